@@ -1,0 +1,40 @@
+// Quantities of the design's units as types, so that a depth is never passed where a force is meant.
+// Inside loops plain doubles are used whose names end in the unit.
+#pragma once
+#include <compare>
+
+namespace osteon {
+
+template <class Tag>
+class Quantity {
+ public:
+  constexpr Quantity() = default;
+  constexpr explicit Quantity(double value) noexcept : value_(value) {}
+  [[nodiscard]] constexpr double value() const noexcept { return value_; }
+  friend constexpr auto operator<=>(Quantity, Quantity) = default;
+  friend constexpr Quantity operator+(Quantity a, Quantity b) noexcept { return Quantity{a.value_ + b.value_}; }
+  friend constexpr Quantity operator-(Quantity a, Quantity b) noexcept { return Quantity{a.value_ - b.value_}; }
+  friend constexpr Quantity operator*(double k, Quantity q) noexcept { return Quantity{k * q.value_}; }
+
+ private:
+  double value_ = 0.0;
+};
+
+using Millimetres = Quantity<struct MillimetreTag>;
+using MillimetresPerSecond = Quantity<struct MillimetrePerSecondTag>;
+using Seconds = Quantity<struct SecondTag>;
+using Newtons = Quantity<struct NewtonTag>;
+using NewtonMillimetres = Quantity<struct NewtonMillimetreTag>;
+using NewtonsPerMillimetre = Quantity<struct NewtonPerMillimetreTag>;
+using GramsPerCm3 = Quantity<struct GramPerCm3Tag>;
+using RevolutionsPerMinute = Quantity<struct RpmTag>;
+
+inline namespace literals {
+constexpr Millimetres operator""_mm(long double v) { return Millimetres{static_cast<double>(v)}; }
+constexpr Seconds operator""_s(long double v) { return Seconds{static_cast<double>(v)}; }
+constexpr Newtons operator""_N(long double v) { return Newtons{static_cast<double>(v)}; }
+constexpr GramsPerCm3 operator""_g_cm3(long double v) { return GramsPerCm3{static_cast<double>(v)}; }
+constexpr RevolutionsPerMinute operator""_rpm(long double v) { return RevolutionsPerMinute{static_cast<double>(v)}; }
+}  // namespace literals
+
+}  // namespace osteon

@@ -1,0 +1,25 @@
+// The name of a cut field's state: equal sets of cuts give equal hashes.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/core/digest.hpp"
+#include "common/core/id.hpp"
+#include "common/geometry/lattice.hpp"
+
+namespace osteon {
+
+// One leaf of a cut field as it is stored and sent: distance in quanta of 2^-10 mm, z fastest.
+struct FieldLeaf {
+  BodyId body;
+  int level = 0;
+  Coord origin;  // samples of the level; a multiple of kLeafSize
+  std::vector<std::int16_t> values;  // kLeafVoxels
+  friend bool operator==(const FieldLeaf&, const FieldLeaf&) = default;
+};
+
+// Hash over the leaves sorted by (body, level, origin); leaves at full band everywhere count as absent.
+[[nodiscard]] Digest field_hash(std::vector<FieldLeaf> leaves, double pitch_mm);
+
+}  // namespace osteon

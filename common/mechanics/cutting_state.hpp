@@ -1,0 +1,29 @@
+// What the tool does to the bone, as felt by the haptic client: drives sound, gauges and the drawn tool.
+#pragma once
+#include <cstdint>
+#include <string>
+
+#include "common/core/id.hpp"
+#include "common/geometry/pose.hpp"
+
+namespace osteon {
+
+enum class CuttingPhase : std::uint8_t { idle = 1, free = 2, cutting = 3, rubbing = 4 };
+
+struct CuttingState {
+  AuthorId author;
+  std::uint64_t state_seq = 0;
+  Pose pose_bone_tool;             // the proxy
+  Pose pose_bone_device;           // the hand
+  std::string tool_name;
+  double spindle_rpm = 0;
+  double feed_mm_per_s = 0;
+  double density_g_cm3 = 0;        // engaged-area weighted
+  double engaged_fraction = 0;     // 0 to 1
+  Vec3 force_physical_N = Vec3::Zero();  // of the bone on the tool, bone frame
+  double torque_Nmm = 0;
+  double depth_mm = 0;             // of the tip below the imported surface
+  CuttingPhase phase = CuttingPhase::idle;
+};
+
+}  // namespace osteon

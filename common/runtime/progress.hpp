@@ -1,0 +1,22 @@
+// How far long work is: a bar on a terminal, a line every tenth elsewhere. Written to standard error.
+#pragma once
+#include <string>
+
+namespace osteon {
+
+class Progress {
+ public:
+  explicit Progress(std::string what);
+  ~Progress();  // ends the line
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  void update(double fraction);  // 0 to 1
+
+ private:
+  std::string what_;
+  bool terminal_;
+  int shown_ = -1;  // per cent on a terminal, tenths elsewhere
+};
+
+}  // namespace osteon

@@ -1,0 +1,73 @@
+// A case: the imported bone, which never changes. A folder with case.json and bone.vdb, named by its content's hash.
+#pragma once
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "common/core/digest.hpp"
+#include "common/core/result.hpp"
+#include "common/volume/dense_volume.hpp"
+
+namespace osteon {
+
+inline constexpr int kCaseSchemaVersion = 1;
+
+// density (g/cm³) = intercept + slope · HU, never below zero.
+struct DensityCalibration {
+  double slope_g_cm3_per_hu = 0.0;
+  double intercept_g_cm3 = 0.0;
+  friend bool operator==(const DensityCalibration&, const DensityCalibration&) = default;
+};
+
+struct CaseInfo {
+  std::string title;                // shown to people; no patient identity
+  std::string source;               // kind and geometry of the input, e.g. "DICOM CT, 512x512x46, 0.84x0.84x3 mm"
+  double pitch_mm = 0;              // h, isotropic
+  DensityCalibration calibration;
+  double threshold_hu = 0;          // bone is at or above it
+  friend bool operator==(const CaseInfo&, const CaseInfo&) = default;
+};
+
+enum class Tissue : std::uint8_t { none = 0, cortical = 1, trabecular = 2 };
+
+// Read-only after construction, so any thread may read it at any time.
+class Case {
+ public:
+  // From the signed distance to the bone surface (mm, negative inside; only the band of 4 voxels matters, beyond it
+  // the sign) and the density (g/cm³), both over the same box.
+  [[nodiscard]] static Result<Case> build(CaseInfo info, const DenseVolume<float>& surface_mm,
+                                          const DenseVolume<float>& density_g_cm3);
+  // Errors: not_found (no such folder), invalid_input (no or broken case.json / bone.vdb, or content that does not
+  // match its hash), unsupported (schema version).
+  [[nodiscard]] static Result<Case> load(const std::filesystem::path& folder);
+  // Writes beside `folder` and renames, so no half-written case is ever seen. Errors: exists, internal (disk).
+  [[nodiscard]] Result<void> save(const std::filesystem::path& folder) const;
+
+  [[nodiscard]] const CaseInfo& info() const;
+  [[nodiscard]] const Digest& hash() const;
+  [[nodiscard]] double pitch_mm() const { return info().pitch_mm; }
+  [[nodiscard]] Box bounds() const;                // of the bone's surface band, mm
+  [[nodiscard]] CoordBox bounds_samples() const;   // the same in samples of level 0
+  [[nodiscard]] double volume_mm3() const;         // of the bone
+
+  // Samples of level 0, z fastest. Signed distance S clipped to ±4 h, and density.
+  void gather_surface(const CoordBox& box, std::span<float> out) const;
+  void gather_density(const CoordBox& box, std::span<float> out) const;
+  // Trilinear, at any point of the bone frame.
+  [[nodiscard]] double surface_mm(const Vec3& point_mm) const;
+  [[nodiscard]] double density_g_cm3(const Vec3& point_mm) const;
+  // A lower bound of the distance to the bone, mm, zero in and near it.
+  [[nodiscard]] double clearance_mm(const Vec3& point_mm) const;
+  [[nodiscard]] Tissue tissue(Coord sample) const;
+  // Whether any sample of level 0 in the box is bone or in the band around it.
+  [[nodiscard]] bool has_bone(const CoordBox& box) const;
+
+  struct Grids;
+
+ private:
+  Case() = default;
+  std::shared_ptr<const Grids> grids_;  // shared by copies of one case: immutable
+};
+
+}  // namespace osteon

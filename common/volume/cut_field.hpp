@@ -1,0 +1,53 @@
+// The cut field R of one body: the only mutable part of a bone. R(x) = min over cuts of the distance to the swept tool.
+#pragma once
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "common/field/cut.hpp"
+#include "common/field/field_hash.hpp"
+#include "common/volume/case.hpp"
+
+namespace osteon {
+
+struct CutReport {
+  std::int64_t visited = 0;    // samples of leaves within the cut's reach (§5.4)
+  std::int64_t computed = 0;   // samples whose distance was evaluated
+  std::int64_t modified = 0;   // samples that changed
+  int level = 0;
+  std::vector<Coord> changed_leaves;  // origins, samples of the level
+};
+
+// Not synchronised: one thread writes, or several read.
+class CutField {
+ public:
+  CutField(Case bone, BodyId body);
+  ~CutField();
+  CutField(CutField&&) noexcept;
+  CutField& operator=(CutField&&) noexcept;
+
+  CutReport apply(const Cut& cut);
+  void restore(const FieldLeaf& leaf);  // sets one leaf, as on joining
+
+  [[nodiscard]] const Case& bone() const;
+  [[nodiscard]] std::vector<FieldLeaf> leaves() const;  // sorted by (level, origin)
+  [[nodiscard]] Digest hash() const;                    // field_hash of leaves()
+  [[nodiscard]] bool has_cuts(int level, const CoordBox& box) const;  // any R below the band in the box of that level
+
+  // R of one level, samples of that level, z fastest; the band where nothing was cut.
+  void gather_cuts(int level, const CoordBox& box, std::span<float> out) const;
+  // f = max(S, −R₀, −R₁, −R₂) on the samples of a level: negative where bone is left, mm.
+  void gather_solid(int level, const CoordBox& box, std::span<float> out) const;
+  // f at a point, each grid trilinear.
+  [[nodiscard]] double solid_mm(const Vec3& point_mm) const;
+  // Bone removed so far, by integrating the solid fraction of cells at the finest level that was cut, mm³.
+  [[nodiscard]] double removed_mm3() const;
+
+  struct Grids;
+
+ private:
+  std::unique_ptr<Grids> grids_;
+};
+
+}  // namespace osteon

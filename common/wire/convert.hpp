@@ -1,0 +1,38 @@
+// Between the generated protocol types and ours. The only place beside the programs' net/ that sees generated types.
+#pragma once
+#include <optional>
+
+#include "common/core/result.hpp"
+#include "common/field/cut.hpp"
+#include "common/field/field_hash.hpp"
+#include "common/surface/mesh_block.hpp"
+#include "common/mechanics/cutting_state.hpp"
+#include "osteon/v1/cutting.pb.h"
+#include "osteon/v1/room.pb.h"
+#include "osteon/v1/types.pb.h"
+#include "osteon/v1/watch.pb.h"
+
+namespace osteon::wire {
+
+// Version of the protocol that this build speaks.
+inline constexpr std::uint32_t kProtocolVersion = 1;
+
+[[nodiscard]] v1::Vector3 to_wire(const Vec3& v);
+[[nodiscard]] Vec3 from_wire(const v1::Vector3& v);
+[[nodiscard]] v1::Pose to_wire(const Pose& pose);
+[[nodiscard]] v1::Coord to_wire(const Coord& c);
+[[nodiscard]] Coord from_wire(const v1::Coord& c);
+[[nodiscard]] v1::Cut to_wire(const Cut& cut);
+[[nodiscard]] v1::CuttingState to_wire(const CuttingState& state);
+[[nodiscard]] v1::FieldLeaf to_wire(const FieldLeaf& leaf);
+[[nodiscard]] std::string to_wire(const Digest& digest);
+
+// Error invalid_input, naming the field, for anything a correct peer never sends: wrong counts, numbers that are not
+// finite, quaternions far from unit, unknown enums, levels out of range.
+[[nodiscard]] Result<Pose> from_wire(const v1::Pose& pose);
+[[nodiscard]] Result<Cut> from_wire(const v1::Cut& cut);
+[[nodiscard]] Result<CuttingState> from_wire(const v1::CuttingState& state);
+[[nodiscard]] Result<FieldLeaf> from_wire(const v1::FieldLeaf& leaf);
+[[nodiscard]] Result<Digest> digest_from_wire(const std::string& bytes);
+
+}  // namespace osteon::wire

@@ -1,0 +1,46 @@
+// Reaching a server and joining its room: what every client does first.
+#pragma once
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "common/core/digest.hpp"
+#include "common/core/id.hpp"
+#include "common/core/result.hpp"
+#include "common/geometry/lattice.hpp"
+
+namespace grpc {
+class Channel;
+}
+
+namespace osteon::wire {
+
+enum class ClientKind { haptic = 1, viewer = 2, audio = 3 };
+
+struct JoinedRoom {
+  std::shared_ptr<grpc::Channel> channel;  // shared with every stub made from it
+  AuthorId author;
+  std::uint64_t server_epoch = 0;
+  std::uint64_t lease_epoch = 0;
+  Digest case_hash;
+  std::string case_title;
+  double pitch_mm = 0;
+  Box bounds;
+  RoomSeq room_seq;
+};
+
+// Errors: unavailable (nobody answers at `address` within `patience`, one sentence with the remedy), unsupported
+// (protocol or kernel version differ), cancelled (`stop` returned true).
+[[nodiscard]] Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
+                                           std::chrono::milliseconds patience, const std::function<bool()>& stop);
+
+struct RoomStatus {
+  RoomSeq room_seq;
+  Digest field_hash;
+  double removed_mm3 = 0;
+  std::uint64_t rejected = 0;
+};
+[[nodiscard]] Result<RoomStatus> room_status(const JoinedRoom& room);
+
+}  // namespace osteon::wire

@@ -1,0 +1,31 @@
+# Finds what deploy/packages.txt installs and gives each library one target name.
+
+find_package(PkgConfig REQUIRED)
+find_package(Threads REQUIRED)
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(Protobuf REQUIRED)
+find_package(tl-expected REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(yaml-cpp REQUIRED)
+find_package(LibArchive REQUIRED)
+find_package(pugixml REQUIRED)
+find_package(GDCM REQUIRED)
+find_package(VTK 9.1 REQUIRED COMPONENTS
+  CommonCore CommonDataModel FiltersCore FiltersSources FiltersGeneral IOImage
+  InteractionStyle RenderingCore RenderingOpenGL2 RenderingFreeType RenderingAnnotation)
+
+pkg_check_modules(grpc REQUIRED IMPORTED_TARGET grpc++)
+pkg_check_modules(sodium REQUIRED IMPORTED_TARGET libsodium)
+pkg_check_modules(zstd REQUIRED IMPORTED_TARGET libzstd)
+pkg_check_modules(rtaudio REQUIRED IMPORTED_TARGET rtaudio)
+pkg_check_modules(sndfile REQUIRED IMPORTED_TARGET sndfile)
+
+# Debian's OpenVDB ships its find module beside the library instead of a package file.
+list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB)
+find_package(OpenVDB 10 REQUIRED)
+
+include(GoogleTest)
+find_package(GTest REQUIRED)
+find_package(benchmark REQUIRED)

@@ -1,0 +1,54 @@
+# How every Osteon target is declared: one library per folder, sources listed, headers in a FILE_SET.
+#
+#   osteon_library(tools SOURCES drill.cpp HEADERS drill.hpp DEPS osteon::geometry PRIVATE_DEPS yaml-cpp)
+#   osteon_program(osteon-server SOURCES main.cpp DEPS osteon::room)
+#   osteon_test(unit.field SOURCES kernel_test.cpp DEPS osteon::field)
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+
+set(OSTEON_SANITIZE "" CACHE STRING "Sanitizers to build with, as given to -fsanitize=")
+
+add_library(osteon_flags INTERFACE)
+# Contraction off everywhere: the same source gives the same numbers on every compiler and processor.
+target_compile_options(osteon_flags INTERFACE -Wall -Wextra -Wshadow -Wnon-virtual-dtor -ffp-contract=off)
+target_include_directories(osteon_flags INTERFACE ${PROJECT_SOURCE_DIR})
+if(OSTEON_SANITIZE)
+  target_compile_options(osteon_flags INTERFACE -fsanitize=${OSTEON_SANITIZE} -fno-omit-frame-pointer)
+  target_link_options(osteon_flags INTERFACE -fsanitize=${OSTEON_SANITIZE})
+endif()
+
+function(osteon_library name)
+  cmake_parse_arguments(arg "" "" "SOURCES;HEADERS;DEPS;PRIVATE_DEPS" ${ARGN})
+  set(target osteon_${name})
+  if(arg_SOURCES)
+    add_library(${target} STATIC ${arg_SOURCES})
+    set(scope PUBLIC)
+    target_link_libraries(${target} PRIVATE ${arg_PRIVATE_DEPS})
+  else()
+    add_library(${target} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  add_library(osteon::${name} ALIAS ${target})
+  target_sources(${target} ${scope} FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR} FILES ${arg_HEADERS})
+  target_link_libraries(${target} ${scope} osteon_flags ${arg_DEPS})
+endfunction()
+
+function(osteon_program name)
+  cmake_parse_arguments(arg "" "" "SOURCES;DEPS" ${ARGN})
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE osteon_flags ${arg_DEPS})
+endfunction()
+
+# A GoogleTest program, registered with ctest case by case. LABELS name the kind of test.
+function(osteon_test name)
+  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE osteon_flags ${arg_DEPS} GTest::gmock_main)
+  if(NOT arg_TIMEOUT)
+    set(arg_TIMEOUT 120)
+  endif()
+  gtest_discover_tests(${name} TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
+    PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}")
+endfunction()
