@@ -1,0 +1,37 @@
+#include "tests/support/wait.hpp"
+
+#include <fstream>
+#include <thread>
+
+namespace osteon::test {
+
+bool wait_until(const std::function<bool()>& condition, std::chrono::milliseconds patience) {
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() >= deadline) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds{2});
+  }
+  return true;
+}
+
+bool wait_for_file(const std::filesystem::path& file, std::chrono::milliseconds patience) {
+  return wait_until(
+      [&] {
+        std::error_code error;
+        const auto size = std::filesystem::file_size(file, error);
+        return !error && size > 0;
+      },
+      patience);
+}
+
+std::optional<std::string> wait_for_address(const std::filesystem::path& file, std::chrono::milliseconds patience) {
+  std::string line;
+  const auto read = [&] {
+    std::ifstream in(file);
+    return std::getline(in, line) && !in.eof();  // the line's end was written too
+  };
+  if (!wait_until(read, patience)) return std::nullopt;
+  return line;
+}
+
+}  // namespace osteon::test

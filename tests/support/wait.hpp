@@ -1,0 +1,21 @@
+// Waiting in tests for what another process does: polled against a deadline, never a fixed sleep.
+#pragma once
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+
+namespace osteon::test {
+
+// True as soon as `condition` holds; false when it does not within `patience`.
+[[nodiscard]] bool wait_until(const std::function<bool()>& condition, std::chrono::milliseconds patience);
+
+// Until the file exists and is not empty.
+[[nodiscard]] bool wait_for_file(const std::filesystem::path& file, std::chrono::milliseconds patience);
+
+// The first line of a server's address file, e.g. "127.0.0.1:40123".
+[[nodiscard]] std::optional<std::string> wait_for_address(const std::filesystem::path& file,
+                                                          std::chrono::milliseconds patience);
+
+}  // namespace osteon::test
