@@ -7,6 +7,8 @@
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
+# Lets tests/architecture compile every header alone; not part of the normal build.
+set(CMAKE_VERIFY_INTERFACE_HEADER_SETS ON)
 # All programs and tests of a build lie in one folder, so that they find each other wherever the build is.
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
 

@@ -1,0 +1,106 @@
+"""The rules of DESIGN section 2 for source files: who may include whom, which headers are heavy, how long files are."""
+import re
+from pathlib import Path
+
+# Folder of common/ -> the folders of common/ that it may include beside itself.
+LAYERS = {
+    "core": set(),
+    "geometry": {"core"},
+    "tools": {"core", "geometry"},
+    "field": {"core", "geometry", "tools"},
+    "volume": {"core", "geometry", "tools", "field"},
+    "imaging": {"core", "geometry", "tools", "field", "volume"},
+    "surface": {"core", "geometry", "tools", "field"},
+    "mechanics": {"core", "geometry", "tools", "field"},
+    "sound": {"core"},
+    "runtime": {"core"},
+    "wire": {"core", "geometry", "tools", "field", "surface", "mechanics"},
+}
+PROGRAMS = ("server", "haptic_client", "viewer_client", "audio_client")
+# Inside a program: folders that only the program's app (and tests) put together.
+OUTER = {"app": set(), "net": {"app"}}
+
+# What is slow to compile or leaks a library's habits: kept out of headers, and within the folders named here.
+HEAVY = {
+    "OpenVDB": (re.compile(r"^openvdb/"), ("common/volume",)),
+    "VTK": (re.compile(r"^vtk"), ("viewer_client", "common/volume")),
+    "gRPC": (re.compile(r"^grpc(pp)?/"), ("common/wire", "*/net")),
+    "GDCM": (re.compile(r"^gdcm"), ("common/imaging", "server/import")),
+}
+GENERATED = re.compile(r"\.pb\.h$")
+GENERATED_HOMES = ("common/wire", "*/net")
+
+SOURCE_ENDS = (".hpp", ".cpp", ".h", ".cc")
+MAX_HEADER_LINES = 300
+MAX_FILE_LINES = 800
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
+
+
+def source_files(root: Path):
+    folders = ("common", *PROGRAMS, "tests")
+    return sorted(p for f in folders for p in (root / f).rglob("*") if p.suffix in SOURCE_ENDS)
+
+
+def includes(text: str):
+    return INCLUDE.findall(text)
+
+
+def lives_in(path: str, homes) -> bool:
+    parts = path.split("/")
+    for home in homes:
+        wanted = home.split("/")
+        if len(parts) > len(wanted) and all(w in ("*", p) for w, p in zip(wanted, parts)):
+            return True
+    return False
+
+
+def layer_faults(path: str, text: str):
+    """One sentence for each include of `path` (relative to the root, '/'-separated) that the layers forbid."""
+    parts = path.split("/")
+    if parts[0] == "tests":
+        return []
+    faults = []
+    for include in includes(text):
+        target = include.split("/")
+        if target[0] == "tests":
+            faults.append(f"{path}: includes {include}, but only tests include tests")
+        elif target[0] == "common" and len(target) > 2:
+            if parts[0] == "common" and target[1] != parts[1] and target[1] not in LAYERS.get(parts[1], set()):
+                faults.append(f"{path}: common/{parts[1]} must not include {include}")
+            if target[1] == "imaging" and parts[:2] not in (["common", "imaging"], ["server", "import"]):
+                faults.append(f"{path}: only server/import uses common/imaging, not this file ({include})")
+        elif target[0] in PROGRAMS:
+            if parts[0] != target[0]:
+                faults.append(f"{path}: belongs to {parts[0]} and must not include {include}")
+            elif len(target) > 2 and target[1] != parts[1] and target[1] in OUTER and parts[1] not in OUTER[target[1]]:
+                faults.append(f"{path}: only {', '.join(sorted(OUTER[target[1]])) or 'tests'} may include {include}")
+        if GENERATED.search(include) and not lives_in(path, GENERATED_HOMES):
+            faults.append(f"{path}: generated code ({include}) stops at common/wire and the programs' net folders")
+        for name, (pattern, homes) in HEAVY.items():
+            if not pattern.search(include):
+                continue
+            if path.endswith((".hpp", ".h")):
+                faults.append(f"{path}: {name} belongs in .cpp files only ({include})")
+            elif not lives_in(path, homes):
+                faults.append(f"{path}: {name} is used in {', '.join(homes)} only ({include})")
+    if parts[0] == "common" and len(parts) > 2 and parts[1] not in LAYERS:
+        faults.append(f"{path}: common/{parts[1]} is not a layer of the design")
+    return faults
+
+
+def size_faults(path: str, text: str):
+    lines = text.count("\n")
+    if path.endswith((".hpp", ".h")) and lines >= MAX_HEADER_LINES:
+        return [f"{path}: {lines} lines; a header is a page, below {MAX_HEADER_LINES}"]
+    if lines >= MAX_FILE_LINES:
+        return [f"{path}: {lines} lines; below {MAX_FILE_LINES}, usually it is two things in one"]
+    return []
+
+
+def declaration_faults(path: str, cmake_text: str):
+    """A header that no target lists is never compiled alone, and a source never at all."""
+    name = path.rsplit("/", 1)[-1]
+    if re.search(rf"(?<![\w/.-]){re.escape(name)}(?![\w.-])", cmake_text):
+        return []
+    return [f"{path}: not listed in the CMakeLists.txt of its folder"]

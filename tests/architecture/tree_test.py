@@ -1,0 +1,82 @@
+"""Holds every source file to the layers and sizes of the design; and shows that each rule can fail."""
+import os
+import unittest
+from pathlib import Path
+
+import tree
+
+ROOT = Path(os.environ.get("OSTEON_SOURCE_DIR", Path(__file__).resolve().parents[2]))
+
+
+def relative(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+class TheTree(unittest.TestCase):
+    def all_faults(self, check):
+        files = tree.source_files(ROOT)
+        self.assertGreater(len(files), 20, f"no sources found under {ROOT}")
+        return [fault for f in files for fault in check(relative(f), f.read_text(encoding="utf-8"))]
+
+    def test_includes_follow_the_layers(self):
+        self.assertEqual(self.all_faults(tree.layer_faults), [])
+
+    def test_files_are_short(self):
+        self.assertEqual(self.all_faults(tree.size_faults), [])
+
+    def test_every_file_is_built(self):
+        def check(path, _text):
+            cmake = (ROOT / path).parent / "CMakeLists.txt"
+            return tree.declaration_faults(path, cmake.read_text() if cmake.exists() else "")
+        self.assertEqual(self.all_faults(check), [])
+
+
+class TheRules(unittest.TestCase):
+    def faults(self, path, include):
+        return tree.layer_faults(path, f'#include "{include}"\n')
+
+    def test_lower_layers_do_not_see_higher_ones(self):
+        self.assertTrue(self.faults("common/field/kernel.cpp", "common/volume/case.hpp"))
+        self.assertTrue(self.faults("common/core/x.hpp", "common/geometry/pose.hpp"))
+        self.assertTrue(self.faults("common/sound/x.cpp", "common/runtime/log.hpp"))
+        self.assertFalse(self.faults("common/volume/case.cpp", "common/field/cut.hpp"))
+
+    def test_programs_do_not_see_each_other(self):
+        self.assertTrue(self.faults("viewer_client/app/main.cpp", "server/room/room.hpp"))
+        self.assertTrue(self.faults("common/wire/x.cpp", "server/room/room.hpp"))
+        self.assertFalse(self.faults("server/net/x.cpp", "server/room/room.hpp"))
+
+    def test_logic_does_not_see_the_network_or_main(self):
+        self.assertTrue(self.faults("server/room/room.cpp", "server/net/service.hpp"))
+        self.assertTrue(self.faults("haptic_client/net/x.cpp", "haptic_client/app/options.hpp"))
+        self.assertFalse(self.faults("server/app/main.cpp", "server/net/service.hpp"))
+
+    def test_imaging_is_for_the_importer(self):
+        self.assertTrue(self.faults("server/room/room.cpp", "common/imaging/dicom.hpp"))
+        self.assertFalse(self.faults("server/import/main.cpp", "common/imaging/dicom.hpp"))
+
+    def test_generated_types_stop_at_the_wire(self):
+        self.assertTrue(self.faults("server/room/room.cpp", "osteon/v1/types.pb.h"))
+        self.assertFalse(self.faults("server/net/x.cpp", "osteon/v1/room.grpc.pb.h"))
+
+    def test_heavy_headers_stay_in_sources(self):
+        self.assertTrue(self.faults("common/volume/case.hpp", "openvdb/openvdb.h"))
+        self.assertTrue(self.faults("viewer_client/render/x.hpp", "vtkActor.h"))
+        self.assertTrue(self.faults("server/room/room.cpp", "grpcpp/grpcpp.h"))
+        self.assertFalse(self.faults("common/volume/case.cpp", "openvdb/openvdb.h"))
+
+    def test_product_code_does_not_see_tests(self):
+        self.assertTrue(self.faults("server/room/room.cpp", "tests/support/process.hpp"))
+
+    def test_sizes(self):
+        self.assertTrue(tree.size_faults("common/core/x.hpp", "\n" * 300))
+        self.assertFalse(tree.size_faults("common/core/x.hpp", "\n" * 299))
+        self.assertTrue(tree.size_faults("common/core/x.cpp", "\n" * 800))
+
+    def test_an_unlisted_file_is_noticed(self):
+        self.assertTrue(tree.declaration_faults("common/core/check.hpp", "SOURCES precheck.hpp check.cpp"))
+        self.assertFalse(tree.declaration_faults("common/core/check.hpp", "HEADERS check.hpp)"))
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
