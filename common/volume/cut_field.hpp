@@ -37,6 +37,8 @@ class CutField {
 
   // R of one level, samples of that level, z fastest; the band where nothing was cut.
   void gather_cuts(int level, const CoordBox& box, std::span<float> out) const;
+  // S of the case on the samples of a level, trilinear between those of level 0.
+  void gather_surface(int level, const CoordBox& box, std::span<float> out) const;
   // f = max(S, −R₀, −R₁, −R₂) on the samples of a level: negative where bone is left, mm.
   void gather_solid(int level, const CoordBox& box, std::span<float> out) const;
   // f at a point, each grid trilinear.

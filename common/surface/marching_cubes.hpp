@@ -1,0 +1,26 @@
+// Marching cubes: which edges of a cell the surface crosses, and the triangles between them.
+// Lorensen and Cline, Marching cubes, SIGGRAPH 1987; the table is derived here, not tabulated by hand.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace osteon {
+
+// Corner i of a cell lies at (i >> 2 & 1, i >> 1 & 1, i & 1); a case has bit i set where corner i is solid.
+struct CellEdge {
+  std::uint8_t corner;  // the end with the smaller coordinates
+  std::uint8_t axis;    // 0, 1, 2: towards +x, +y, +z
+};
+inline constexpr int kCellEdges = 12;
+
+struct MarchingCubesTable {
+  std::array<CellEdge, kCellEdges> edges;
+  // Triangles of each case as edge numbers, counter-clockwise seen from outside the solid. On a face with two solid
+  // corners across from each other the surface separates them; as the rule sees only the face, neighbours agree.
+  std::array<std::vector<std::array<std::uint8_t, 3>>, 256> triangles;
+};
+
+[[nodiscard]] const MarchingCubesTable& marching_cubes_table();
+
+}  // namespace osteon

@@ -1,0 +1,343 @@
+#include "common/volume/case.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "common/core/check.hpp"
+#include "common/field/kernel.hpp"
+#include "common/volume/sparse_volume.hpp"
+
+namespace osteon {
+
+using nlohmann::json;
+
+// Grids of one case. `clearance` has one sample for each leaf of level 0, at the leaf's middle.
+struct Case::Grids {
+  CaseInfo info;
+  Digest hash;
+  SparseVolume surface, density, clearance, bone, tissue;
+  CoordBox bounds;
+  double volume_mm3 = 0.0;
+};
+
+namespace {
+
+constexpr const char* kInfoFile = "case.json";
+constexpr const char* kVolumeFile = "bone.vdb";
+const std::vector<std::string> kGridNames{"surface", "density", "clearance", "bone", "tissue"};
+
+// Above it bone counts as cortical. [A] Apparent densities of cancellous bone end near here.
+constexpr float kCorticalFrom_g_cm3 = 1.0f;
+// Clearance is kept this far from the bone, in leaves; farther points read this distance.
+constexpr int kClearanceLeaves = 12;
+
+float to_quantum(float mm) { return std::round(mm * 1024.0f) / 1024.0f + 0.0f; }
+
+// The leaf's samples, with `outside` where the volume ends.
+void read_leaf(const DenseVolume<float>& from, Coord origin, float outside, std::span<float, kLeafVoxels> out) {
+  for (std::int32_t x = 0; x < kLeafSize; ++x)
+    for (std::int32_t y = 0; y < kLeafSize; ++y)
+      for (std::int32_t z = 0; z < kLeafSize; ++z) {
+        const Coord c = origin + Coord{x, y, z};
+        out[static_cast<std::size_t>(x * 64 + y * 8 + z)] = from.box.contains(c) ? from.at(c) : outside;
+      }
+}
+
+void hash_volume(Hasher& hasher, const std::string& name, const SparseVolume& volume) {
+  hasher.text(name);
+  hasher.number(static_cast<double>(volume.background()));
+  const auto place = [&](Coord c) {
+    for (const std::int32_t i : {c.x, c.y, c.z}) hasher.integer(static_cast<std::uint32_t>(i));
+  };
+  for (const Coord origin : volume.constants()) {
+    place(origin);
+    hasher.number(static_cast<double>(volume.value(origin)));
+  }
+  hasher.text("leaves");
+  for (const Coord origin : volume.leaves()) {
+    place(origin);
+    hasher.bytes(std::as_bytes(std::span(volume.leaf(origin), kLeafVoxels)));
+  }
+}
+
+Digest content_hash(const Case::Grids& grids) {
+  Hasher hasher;
+  hasher.integer(kCaseSchemaVersion);
+  hasher.text(grids.info.title);
+  hasher.text(grids.info.source);
+  hasher.number(grids.info.pitch_mm);
+  hasher.number(grids.info.calibration.slope_g_cm3_per_hu);
+  hasher.number(grids.info.calibration.intercept_g_cm3);
+  hasher.number(grids.info.threshold_hu);
+  const SparseVolume* volumes[] = {&grids.surface, &grids.density, &grids.clearance, &grids.bone, &grids.tissue};
+  for (std::size_t i = 0; i < kGridNames.size(); ++i) hash_volume(hasher, kGridNames[i], *volumes[i]);
+  return hasher.finish();
+}
+
+// Box and volume of the bone, which follow from the surface.
+void measure(Case::Grids& grids) {
+  constexpr std::int32_t kFar = std::numeric_limits<std::int32_t>::max();
+  grids.bounds = {{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
+  const auto include = [&](Coord origin) {
+    CoordBox& b = grids.bounds;
+    b.min = {std::min(b.min.x, origin.x), std::min(b.min.y, origin.y), std::min(b.min.z, origin.z)};
+    b.max = {std::max(b.max.x, origin.x + 7), std::max(b.max.y, origin.y + 7), std::max(b.max.z, origin.z + 7)};
+  };
+  const double pitch = grids.info.pitch_mm;
+  double samples = 0.0;
+  for (const Coord origin : grids.surface.constants()) {
+    include(origin);
+    samples += kLeafVoxels;
+  }
+  for (const Coord origin : grids.surface.leaves()) {
+    include(origin);
+    const float* leaf = grids.surface.leaf(origin);
+    // A sample whose distance is within half a pitch of the surface is bone in part.
+    for (int i = 0; i < kLeafVoxels; ++i) samples += std::clamp(0.5 - static_cast<double>(leaf[i]) / pitch, 0.0, 1.0);
+  }
+  grids.volume_mm3 = samples * pitch * pitch * pitch;
+}
+
+// Lower envelope of parabolas along one line of squared distances: exact Euclidean distance transform, one axis at a
+// time (Felzenszwalb and Huttenlocher, Distance transforms of sampled functions, 2012).
+void distance_along_line(std::vector<double>& line) {
+  const int n = static_cast<int>(line.size());
+  std::vector<int> parabola(line.size());
+  std::vector<double> from(line.size() + 1), result(line.size());
+  int last = -1;
+  for (int q = 0; q < n; ++q) {
+    if (std::isinf(line[static_cast<std::size_t>(q)])) continue;
+    double cross = -std::numeric_limits<double>::infinity();
+    while (last >= 0) {
+      const int p = parabola[static_cast<std::size_t>(last)];
+      cross = (line[static_cast<std::size_t>(q)] + q * q - line[static_cast<std::size_t>(p)] - p * p) / (2.0 * (q - p));
+      if (cross > from[static_cast<std::size_t>(last)]) break;
+      --last;
+    }
+    if (last < 0) cross = -std::numeric_limits<double>::infinity();
+    ++last;
+    parabola[static_cast<std::size_t>(last)] = q;
+    from[static_cast<std::size_t>(last)] = cross;
+  }
+  if (last < 0) return;
+  for (int q = 0, k = 0; q < n; ++q) {
+    while (k < last && from[static_cast<std::size_t>(k + 1)] < q) ++k;
+    const int p = parabola[static_cast<std::size_t>(k)];
+    result[static_cast<std::size_t>(q)] = (q - p) * (q - p) + line[static_cast<std::size_t>(p)];
+  }
+  line = std::move(result);
+}
+
+// Distance between leaves, less one leaf's diagonal on either side, bounds the distance to the bone from below.
+SparseVolume make_clearance(const SparseVolume& surface, double pitch) {
+  std::vector<Coord> occupied = surface.leaves();
+  const std::vector<Coord> inside = surface.constants();
+  occupied.insert(occupied.end(), inside.begin(), inside.end());
+  const double leaf_mm = kLeafSize * pitch;
+  SparseVolume clearance(static_cast<float>((kClearanceLeaves - 2) * leaf_mm));
+  if (occupied.empty()) return clearance;
+
+  CoordBox box{shift_down(occupied.front(), 3), shift_down(occupied.front(), 3)};
+  for (const Coord origin : occupied) {
+    const Coord c = shift_down(origin, 3);
+    box.min = {std::min(box.min.x, c.x), std::min(box.min.y, c.y), std::min(box.min.z, c.z)};
+    box.max = {std::max(box.max.x, c.x), std::max(box.max.y, c.y), std::max(box.max.z, c.z)};
+  }
+  DenseVolume<double> squared(box.grown(kClearanceLeaves), std::numeric_limits<double>::infinity());
+  for (const Coord origin : occupied) squared.at(shift_down(origin, 3)) = 0.0;
+
+  const Coord dims = squared.box.dims();
+  const std::size_t strides[3] = {static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z), static_cast<std::size_t>(dims.z), 1};
+  const std::size_t sizes[3] = {static_cast<std::size_t>(dims.x), static_cast<std::size_t>(dims.y), static_cast<std::size_t>(dims.z)};
+  std::vector<double> line;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    for (std::size_t i = 0; i < sizes[u]; ++i)
+      for (std::size_t j = 0; j < sizes[v]; ++j) {
+        const std::size_t start = i * strides[u] + j * strides[v];
+        line.resize(sizes[axis]);
+        for (std::size_t k = 0; k < sizes[axis]; ++k) line[k] = squared.values[start + k * strides[axis]];
+        distance_along_line(line);
+        for (std::size_t k = 0; k < sizes[axis]; ++k) squared.values[start + k * strides[axis]] = line[k];
+      }
+  }
+  const Coord low = squared.box.min, high = squared.box.max;
+  for (std::int32_t x = low.x; x <= high.x; ++x)
+    for (std::int32_t y = low.y; y <= high.y; ++y)
+      for (std::int32_t z = low.z; z <= high.z; ++z) {
+        const double leaves = std::sqrt(squared.at({x, y, z})) - std::sqrt(3.0);
+        const float bound = std::clamp(static_cast<float>(leaves * leaf_mm), 0.0f, clearance.background());
+        if (bound >= clearance.background()) continue;
+        clearance.edit_leaf(floor_to({x, y, z}, kLeafSize))[(x & 7) * 64 + (y & 7) * 8 + (z & 7)] = bound;
+      }
+  return clearance;
+}
+
+json to_json(const Case::Grids& grids) {
+  const CaseInfo& info = grids.info;
+  return {{"schema_version", kCaseSchemaVersion},
+          {"title", info.title},
+          {"source", info.source},
+          {"pitch_mm", info.pitch_mm},
+          {"calibration", {{"slope_g_cm3_per_hu", info.calibration.slope_g_cm3_per_hu},
+                           {"intercept_g_cm3", info.calibration.intercept_g_cm3}}},
+          {"segmentation", {{"threshold_hu", info.threshold_hu}}},
+          {"content_hash", to_hex(grids.hash)}};
+}
+
+}  // namespace
+
+Result<Case> Case::build(CaseInfo info, const DenseVolume<float>& surface_mm, const DenseVolume<float>& density_g_cm3) {
+  if (!(info.pitch_mm > 0.0)) return failure(ErrorCode::invalid_input, "a case needs a pitch above zero");
+  OSTEON_CHECK(surface_mm.box == density_g_cm3.box);
+  const float band = band_mm(info.pitch_mm);
+  auto grids = std::make_shared<Grids>(Grids{std::move(info), {}, SparseVolume(band), SparseVolume(0.0f), SparseVolume(0.0f),
+                                             SparseVolume(0.0f), SparseVolume(0.0f), {}, 0.0});
+  std::array<float, kLeafVoxels> s, rho;
+  const Coord first = floor_to(surface_mm.box.min, kLeafSize), last = surface_mm.box.max;
+  for (std::int32_t x = first.x; x <= last.x; x += kLeafSize)
+    for (std::int32_t y = first.y; y <= last.y; y += kLeafSize)
+      for (std::int32_t z = first.z; z <= last.z; z += kLeafSize) {
+        const Coord origin{x, y, z};
+        read_leaf(surface_mm, origin, band, s);
+        for (float& value : s) value = std::clamp(to_quantum(value), -band, band);
+        if (std::ranges::all_of(s, [&](float v) { return v == band; })) continue;
+        if (std::ranges::all_of(s, [&](float v) { return v == -band; })) {
+          grids->surface.set_constant(origin, -band);
+          grids->bone.set_constant(origin, 1.0f);
+        } else {
+          std::ranges::copy(s, grids->surface.edit_leaf(origin));
+          std::ranges::transform(s, grids->bone.edit_leaf(origin), [](float v) { return v < 0.0f ? 1.0f : 0.0f; });
+        }
+        read_leaf(density_g_cm3, origin, 0.0f, rho);
+        float* tissue = grids->tissue.edit_leaf(origin);
+        for (std::size_t i = 0; i < kLeafVoxels; ++i) {
+          if (!std::isfinite(rho[i])) return failure(ErrorCode::invalid_input, "the density has values that are not numbers");
+          rho[i] = std::max(0.0f, rho[i]);
+          const Tissue kind = s[i] >= 0.0f ? Tissue::none : rho[i] >= kCorticalFrom_g_cm3 ? Tissue::cortical : Tissue::trabecular;
+          tissue[i] = static_cast<float>(kind);
+        }
+        std::ranges::copy(rho, grids->density.edit_leaf(origin));
+      }
+  measure(*grids);
+  if (grids->volume_mm3 <= 0.0)
+    return failure(ErrorCode::invalid_input, "there is no bone at or above the threshold; choose a lower --threshold");
+  grids->clearance = make_clearance(grids->surface, grids->info.pitch_mm);
+  grids->hash = content_hash(*grids);
+  Case result;
+  result.grids_ = std::move(grids);
+  return result;
+}
+
+Result<Case> Case::load(const std::filesystem::path& folder) {
+  const auto file = folder / kInfoFile;
+  if (!std::filesystem::is_directory(folder))
+    return failure(ErrorCode::not_found, "there is no case folder " + folder.string() + "; make one with osteon-import");
+  std::ifstream in(file);
+  if (!in)
+    return failure(ErrorCode::invalid_input, folder.string() + " is not a case: it has no " + kInfoFile + "; make one with osteon-import");
+  CaseInfo info;
+  Digest named;
+  try {
+    const json j = json::parse(in);
+    const int version = j.at("schema_version").get<int>();
+    if (version != kCaseSchemaVersion)
+      return failure(ErrorCode::unsupported, file.string() + ": schema_version is " + std::to_string(version) + ", but this program reads version " +
+                         std::to_string(kCaseSchemaVersion) + "; import the case again with this program's osteon-import");
+    info.title = j.at("title").get<std::string>();
+    info.source = j.at("source").get<std::string>();
+    info.pitch_mm = j.at("pitch_mm").get<double>();
+    info.calibration.slope_g_cm3_per_hu = j.at("calibration").at("slope_g_cm3_per_hu").get<double>();
+    info.calibration.intercept_g_cm3 = j.at("calibration").at("intercept_g_cm3").get<double>();
+    info.threshold_hu = j.at("segmentation").at("threshold_hu").get<double>();
+    const auto hash = digest_from_hex(j.at("content_hash").get<std::string>());
+    if (!hash) return failure(ErrorCode::invalid_input, file.string() + ": content_hash: " + hash.error().message);
+    named = *hash;
+  } catch (const std::exception& e) {
+    return failure(ErrorCode::invalid_input, file.string() + " is not a case description (" + e.what() + "); import the case again");
+  }
+  if (!(info.pitch_mm > 0.0))
+    return failure(ErrorCode::invalid_input, file.string() + ": pitch_mm must be above zero; import the case again");
+  auto volumes = load_volumes(folder / kVolumeFile, kGridNames);
+  if (!volumes) return tl::unexpected(volumes.error());
+  auto& v = *volumes;
+  auto grids = std::make_shared<Grids>(Grids{std::move(info), named, std::move(v[0]), std::move(v[1]), std::move(v[2]), std::move(v[3]),
+                                             std::move(v[4]), {}, 0.0});
+  if (content_hash(*grids) != named)
+    return failure(ErrorCode::invalid_input, folder.string() + ": the content does not match content_hash of " + kInfoFile + "; import the case again");
+  measure(*grids);
+  Case result;
+  result.grids_ = std::move(grids);
+  return result;
+}
+
+Result<void> Case::save(const std::filesystem::path& folder) const {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (fs::exists(folder, error))
+    return failure(ErrorCode::exists, folder.string() + " is already there; choose another name or remove it first");
+  fs::path partial = folder;
+  if (!partial.has_filename()) partial = partial.parent_path();
+  const fs::path target = partial;
+  partial += ".partial-" + std::to_string(::getpid());
+  fs::create_directories(partial, error);
+  if (error) return failure(ErrorCode::internal, "cannot make the folder " + partial.string() + ": " + error.message());
+
+  const auto write = [&]() -> Result<void> {
+    const auto& g = *grids_;
+    if (auto saved = save_volumes(partial / kVolumeFile, g.info.pitch_mm,
+                                  {{"surface", &g.surface}, {"density", &g.density}, {"clearance", &g.clearance},
+                                   {"bone", &g.bone}, {"tissue", &g.tissue}});
+        !saved)
+      return saved;
+    std::ofstream out(partial / kInfoFile);
+    out << to_json(g).dump(2) << '\n';
+    out.close();
+    if (!out) return failure(ErrorCode::internal, "cannot write " + (partial / kInfoFile).string() + "; is the disk full?");
+    fs::rename(partial, target, error);
+    if (error) return failure(ErrorCode::internal, "cannot rename " + partial.string() + " to " + target.string() + ": " + error.message());
+    return {};
+  };
+  const Result<void> written = write();
+  if (!written) fs::remove_all(partial, error);
+  return written;
+}
+
+const CaseInfo& Case::info() const { return grids_->info; }
+const Digest& Case::hash() const { return grids_->hash; }
+CoordBox Case::bounds_samples() const { return grids_->bounds; }
+double Case::volume_mm3() const { return grids_->volume_mm3; }
+
+Box Case::bounds() const {
+  return {position_mm(grids_->bounds.min, pitch_mm()), position_mm(grids_->bounds.max, pitch_mm())};
+}
+
+void Case::gather_surface(const CoordBox& box, std::span<float> out) const { grids_->surface.gather(box, out); }
+void Case::gather_density(const CoordBox& box, std::span<float> out) const { grids_->density.gather(box, out); }
+double Case::surface_mm(const Vec3& point_mm) const { return grids_->surface.trilinear(point_mm / pitch_mm()); }
+double Case::density_g_cm3(const Vec3& point_mm) const { return grids_->density.trilinear(point_mm / pitch_mm()); }
+
+double Case::clearance_mm(const Vec3& point_mm) const {
+  const Vec3 leaf = point_mm / (kLeafSize * pitch_mm());
+  return static_cast<double>(grids_->clearance.value({static_cast<std::int32_t>(std::floor(leaf.x())), static_cast<std::int32_t>(std::floor(leaf.y())),
+                                                      static_cast<std::int32_t>(std::floor(leaf.z()))}));
+}
+
+Tissue Case::tissue(Coord sample) const { return static_cast<Tissue>(static_cast<int>(grids_->tissue.value(sample))); }
+
+bool Case::has_bone(const CoordBox& box) const {
+  const Coord first = floor_to(box.min, kLeafSize);
+  for (std::int32_t x = first.x; x <= box.max.x; x += kLeafSize)
+    for (std::int32_t y = first.y; y <= box.max.y; y += kLeafSize)
+      for (std::int32_t z = first.z; z <= box.max.z; z += kLeafSize)
+        if (grids_->surface.leaf({x, y, z}) || grids_->surface.value({x, y, z}) < 0.0f) return true;
+  return false;
+}
+
+}  // namespace osteon

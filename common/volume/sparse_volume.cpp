@@ -1,0 +1,169 @@
+#include "common/volume/sparse_volume.hpp"
+
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <mutex>
+
+#include "common/core/check.hpp"
+
+namespace osteon {
+
+using Grid = openvdb::FloatGrid;
+using Tree = Grid::TreeType;
+using Leaf = Tree::LeafNodeType;
+static_assert(Leaf::SIZE == kLeafVoxels);
+
+struct SparseVolume::Impl {
+  Grid::Ptr grid;
+};
+
+namespace {
+
+void initialize_once() {
+  static std::once_flag once;
+  std::call_once(once, [] { openvdb::initialize(); });
+}
+
+openvdb::Coord vdb(Coord c) { return {c.x, c.y, c.z}; }
+Coord ours(const openvdb::Coord& c) { return {c.x(), c.y(), c.z()}; }
+
+}  // namespace
+
+SparseVolume::SparseVolume(float background) : impl_(std::make_unique<Impl>()) {
+  initialize_once();
+  impl_->grid = Grid::create(background);
+}
+SparseVolume::~SparseVolume() = default;
+SparseVolume::SparseVolume(SparseVolume&&) noexcept = default;
+SparseVolume& SparseVolume::operator=(SparseVolume&&) noexcept = default;
+
+float SparseVolume::background() const { return impl_->grid->background(); }
+
+float SparseVolume::value(Coord sample) const { return impl_->grid->tree().getValue(vdb(sample)); }
+
+void SparseVolume::gather(const CoordBox& box, std::span<float> out) const {
+  if (box.empty()) return;
+  const Coord dims = box.dims();
+  OSTEON_CHECK(out.size() == static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z));
+  const Grid::ConstUnsafeAccessor accessor = impl_->grid->getConstUnsafeAccessor();
+  const Coord first = floor_to(box.min, kLeafSize);
+  for (std::int32_t lx = first.x; lx <= box.max.x; lx += kLeafSize)
+    for (std::int32_t ly = first.y; ly <= box.max.y; ly += kLeafSize)
+      for (std::int32_t lz = first.z; lz <= box.max.z; lz += kLeafSize) {
+        const Leaf* leaf = accessor.probeConstLeaf(openvdb::Coord(lx, ly, lz));
+        const float* data = leaf ? leaf->buffer().data() : nullptr;
+        const float constant = leaf ? 0.0f : accessor.getValue(openvdb::Coord(lx, ly, lz));
+        const std::int32_t x0 = std::max(lx, box.min.x), x1 = std::min(lx + kLeafSize - 1, box.max.x);
+        const std::int32_t y0 = std::max(ly, box.min.y), y1 = std::min(ly + kLeafSize - 1, box.max.y);
+        const std::int32_t z0 = std::max(lz, box.min.z), z1 = std::min(lz + kLeafSize - 1, box.max.z);
+        for (std::int32_t x = x0; x <= x1; ++x)
+          for (std::int32_t y = y0; y <= y1; ++y) {
+            float* row = out.data() + (static_cast<std::size_t>(x - box.min.x) * static_cast<std::size_t>(dims.y) +
+                                       static_cast<std::size_t>(y - box.min.y)) * static_cast<std::size_t>(dims.z) +
+                         (z0 - box.min.z);
+            if (data) {
+              std::memcpy(row, data + (x - lx) * 64 + (y - ly) * 8 + (z0 - lz), sizeof(float) * static_cast<std::size_t>(z1 - z0 + 1));
+            } else {
+              std::fill_n(row, z1 - z0 + 1, constant);
+            }
+          }
+      }
+}
+
+double SparseVolume::trilinear(const Vec3& index) const {
+  const Grid::ConstUnsafeAccessor accessor = impl_->grid->getConstUnsafeAccessor();
+  const double fx = std::floor(index.x()), fy = std::floor(index.y()), fz = std::floor(index.z());
+  const openvdb::Coord base(static_cast<int>(fx), static_cast<int>(fy), static_cast<int>(fz));
+  const double wx = index.x() - fx, wy = index.y() - fy, wz = index.z() - fz;
+  double sum = 0.0;
+  for (int i = 0; i < 8; ++i) {
+    const int x = i >> 2, y = (i >> 1) & 1, z = i & 1;
+    const double weight = (x ? wx : 1.0 - wx) * (y ? wy : 1.0 - wy) * (z ? wz : 1.0 - wz);
+    sum += weight * static_cast<double>(accessor.getValue(base.offsetBy(x, y, z)));
+  }
+  return sum;
+}
+
+const float* SparseVolume::leaf(Coord origin) const {
+  const Leaf* leaf = impl_->grid->tree().probeConstLeaf(vdb(origin));
+  return leaf ? leaf->buffer().data() : nullptr;
+}
+
+float* SparseVolume::edit_leaf(Coord origin) {
+  Leaf* leaf = impl_->grid->tree().touchLeaf(vdb(origin));
+  leaf->setValuesOn();
+  return leaf->buffer().data();
+}
+
+void SparseVolume::set_constant(Coord origin, float value) {
+  impl_->grid->tree().addTile(1, vdb(origin), value, value != background());
+}
+
+std::vector<Coord> SparseVolume::leaves() const {
+  std::vector<Coord> origins;
+  for (auto it = impl_->grid->tree().cbeginLeaf(); it; ++it) origins.push_back(ours(it->origin()));
+  std::ranges::sort(origins);
+  return origins;
+}
+
+std::vector<Coord> SparseVolume::constants() const {
+  std::vector<Coord> origins;
+  auto it = impl_->grid->tree().cbeginValueOn();
+  it.setMaxDepth(Tree::ValueOnCIter::LEAF_DEPTH - 1);
+  for (; it; ++it) {
+    const openvdb::CoordBBox box = it.getBoundingBox();
+    for (auto x = box.min().x(); x <= box.max().x(); x += kLeafSize)
+      for (auto y = box.min().y(); y <= box.max().y(); y += kLeafSize)
+        for (auto z = box.min().z(); z <= box.max().z(); z += kLeafSize) origins.push_back({x, y, z});
+  }
+  std::ranges::sort(origins);
+  return origins;
+}
+
+Result<void> save_volumes(const std::filesystem::path& file, double pitch_mm,
+                          const std::vector<std::pair<std::string, const SparseVolume*>>& volumes) {
+  try {
+    initialize_once();
+    openvdb::GridPtrVec grids;
+    for (const auto& [name, volume] : volumes) {
+      const Grid::Ptr grid = volume->impl_->grid->copy();  // shares the tree, has a name and transform of its own
+      grid->setName(name);
+      grid->setTransform(openvdb::math::Transform::createLinearTransform(pitch_mm));
+      grids.push_back(grid);
+    }
+    openvdb::io::File out(file.string());
+    out.write(grids);
+    out.close();
+    return {};
+  } catch (const std::exception& e) {
+    return failure(ErrorCode::internal, "cannot write " + file.string() + ": " + e.what());
+  }
+}
+
+Result<std::vector<SparseVolume>> load_volumes(const std::filesystem::path& file, const std::vector<std::string>& names) {
+  if (!std::filesystem::exists(file)) return failure(ErrorCode::not_found, "there is no file " + file.string());
+  try {
+    initialize_once();
+    openvdb::io::File in(file.string());
+    in.open(false);  // no delayed loading: the file may be replaced while we run
+    std::vector<SparseVolume> volumes;
+    for (const std::string& name : names) {
+      if (!in.hasGrid(name))
+        return failure(ErrorCode::invalid_input, file.string() + " has no grid \"" + name + "\"; import the case again");
+      const auto grid = openvdb::gridPtrCast<Grid>(in.readGrid(name));
+      if (!grid)
+        return failure(ErrorCode::invalid_input, "grid \"" + name + "\" of " + file.string() + " is not a float grid; import the case again");
+      SparseVolume volume(grid->background());
+      volume.impl_->grid = grid;
+      volumes.push_back(std::move(volume));
+    }
+    return volumes;
+  } catch (const std::exception& e) {
+    return failure(ErrorCode::invalid_input, file.string() + " is damaged (" + e.what() + "); import the case again");
+  }
+}
+
+}  // namespace osteon

@@ -1,0 +1,51 @@
+// A sparse grid of floats in leaves of 8³ samples: our view of an OpenVDB FloatGrid, without its headers.
+#pragma once
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/core/result.hpp"
+#include "common/geometry/lattice.hpp"
+
+namespace osteon {
+
+// Several threads may read at once; one that writes must be alone.
+class SparseVolume {
+ public:
+  explicit SparseVolume(float background);
+  ~SparseVolume();
+  SparseVolume(SparseVolume&&) noexcept;
+  SparseVolume& operator=(SparseVolume&&) noexcept;
+
+  [[nodiscard]] float background() const;
+  [[nodiscard]] float value(Coord sample) const;
+  void gather(const CoordBox& box, std::span<float> out) const;  // z fastest
+  [[nodiscard]] double trilinear(const Vec3& index) const;       // at a point in samples
+
+  // Leaves are named by their first sample, a multiple of kLeafSize. Without a leaf, all its samples have value().
+  [[nodiscard]] const float* leaf(Coord origin) const;  // kLeafVoxels, z fastest, or null
+  [[nodiscard]] float* edit_leaf(Coord origin);         // made with the value that was there
+  void set_constant(Coord origin, float value);         // a leaf's worth of one value, stored without samples
+  [[nodiscard]] std::vector<Coord> leaves() const;      // sorted
+  [[nodiscard]] std::vector<Coord> constants() const;   // places of set_constant() other than the background; sorted
+
+  struct Impl;
+
+ private:
+  friend Result<void> save_volumes(const std::filesystem::path&, double,
+                                   const std::vector<std::pair<std::string, const SparseVolume*>>&);
+  friend Result<std::vector<SparseVolume>> load_volumes(const std::filesystem::path&, const std::vector<std::string>&);
+  std::unique_ptr<Impl> impl_;
+};
+
+// A .vdb file with the named grids, each with the lattice's transform. Errors name the file.
+[[nodiscard]] Result<void> save_volumes(const std::filesystem::path& file, double pitch_mm,
+                                        const std::vector<std::pair<std::string, const SparseVolume*>>& volumes);
+// The grids in the order of `names`. Errors: not_found, invalid_input (no such grid, wrong kind, damaged file).
+[[nodiscard]] Result<std::vector<SparseVolume>> load_volumes(const std::filesystem::path& file,
+                                                             const std::vector<std::string>& names);
+
+}  // namespace osteon

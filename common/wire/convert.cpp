@@ -1,0 +1,199 @@
+#include "common/wire/convert.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace osteon::wire {
+namespace {
+
+tl::unexpected<Error> bad(const std::string& field, const std::string& what) {
+  return failure(ErrorCode::invalid_input, field + " " + what);
+}
+
+bool all_finite(std::initializer_list<double> values) {
+  return std::ranges::all_of(values, [](double v) { return std::isfinite(v); });
+}
+
+}  // namespace
+
+v1::Vector3 to_wire(const Vec3& v) {
+  v1::Vector3 out;
+  out.set_x(v.x());
+  out.set_y(v.y());
+  out.set_z(v.z());
+  return out;
+}
+
+Vec3 from_wire(const v1::Vector3& v) { return {v.x(), v.y(), v.z()}; }
+
+v1::Pose to_wire(const Pose& pose) {
+  v1::Pose out;
+  *out.mutable_position_mm() = to_wire(pose.position_mm);
+  for (const double q : {pose.rotation.x(), pose.rotation.y(), pose.rotation.z(), pose.rotation.w()})
+    out.add_rotation(static_cast<float>(q));
+  return out;
+}
+
+v1::Coord to_wire(const Coord& c) {
+  v1::Coord out;
+  out.set_x(c.x);
+  out.set_y(c.y);
+  out.set_z(c.z);
+  return out;
+}
+
+Coord from_wire(const v1::Coord& c) { return {c.x(), c.y(), c.z()}; }
+
+std::string to_wire(const Digest& digest) {
+  return {reinterpret_cast<const char*>(digest.bytes.data()), digest.bytes.size()};
+}
+
+v1::Cut to_wire(const Cut& cut) {
+  v1::Cut out;
+  out.set_author(cut.author.value);
+  out.set_author_seq(cut.author_seq);
+  out.set_lease_epoch(cut.lease_epoch);
+  out.set_body(cut.body.value);
+  out.set_tool_hash(to_wire(cut.tool));
+  out.mutable_shape()->set_kind(static_cast<v1::ToolKind>(cut.shape.kind));
+  out.mutable_shape()->set_radius(cut.shape.radius);
+  out.mutable_shape()->set_tip_height(cut.shape.tip_height);
+  out.mutable_shape()->set_length(cut.shape.length);
+  out.set_level(static_cast<std::uint32_t>(cut.level));
+  for (const QuantisedPose& pose : cut.path) {
+    v1::QuantisedPose* knot = out.add_path();
+    for (const std::int32_t p : pose.position) knot->add_position(p);
+    for (const std::int16_t r : pose.rotation) knot->add_rotation(r);
+  }
+  out.set_spindle_rpm(cut.spindle_rpm);
+  return out;
+}
+
+v1::CuttingState to_wire(const CuttingState& state) {
+  v1::CuttingState out;
+  out.set_author(state.author.value);
+  out.set_state_seq(state.state_seq);
+  *out.mutable_pose_bone_tool() = to_wire(state.pose_bone_tool);
+  *out.mutable_pose_bone_device() = to_wire(state.pose_bone_device);
+  out.set_tool_name(state.tool_name);
+  out.set_spindle_rpm(state.spindle_rpm);
+  out.set_feed_mm_per_s(state.feed_mm_per_s);
+  out.set_density_g_cm3(state.density_g_cm3);
+  out.set_engaged_fraction(state.engaged_fraction);
+  *out.mutable_force_physical_n() = to_wire(state.force_physical_N);
+  out.set_torque_n_mm(state.torque_Nmm);
+  out.set_depth_mm(state.depth_mm);
+  out.set_phase(static_cast<v1::CuttingPhase>(state.phase));
+  return out;
+}
+
+v1::FieldLeaf to_wire(const FieldLeaf& leaf) {
+  v1::FieldLeaf out;
+  out.set_body(leaf.body.value);
+  out.set_level(static_cast<std::uint32_t>(leaf.level));
+  *out.mutable_origin() = to_wire(leaf.origin);
+  std::string* bytes = out.mutable_values();
+  bytes->resize(2 * leaf.values.size());
+  for (std::size_t i = 0; i < leaf.values.size(); ++i) {
+    const auto value = static_cast<std::uint16_t>(leaf.values[i]);
+    (*bytes)[2 * i] = static_cast<char>(value & 255);
+    (*bytes)[2 * i + 1] = static_cast<char>(value >> 8);
+  }
+  return out;
+}
+
+Result<Pose> from_wire(const v1::Pose& pose) {
+  if (pose.rotation_size() != 4) return bad("rotation", "needs 4 entries, this has " + std::to_string(pose.rotation_size()));
+  const Vec3 position = from_wire(pose.position_mm());
+  const Eigen::Quaterniond rotation(pose.rotation(3), pose.rotation(0), pose.rotation(1), pose.rotation(2));
+  if (!position.allFinite()) return bad("position_mm", "is not finite");
+  if (!(std::abs(rotation.norm() - 1.0) < 1e-3)) return bad("rotation", "is not a unit quaternion");
+  return Pose{position, rotation.normalized()};
+}
+
+Result<Digest> digest_from_wire(const std::string& bytes) {
+  Digest digest;
+  if (bytes.size() != digest.bytes.size()) return bad("hash", "needs 32 bytes, this has " + std::to_string(bytes.size()));
+  std::ranges::transform(bytes, digest.bytes.begin(), [](char c) { return static_cast<std::uint8_t>(c); });
+  return digest;
+}
+
+Result<Cut> from_wire(const v1::Cut& cut) {
+  Cut out;
+  out.author = {cut.author()};
+  out.author_seq = cut.author_seq();
+  out.lease_epoch = cut.lease_epoch();
+  out.body = {cut.body()};
+  const auto tool = digest_from_wire(cut.tool_hash());
+  if (!tool) return bad("tool_hash:", tool.error().message);
+  out.tool = *tool;
+  const v1::CutShape& shape = cut.shape();
+  if (shape.kind() != v1::TOOL_KIND_DRILL && shape.kind() != v1::TOOL_KIND_ROUND_BURR)
+    return bad("shape.kind", "is not a kind of tool that this program knows");
+  out.shape = {static_cast<ToolKind>(shape.kind()), shape.radius(), shape.tip_height(), shape.length()};
+  if (shape.radius() <= 0 || shape.tip_height() <= 0 || shape.length() < shape.tip_height())
+    return bad("shape", "needs a radius and a tip height above zero, and a length of at least the tip height");
+  if (cut.level() >= static_cast<std::uint32_t>(kLevels)) return bad("level", "must be 0, 1 or 2");
+  out.level = static_cast<int>(cut.level());
+  if (cut.path().empty()) return bad("path", "needs at least one pose");
+  for (const v1::QuantisedPose& knot : cut.path()) {
+    if (knot.position_size() != 3 || knot.rotation_size() != 4) return bad("path", "has a pose without 3 positions and 4 rotations");
+    QuantisedPose pose;
+    double norm = 0.0;
+    for (int i = 0; i < 3; ++i) pose.position[static_cast<std::size_t>(i)] = knot.position(i);
+    for (int i = 0; i < 4; ++i) {
+      if (std::abs(knot.rotation(i)) > 32767) return bad("path", "has a rotation beyond 32767");
+      pose.rotation[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(knot.rotation(i));
+      norm += static_cast<double>(knot.rotation(i)) * knot.rotation(i);
+    }
+    if (std::abs(std::sqrt(norm) / 32767.0 - 1.0) > 1e-3) return bad("path", "has a rotation that is not a unit quaternion");
+    out.path.push_back(pose);
+  }
+  out.spindle_rpm = cut.spindle_rpm();
+  return out;
+}
+
+Result<CuttingState> from_wire(const v1::CuttingState& state) {
+  CuttingState out;
+  out.author = {state.author()};
+  out.state_seq = state.state_seq();
+  const auto tool = from_wire(state.pose_bone_tool());
+  if (!tool) return failure(ErrorCode::invalid_input, "pose_bone_tool." + tool.error().message);
+  const auto device = from_wire(state.pose_bone_device());
+  if (!device) return failure(ErrorCode::invalid_input, "pose_bone_device." + device.error().message);
+  out.pose_bone_tool = *tool;
+  out.pose_bone_device = *device;
+  out.tool_name = state.tool_name();
+  out.force_physical_N = from_wire(state.force_physical_n());
+  if (!all_finite({state.spindle_rpm(), state.feed_mm_per_s(), state.density_g_cm3(), state.engaged_fraction(),
+                   state.torque_n_mm(), state.depth_mm()}) || !out.force_physical_N.allFinite())
+    return bad("cutting state", "has a number that is not finite");
+  out.spindle_rpm = state.spindle_rpm();
+  out.feed_mm_per_s = state.feed_mm_per_s();
+  out.density_g_cm3 = state.density_g_cm3();
+  out.engaged_fraction = state.engaged_fraction();
+  out.torque_Nmm = state.torque_n_mm();
+  out.depth_mm = state.depth_mm();
+  if (state.phase() < v1::CUTTING_PHASE_IDLE || state.phase() > v1::CUTTING_PHASE_RUBBING)
+    return bad("phase", "is not one that this program knows");
+  out.phase = static_cast<CuttingPhase>(state.phase());
+  return out;
+}
+
+Result<FieldLeaf> from_wire(const v1::FieldLeaf& leaf) {
+  FieldLeaf out;
+  out.body = {leaf.body()};
+  if (leaf.level() >= static_cast<std::uint32_t>(kLevels)) return bad("level", "must be 0, 1 or 2");
+  out.level = static_cast<int>(leaf.level());
+  out.origin = from_wire(leaf.origin());
+  if (floor_to(out.origin, kLeafSize) != out.origin) return bad("origin", "is not the first sample of a leaf");
+  if (leaf.values().size() != 2 * kLeafVoxels) return bad("values", "needs 1024 bytes, this has " + std::to_string(leaf.values().size()));
+  out.values.resize(kLeafVoxels);
+  for (std::size_t i = 0; i < out.values.size(); ++i) {
+    const auto low = static_cast<std::uint8_t>(leaf.values()[2 * i]), high = static_cast<std::uint8_t>(leaf.values()[2 * i + 1]);
+    out.values[i] = static_cast<std::int16_t>(low | high << 8);
+  }
+  return out;
+}
+
+}  // namespace osteon::wire
