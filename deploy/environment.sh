@@ -1,0 +1,9 @@
+# Sourced by the scripts of this folder: the same surroundings whoever calls, from wherever.
+# Gives $root, the checkout, and `die`, which ends the script with one sentence.
+unset CDPATH
+root=$(cd -- "$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")/.." && pwd -P)
+export PATH="${PATH:-/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin}"
+export HOME="${HOME:-$(getent passwd "$(id -u)" | cut -d: -f6)}"
+export LC_ALL=C.UTF-8 PYTHONDONTWRITEBYTECODE=1
+
+die() { printf 'deploy/%s: %s\n' "${0##*/}" "$*" >&2; exit 1; }
