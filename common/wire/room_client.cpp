@@ -1,0 +1,112 @@
+#include "common/wire/room_client.hpp"
+
+#include <grpc/support/log.h>
+#include <grpcpp/grpcpp.h>
+
+#include <algorithm>
+
+#include "common/field/kernel.hpp"
+#include "common/wire/convert.hpp"
+#include "osteon/v1/room.grpc.pb.h"
+
+namespace osteon::wire {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr int kMaxReceiveBytes = 4 * 1024 * 1024;  // a piece of a case is 1 MiB, a mesh message about 256 kB
+constexpr auto kAnswerTime = 5s;                   // for one request to a server that was reached
+
+std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
+  // What fails is told in one sentence by the program, not in gRPC's own lines.
+  gpr_set_log_function([](gpr_log_func_args*) {});
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 50);
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 200);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 200);
+  arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
+  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+}
+
+bool is_host_port(const std::string& address) {
+  const std::size_t colon = address.rfind(':');
+  if (colon == std::string::npos || colon == 0) return false;
+  const std::string port = address.substr(colon + 1);
+  return !port.empty() && port.size() <= 5 && std::all_of(port.begin(), port.end(), [](char c) { return c >= '0' && c <= '9'; }) &&
+         std::stoi(port) > 0 && std::stoi(port) <= 65535;
+}
+
+Error nobody_answers(const std::string& address, std::chrono::milliseconds patience) {
+  const std::string seconds = std::to_string(patience.count() / 1000) +
+                              (patience.count() % 1000 ? "." + std::to_string(patience.count() % 1000 / 100) : "");
+  return {ErrorCode::unavailable, "no Osteon server answers at " + address + " within " + seconds +
+                                      " s; start osteon-server there or give its address with --server"};
+}
+
+Error error_of(const grpc::Status& status, const std::string& server) {
+  switch (status.error_code()) {
+    case grpc::StatusCode::FAILED_PRECONDITION: return {ErrorCode::unsupported, status.error_message()};
+    case grpc::StatusCode::INVALID_ARGUMENT: return {ErrorCode::invalid_input, status.error_message()};
+    case grpc::StatusCode::NOT_FOUND: return {ErrorCode::not_found, status.error_message()};
+    case grpc::StatusCode::UNIMPLEMENTED:
+      return {ErrorCode::unsupported, server + " is not an Osteon server of this version"};
+    default:
+      return {ErrorCode::unavailable, server + " does not answer: " + status.error_message()};
+  }
+}
+
+}  // namespace
+
+Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
+                             std::chrono::milliseconds patience, const std::function<bool()>& stop) {
+  if (!is_host_port(address))
+    return failure(ErrorCode::invalid_input, "the server's address " + address + " is not HOST:PORT");
+  JoinedRoom room;
+  room.channel = make_channel(address);
+
+  // In short waits, so that a person who gives up is heard.
+  const auto until = Clock::now() + patience;
+  while (!room.channel->WaitForConnected(std::chrono::system_clock::now() + 50ms)) {
+    if (stop && stop()) return failure(ErrorCode::cancelled, "stopped before the server at " + address + " answered");
+    if (Clock::now() >= until) return tl::unexpected(nobody_answers(address, patience));
+  }
+
+  v1::JoinRequest request;
+  request.set_protocol_version(kProtocolVersion);
+  request.set_kernel_version(kind == ClientKind::haptic ? kKernelVersion : 0);
+  request.set_kind(static_cast<v1::ClientKind>(kind));
+  request.set_name(name);
+  v1::JoinResponse response;
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kAnswerTime);
+  const grpc::Status status = v1::RoomService::NewStub(room.channel)->Join(&context, request, &response);
+  if (!status.ok()) return tl::unexpected(error_of(status, "the program at " + address));
+
+  const Result<Digest> hash = digest_from_wire(response.case_hash());
+  if (!hash || response.author() == 0 || !(response.pitch_mm() > 0))
+    return failure(ErrorCode::unsupported, "the program at " + address + " does not answer as an Osteon server does");
+  room.author = AuthorId{response.author()};
+  room.server_epoch = response.server_epoch();
+  room.lease_epoch = response.lease_epoch();
+  room.case_hash = *hash;
+  room.case_title = response.case_title();
+  room.pitch_mm = response.pitch_mm();
+  room.bounds = {from_wire(response.bounds_min_mm()), from_wire(response.bounds_max_mm())};
+  room.room_seq = RoomSeq{response.room_seq()};
+  return room;
+}
+
+Result<RoomStatus> room_status(const JoinedRoom& room) {
+  v1::GetStatusResponse response;
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kAnswerTime);
+  const grpc::Status status = v1::RoomService::NewStub(room.channel)->GetStatus(&context, {}, &response);
+  if (!status.ok()) return tl::unexpected(error_of(status, "the server"));
+  const Result<Digest> hash = digest_from_wire(response.field_hash());
+  if (!hash) return tl::unexpected(hash.error());
+  return RoomStatus{RoomSeq{response.room_seq()}, *hash, response.removed_mm3(), response.rejected()};
+}
+
+}  // namespace osteon::wire

@@ -1,0 +1,102 @@
+#include "server/net/outbox.hpp"
+
+#include <utility>
+
+#include "common/wire/convert.hpp"
+
+namespace osteon {
+namespace {
+
+Bytes serialised(const google::protobuf::MessageLite& message) {
+  return std::make_shared<const std::string>(message.SerializeAsString());
+}
+
+}  // namespace
+
+MeshOutbox::MeshOutbox(MeshUpdate snapshot)
+    : waiting_(std::move(snapshot.blocks)),
+      snapshot_blocks_(waiting_.size()),
+      snapshot_seq_(snapshot.room_seq),
+      newest_(snapshot.room_seq) {}
+
+void MeshOutbox::add(const MeshUpdate& update) {
+  for (const auto& [key, bytes] : update.blocks) waiting_.insert_or_assign(key, bytes);
+  newest_ = update.room_seq;
+  news_ = true;
+}
+
+MessageParts MeshOutbox::take() {
+  if (waiting_.empty() && !news_) return {};
+  MessageParts parts;
+  std::size_t size = 0;
+  bool wrapped = waiting_.empty();
+  while (!waiting_.empty()) {
+    auto next = started_ ? waiting_.upper_bound(cursor_) : waiting_.begin();
+    if (next == waiting_.end()) {
+      wrapped = true;
+      next = waiting_.begin();
+    }
+    if (!parts.empty() && size + next->second->size() > kMessageBytes) break;
+    size += next->second->size();
+    cursor_ = next->first;
+    started_ = true;
+    parts.push_back(std::move(next->second));
+    waiting_.erase(next);
+  }
+
+  // The first round has brought every block of the first surface, each at least as new as that.
+  if (!snapshot_sent_ && (wrapped || waiting_.empty())) {
+    snapshot_sent_ = true;
+    said_ = snapshot_seq_;
+  }
+  if (waiting_.empty()) {
+    said_ = newest_;
+    news_ = false;
+  }
+  v1::WatchMeshResponse head;
+  head.set_room_seq(said_.value);
+  head.set_snapshot_complete(snapshot_sent_);
+  head.set_snapshot_blocks(static_cast<std::uint32_t>(snapshot_blocks_));
+  parts.push_back(serialised(head));
+  return parts;
+}
+
+void SessionOutbox::begin(std::vector<FieldLeaf> leaves, RoomSeq contained) {
+  leaves_ = std::move(leaves);
+  contained_ = contained;
+  begun_ = true;
+}
+
+bool SessionOutbox::add(RoomSeq place, Bytes row) { return place <= contained_ || add_answer(std::move(row)); }
+
+bool SessionOutbox::add_answer(Bytes row) {
+  if (rows_.size() >= kMaxRows) return false;
+  rows_.push_back(std::move(row));
+  return true;
+}
+
+MessageParts SessionOutbox::take() {
+  if (!begun_) return {};
+  v1::SessionResponse response;
+  if (next_leaf_ < leaves_.size()) {
+    *response.mutable_leaf() = wire::to_wire(leaves_[next_leaf_]);
+    // Every leaf sent frees its memory; the list itself goes with the last.
+    leaves_[next_leaf_].values = {};
+    if (++next_leaf_ == leaves_.size()) {
+      leaves_ = {};
+      next_leaf_ = 0;
+    }
+    return {serialised(response)};
+  }
+  if (!complete_said_) {
+    complete_said_ = true;
+    response.mutable_complete()->set_room_seq(contained_.value);
+    return {serialised(response)};
+  }
+  if (rows_.empty()) return {};
+  Bytes row = std::move(rows_.front());
+  rows_.pop_front();
+  return {std::move(row)};
+}
+
+}  // namespace osteon

@@ -1,0 +1,77 @@
+// What waits for one subscriber while a message to it is in flight: bounded, newest wins. Free of gRPC, so that a slow
+// reader is tested without one.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/core/id.hpp"
+#include "common/field/field_hash.hpp"
+#include "common/surface/mesh_block.hpp"
+
+namespace osteon {
+
+// Serialised once and shared by every subscriber that it waits for or travels to.
+using Bytes = std::shared_ptr<const std::string>;
+
+// One message in pieces that are sent behind each other; empty when there is nothing to send.
+using MessageParts = std::vector<Bytes>;
+
+// Changed blocks, each a serialised WatchMeshResponse of that block alone.
+struct MeshUpdate {
+  RoomSeq room_seq;
+  std::map<BlockKey, Bytes> blocks;
+};
+
+// The waiting set of a mesh subscriber: at most one version of every block.
+class MeshOutbox {
+ public:
+  static constexpr std::size_t kMessageBytes = 256 * 1024;
+
+  explicit MeshOutbox(MeshUpdate snapshot);
+  void add(const MeshUpdate& update);
+  // The next message, of about kMessageBytes at most. Blocks leave in the order of their keys, round and round, so
+  // none starves behind others that change all the time.
+  [[nodiscard]] MessageParts take();
+  [[nodiscard]] std::size_t waiting() const { return waiting_.size(); }
+
+ private:
+  std::map<BlockKey, Bytes> waiting_;
+  BlockKey cursor_;             // the last block taken
+  bool started_ = false;        // cursor_ is set
+  std::size_t snapshot_blocks_;
+  bool snapshot_sent_ = false;
+  RoomSeq snapshot_seq_;        // what the first whole surface contains
+  RoomSeq newest_;              // contained once nothing waits
+  RoomSeq said_;                // contained in what was sent so far
+  bool news_ = true;            // newest_ was not said yet
+};
+
+// What a session sends: the field as it was on joining, then rows in room_seq order. Rows cannot be skipped, so a reader
+// that falls too far behind is given up instead.
+class SessionOutbox {
+ public:
+  static constexpr std::size_t kMaxRows = 8192;
+
+  void begin(std::vector<FieldLeaf> leaves, RoomSeq contained);
+  // A row of the room's order; one that the leaves contain is skipped. False when kMaxRows wait already; the row is then
+  // not taken.
+  [[nodiscard]] bool add(RoomSeq place, Bytes row);
+  // An answer outside the order: the first outcome of a cut that was sent again.
+  [[nodiscard]] bool add_answer(Bytes row);
+  [[nodiscard]] MessageParts take();
+  [[nodiscard]] std::size_t waiting() const { return rows_.size(); }
+
+ private:
+  std::vector<FieldLeaf> leaves_;
+  std::size_t next_leaf_ = 0;
+  RoomSeq contained_;
+  bool begun_ = false, complete_said_ = false;
+  std::deque<Bytes> rows_;
+};
+
+}  // namespace osteon

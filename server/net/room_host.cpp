@@ -1,0 +1,499 @@
+#include "server/net/room_host.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <shared_mutex>
+#include <thread>
+#include <utility>
+
+#include "common/core/check.hpp"
+#include "common/runtime/periodic.hpp"
+#include "common/wire/convert.hpp"
+
+namespace osteon {
+namespace {
+
+using Clock = RoomHost::Clock;
+
+Bytes serialised(const google::protobuf::MessageLite& message) {
+  return std::make_shared<const std::string>(message.SerializeAsString());
+}
+
+Bytes block_message(const BlockKey& key, const StoredBlock& block) {
+  v1::WatchMeshResponse response;
+  v1::MeshBlock& out = *response.add_blocks();
+  out.set_body(key.body.value);
+  out.set_level(static_cast<std::uint32_t>(key.level));
+  *out.mutable_index() = wire::to_wire(key.index);
+  out.set_version(block.version);
+  out.set_payload(block.payload.bytes.data(), block.payload.bytes.size());
+  out.set_mesh_hash(wire::to_wire(block.mesh_hash));
+  return serialised(response);
+}
+
+// The open streams of one kind.
+template <class Sink>
+class Audience {
+ public:
+  void add(Sink& sink) { sinks_.push_back(&sink); }
+  void remove(Sink& sink) { std::erase(sinks_, &sink); }
+  template <class Call>
+  void each(Call call) const {
+    for (Sink* sink : sinks_) call(*sink);
+  }
+  [[nodiscard]] std::size_t size() const { return sinks_.size(); }
+
+ private:
+  std::vector<Sink*> sinks_;
+};
+
+struct QueuedCut {
+  std::shared_ptr<SessionSink> sink;  // owned by its stream and by its queued cuts
+  Cut cut;
+  Clock::time_point arrived;
+};
+
+// A tool's newest state; one whose session is over is shown idle for a while, so that every reader sees it stop.
+struct ShownState {
+  CuttingState state;
+  bool over = false;
+  std::uint64_t ticks_over = 0;
+};
+constexpr std::uint64_t kShowIdleTicks = 1200;
+
+}  // namespace
+
+// Lock order: room_, then sessions_mutex_ or mesh_mutex_ or cutting_mutex_, then a stream's own; queue_mutex_ and
+// jobs_mutex_ are never held with another.
+struct RoomHost::Impl {
+  Impl(Room r, HostRates rates) : room(std::move(r)), rates_(rates) {}
+
+  void make_whole_surface(const std::function<void(double)>& progress);
+  void run_ticks();
+  void run_mesh();
+  void run_jobs();
+  void decide(QueuedCut& queued);
+  void publish_states();
+  void make_stale_blocks();
+  void session_over(AuthorId author);
+
+  Room room;
+  std::shared_mutex room_mutex;
+  const HostRates rates_;
+  std::atomic<std::uint64_t> room_seq{0}, authors{0};
+  std::atomic<bool> stopping{false};
+
+  std::mutex queue_mutex;
+  std::vector<QueuedCut> queue;
+
+  mutable std::mutex sessions_mutex;
+  Audience<SessionSink> sessions;
+  std::set<AuthorId> open_authors;
+
+  mutable std::mutex cutting_mutex;
+  Audience<CuttingSink> cutting_streams;
+  std::map<AuthorId, ShownState> states;
+  Bytes shown;               // the newest message, for those who come later
+  bool states_changed = false;
+
+  mutable std::mutex mesh_mutex;
+  Audience<MeshSink> mesh_streams;
+  BlockStore store;
+  MeshUpdate surface;        // every block with a surface, as it travels
+
+  std::mutex mesh_wake_mutex;
+  std::condition_variable mesh_wake;
+  std::vector<Clock::time_point> unmeshed;  // arrivals of cuts whose blocks are not made yet
+  bool mesh_due = false, mesh_end = false;
+
+  std::mutex jobs_mutex;
+  std::condition_variable jobs_wake;
+  std::deque<std::function<void()>> jobs;
+  bool jobs_end = false;
+
+  mutable std::mutex stats_mutex;
+  TickStats stats;
+  DurationHistogram mesh_update;
+  RoomCounts counts;
+  std::size_t stale = 0;
+
+  std::optional<std::string> ended;  // under sessions, cutting and mesh mutex: why new streams end at once
+  std::optional<BoneStatus> last_status;  // of the job thread
+
+  std::thread tick_thread, mesh_thread, job_thread;
+};
+
+void RoomHost::Impl::make_whole_surface(const std::function<void(double)>& progress) {
+  const std::vector<BlockKey> keys = room.bone_blocks();
+  std::vector<BlockPayload> payloads(keys.size());
+  std::atomic<std::size_t> next{0};
+  const auto work = [&](bool reports) {
+    for (std::size_t i = next++; i < keys.size(); i = next++) {
+      payloads[i] = make_block(room.gather_block(keys[i]));
+      if (reports && progress) progress(static_cast<double>(i) / static_cast<double>(keys.size()));
+    }
+  };
+  {
+    std::vector<std::jthread> helpers;
+    for (unsigned i = 1; i < std::max(1u, std::thread::hardware_concurrency()); ++i) helpers.emplace_back(work, false);
+    work(true);
+  }
+  for (std::size_t i = 0; i < keys.size(); ++i)
+    if (const StoredBlock* block = store.put(keys[i], std::move(payloads[i])))
+      surface.blocks[keys[i]] = block_message(keys[i], *block);
+  if (progress) progress(1.0);
+}
+
+void RoomHost::Impl::run_ticks() {
+  PeriodicTimer timer(rates_.tick);
+  TickStats own;
+  std::vector<QueuedCut> batch;
+  bool last = false;
+  while (!last) {
+    timer.wait(own);
+    last = stopping;
+    {
+      const std::lock_guard lock(queue_mutex);
+      std::swap(batch, queue);
+    }
+    for (QueuedCut& queued : batch) decide(queued);
+    const bool decided = !batch.empty();
+    batch.clear();
+    publish_states();
+    if (decided) {
+      const std::lock_guard lock(mesh_wake_mutex);
+      mesh_due = true;
+      mesh_wake.notify_one();
+    }
+    timer.done(own);
+    // Others read a copy, so that a tick never waits for a reader of its histograms.
+    if (const std::unique_lock lock(stats_mutex, std::try_to_lock); lock || last) stats = own;
+  }
+}
+
+void RoomHost::Impl::decide(QueuedCut& queued) {
+  Result<Outcome> outcome = [&] {
+    const std::unique_lock lock(room_mutex);
+    Result<Outcome> decision = room.submit(queued.cut);
+    room_seq = room.room_seq().value;
+    const std::lock_guard stats_lock(stats_mutex);
+    counts = room.counts();
+    stale = room.stale_blocks();
+    return decision;
+  }();
+  if (!outcome) {
+    queued.sink->refuse(outcome.error());
+    queued.sink->decided();
+    return;
+  }
+
+  // Published at once, before the next cut is looked at: nobody waits for a timer.
+  v1::SessionResponse response;
+  if (outcome->committed()) {
+    v1::CommittedCut& row = *response.mutable_committed();
+    row.set_room_seq(outcome->room_seq.value);
+    *row.mutable_cut() = wire::to_wire(queued.cut);
+  } else {
+    v1::RejectedCut& row = *response.mutable_rejected();
+    row.set_room_seq(outcome->room_seq.value);
+    row.set_author_seq(queued.cut.author_seq);
+    row.set_reason(std::string(sentence(outcome->rejection)));
+  }
+  const Bytes row = serialised(response);
+  {
+    const std::lock_guard lock(sessions_mutex);
+    if (outcome->repeated)
+      queued.sink->answer(row);
+    else if (outcome->committed())
+      sessions.each([&](SessionSink& sink) { sink.offer(outcome->room_seq, row); });
+    else
+      queued.sink->offer(outcome->room_seq, row);
+  }
+  queued.sink->decided();
+  if (!outcome->report.changed_leaves.empty()) {
+    const std::lock_guard lock(mesh_wake_mutex);
+    unmeshed.push_back(queued.arrived);
+  }
+}
+
+void RoomHost::Impl::publish_states() {
+  const std::lock_guard lock(cutting_mutex);
+  for (auto& [author, entry] : states) entry.ticks_over += entry.over ? 1 : 0;
+  if (std::erase_if(states, [](const auto& entry) { return entry.second.ticks_over > kShowIdleTicks; }) > 0)
+    states_changed = true;
+  if (!states_changed) return;
+  states_changed = false;
+  v1::WatchCuttingResponse response;
+  response.set_room_seq(room_seq);
+  for (const auto& [author, entry] : states) *response.add_states() = wire::to_wire(entry.state);
+  shown = serialised(response);
+  cutting_streams.each([&](CuttingSink& sink) { sink.offer(shown); });
+}
+
+// A tool whose hand is gone stands still: readers must not go on sounding and drawing its last moment.
+void RoomHost::Impl::session_over(AuthorId author) {
+  const std::lock_guard lock(cutting_mutex);
+  const auto entry = states.find(author);
+  if (entry == states.end()) return;
+  CuttingState& state = entry->second.state;
+  ++state.state_seq;
+  state.phase = CuttingPhase::idle;
+  state.spindle_rpm = state.feed_mm_per_s = state.engaged_fraction = state.torque_Nmm = 0;
+  state.force_physical_N = Vec3::Zero();
+  entry->second.over = true;
+  states_changed = true;
+}
+
+void RoomHost::Impl::run_mesh() {
+  auto next = Clock::now();
+  while (true) {
+    {
+      std::unique_lock lock(mesh_wake_mutex);
+      mesh_wake.wait(lock, [&] { return mesh_due || mesh_end; });
+      if (!mesh_due) return;
+      // A first cut is shown at once, a row of cuts at the mesh rate.
+      mesh_wake.wait_until(lock, next, [&] { return mesh_end; });
+      mesh_due = false;
+    }
+    next = Clock::now() + rates_.mesh;
+    make_stale_blocks();
+  }
+}
+
+void RoomHost::Impl::make_stale_blocks() {
+  std::vector<BlockKey> keys;
+  std::vector<Clock::time_point> arrivals;
+  MeshUpdate update;
+  {
+    // Arrivals first: a cut between the two is measured with the next blocks, never before its own are made.
+    const std::lock_guard lock(mesh_wake_mutex);
+    std::swap(arrivals, unmeshed);
+  }
+  {
+    const std::unique_lock lock(room_mutex);
+    keys = room.take_stale_blocks();
+    update.room_seq = room.room_seq();
+  }
+
+  // The room goes on between two blocks; one that it changes meanwhile is stale again and made anew.
+  std::vector<BlockPayload> payloads;
+  payloads.reserve(keys.size());
+  for (const BlockKey& key : keys) {
+    const BlockSamples samples = [&] {
+      const std::shared_lock lock(room_mutex);
+      return room.gather_block(key);
+    }();
+    payloads.push_back(make_block(samples));
+  }
+
+  {
+    const std::lock_guard lock(mesh_mutex);
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      const StoredBlock* block = store.put(keys[i], std::move(payloads[i]));
+      if (!block) continue;
+      const Bytes message = block_message(keys[i], *block);
+      update.blocks[keys[i]] = message;
+      if (block->payload.bytes.empty())
+        surface.blocks.erase(keys[i]);
+      else
+        surface.blocks[keys[i]] = message;
+    }
+    surface.room_seq = update.room_seq;
+    mesh_streams.each([&](MeshSink& sink) { sink.offer(update); });
+  }
+  const auto ready = Clock::now();
+  const std::lock_guard lock(stats_mutex);
+  for (const Clock::time_point arrived : arrivals) mesh_update.record(ready - arrived);
+}
+
+void RoomHost::Impl::run_jobs() {
+  while (true) {
+    std::function<void()> job;
+    {
+      std::unique_lock lock(jobs_mutex);
+      jobs_wake.wait(lock, [&] { return !jobs.empty() || jobs_end; });
+      if (jobs.empty()) return;
+      job = std::move(jobs.front());
+      jobs.pop_front();
+    }
+    job();
+  }
+}
+
+RoomHost::RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress)
+    : impl_(std::make_unique<Impl>(std::move(room), rates)) {
+  impl_->make_whole_surface(progress);
+  impl_->tick_thread = std::thread([this] { impl_->run_ticks(); });
+  impl_->mesh_thread = std::thread([this] { impl_->run_mesh(); });
+  impl_->job_thread = std::thread([this] { impl_->run_jobs(); });
+}
+
+RoomHost::~RoomHost() { stop(); }
+
+const Case& RoomHost::bone() const { return impl_->room.bone(); }
+RoomSeq RoomHost::room_seq() const { return RoomSeq{impl_->room_seq}; }
+std::uint64_t RoomHost::lease_epoch() const { return impl_->room.lease_epoch(); }
+bool RoomHost::knows(AuthorId author) const { return author && author.value <= impl_->authors; }
+
+HostHealth RoomHost::health() const {
+  HostHealth health;
+  health.room_seq = room_seq();
+  const auto look = [&](const StreamSink& sink) { health.furthest_behind = std::max(health.furthest_behind, sink.waiting()); };
+  {
+    const std::lock_guard lock(impl_->sessions_mutex);
+    health.sessions = impl_->sessions.size();
+    impl_->sessions.each(look);
+  }
+  {
+    const std::lock_guard lock(impl_->mesh_mutex);
+    health.mesh_streams = impl_->mesh_streams.size();
+    health.blocks = impl_->surface.blocks.size();
+    impl_->mesh_streams.each(look);
+  }
+  {
+    const std::lock_guard lock(impl_->cutting_mutex);
+    health.cutting_streams = impl_->cutting_streams.size();
+  }
+  {
+    const std::lock_guard lock(impl_->queue_mutex);
+    health.queued_cuts = impl_->queue.size();
+  }
+  const std::lock_guard lock(impl_->stats_mutex);
+  health.tick = impl_->stats;
+  health.mesh_update = impl_->mesh_update;
+  health.counts = impl_->counts;
+  health.stale_blocks = impl_->stale;
+  return health;
+}
+
+void RoomHost::run_slowly(std::function<void()> job) {
+  const std::lock_guard lock(impl_->jobs_mutex);
+  if (impl_->jobs_end) return;
+  impl_->jobs.push_back(std::move(job));
+  impl_->jobs_wake.notify_one();
+}
+
+AuthorId RoomHost::join(MemberKind kind) {
+  const std::unique_lock lock(impl_->room_mutex);
+  const AuthorId author = impl_->room.join(kind);
+  impl_->authors = author.value;
+  return author;
+}
+
+BoneStatus RoomHost::bone_status() {
+  std::vector<FieldLeaf> leaves;
+  BoneStatus status;
+  {
+    const std::shared_lock lock(impl_->room_mutex);
+    status.room_seq = impl_->room.room_seq();
+    status.counts = impl_->room.counts();
+    if (impl_->last_status && impl_->last_status->room_seq == status.room_seq) return *impl_->last_status;
+    leaves = impl_->room.leaves();
+  }
+  // Measured on a copy, so that the room is not kept from cutting.
+  CutField copy(bone(), BodyId{0});
+  for (const FieldLeaf& leaf : leaves) copy.restore(leaf);
+  status.removed_mm3 = copy.removed_mm3();
+  status.field_hash = osteon::field_hash(std::move(leaves), bone().pitch_mm());
+  impl_->last_status = status;
+  return status;
+}
+
+Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink) {
+  // Held until the sink is listed: every row after these leaves is committed, and so offered, later.
+  const std::shared_lock room_lock(impl_->room_mutex);
+  if (!impl_->room.may_cut(sink->author()))
+    return failure(ErrorCode::invalid_input, "open.author " + std::to_string(sink->author().value) +
+                                                 " has not joined this room as a haptic client; call Join first");
+  std::vector<FieldLeaf> leaves = impl_->room.leaves();
+  const RoomSeq contained = impl_->room.room_seq();
+  const std::lock_guard lock(impl_->sessions_mutex);
+  if (!impl_->open_authors.insert(sink->author()).second)
+    return failure(ErrorCode::invalid_input,
+                   "open.author " + std::to_string(sink->author().value) + " has an open session; join again for another");
+  impl_->sessions.add(*sink);
+  sink->begin(std::move(leaves), contained);
+  if (impl_->ended) sink->end(*impl_->ended);
+  return {};
+}
+
+void RoomHost::watch_mesh(MeshSink& sink) {
+  const std::lock_guard lock(impl_->mesh_mutex);
+  impl_->mesh_streams.add(sink);
+  sink.begin(impl_->surface);
+  if (impl_->ended) sink.end(*impl_->ended);
+}
+
+void RoomHost::watch_cutting(CuttingSink& sink) {
+  const std::lock_guard lock(impl_->cutting_mutex);
+  impl_->cutting_streams.add(sink);
+  if (impl_->shown) sink.offer(impl_->shown);
+  if (impl_->ended) sink.end(*impl_->ended);
+}
+
+void RoomHost::leave(SessionSink& sink) {
+  bool was_open = false;
+  {
+    const std::lock_guard lock(impl_->sessions_mutex);
+    const std::size_t before = impl_->sessions.size();
+    impl_->sessions.remove(sink);
+    was_open = impl_->sessions.size() < before;
+    if (was_open) impl_->open_authors.erase(sink.author());
+  }
+  if (was_open) impl_->session_over(sink.author());
+}
+
+void RoomHost::leave(MeshSink& sink) {
+  const std::lock_guard lock(impl_->mesh_mutex);
+  impl_->mesh_streams.remove(sink);
+}
+
+void RoomHost::leave(CuttingSink& sink) {
+  const std::lock_guard lock(impl_->cutting_mutex);
+  impl_->cutting_streams.remove(sink);
+}
+
+void RoomHost::queue_cut(std::shared_ptr<SessionSink> sink, Cut cut, Clock::time_point arrived) {
+  const std::lock_guard lock(impl_->queue_mutex);
+  impl_->queue.push_back({std::move(sink), std::move(cut), arrived});
+}
+
+void RoomHost::offer_state(CuttingState state) {
+  const std::lock_guard lock(impl_->cutting_mutex);
+  ShownState& entry = impl_->states[state.author];
+  entry = {std::move(state)};
+  impl_->states_changed = true;
+}
+
+void RoomHost::end_streams(const std::string& why) {
+  const std::scoped_lock lock(impl_->sessions_mutex, impl_->mesh_mutex, impl_->cutting_mutex);
+  impl_->ended = why;
+  impl_->sessions.each([&](SessionSink& sink) { sink.end(why); });
+  impl_->mesh_streams.each([&](MeshSink& sink) { sink.end(why); });
+  impl_->cutting_streams.each([&](CuttingSink& sink) { sink.end(why); });
+}
+
+void RoomHost::stop() {
+  // The last tick may still make blocks due, so the mesh thread ends after it.
+  impl_->stopping = true;
+  if (impl_->tick_thread.joinable()) impl_->tick_thread.join();
+  {
+    const std::lock_guard lock(impl_->mesh_wake_mutex);
+    impl_->mesh_end = true;
+    impl_->mesh_wake.notify_all();
+  }
+  if (impl_->mesh_thread.joinable()) impl_->mesh_thread.join();
+  {
+    const std::lock_guard lock(impl_->jobs_mutex);
+    impl_->jobs_end = true;
+    impl_->jobs_wake.notify_all();
+  }
+  if (impl_->job_thread.joinable()) impl_->job_thread.join();
+}
+
+}  // namespace osteon

@@ -1,0 +1,109 @@
+// Runs a room: one thread that commits cuts at 120 Hz, one that makes mesh blocks at 30 Hz, one for slow requests.
+// Free of gRPC: streams are seen as sinks.
+#pragma once
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "common/core/result.hpp"
+#include "common/mechanics/cutting_state.hpp"
+#include "common/runtime/tick_stats.hpp"
+#include "server/net/outbox.hpp"
+#include "server/room/room.hpp"
+
+namespace osteon {
+
+// What the host says to open streams. Called under the host's locks: must return at once and never call back.
+class StreamSink {
+ public:
+  virtual ~StreamSink() = default;
+  virtual void end(const std::string& why) = 0;             // the server stops
+  [[nodiscard]] virtual std::size_t waiting() const = 0;    // rows or blocks that the reader is behind
+};
+class MeshSink : public StreamSink {
+ public:
+  virtual void begin(MeshUpdate whole_surface) = 0;
+  virtual void offer(const MeshUpdate& update) = 0;
+};
+class CuttingSink : public StreamSink {
+ public:
+  virtual void offer(const Bytes& message) = 0;             // a whole WatchCuttingResponse; newest wins
+};
+class SessionSink : public StreamSink {
+ public:
+  [[nodiscard]] virtual AuthorId author() const = 0;
+  virtual void begin(std::vector<FieldLeaf> leaves, RoomSeq contained) = 0;
+  virtual void offer(RoomSeq place, const Bytes& row) = 0;  // a whole SessionResponse
+  virtual void answer(const Bytes& row) = 0;                // the same, outside the room's order
+  virtual void refuse(const Error& why) = 0;                // a breach of the protocol: the stream ends
+  virtual void decided() = 0;                               // one queued cut has left the queue
+};
+
+struct HostRates {
+  std::chrono::nanoseconds tick{1'000'000'000 / 120};
+  std::chrono::nanoseconds mesh{1'000'000'000 / 30};
+};
+
+struct HostHealth {
+  TickStats tick;
+  DurationHistogram mesh_update;  // from a cut's arrival until its blocks' payloads were ready
+  RoomSeq room_seq;
+  RoomCounts counts;
+  std::size_t sessions = 0, mesh_streams = 0, cutting_streams = 0;
+  std::size_t queued_cuts = 0, stale_blocks = 0;
+  std::size_t furthest_behind = 0;  // rows or blocks that wait for the slowest reader
+  std::size_t blocks = 0;
+};
+
+// The bone at one place of the room's order.
+struct BoneStatus {
+  RoomSeq room_seq;
+  Digest field_hash;
+  double removed_mm3 = 0;
+  RoomCounts counts;
+};
+
+class RoomHost {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  // Makes the whole surface, then starts the threads. `progress` hears fractions from one thread at a time.
+  RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress);
+  ~RoomHost();
+  RoomHost(const RoomHost&) = delete;
+  RoomHost& operator=(const RoomHost&) = delete;
+
+  [[nodiscard]] const Case& bone() const;
+  [[nodiscard]] RoomSeq room_seq() const;
+  [[nodiscard]] std::uint64_t lease_epoch() const;
+  [[nodiscard]] bool knows(AuthorId author) const;
+  [[nodiscard]] HostHealth health() const;
+
+  // Runs `job` on the thread for slow requests, in order; it may call the functions below.
+  void run_slowly(std::function<void()> job);
+  AuthorId join(MemberKind kind);
+  [[nodiscard]] BoneStatus bone_status();
+  // From now on the sink hears every row after those of its leaves. Error: invalid_input (the author may not cut, or
+  // has an open session).
+  [[nodiscard]] Result<void> open_session(const std::shared_ptr<SessionSink>& sink);
+  void watch_mesh(MeshSink& sink);
+  void watch_cutting(CuttingSink& sink);
+  // Afterwards the sink hears nothing more. Unknown sinks are none of its business.
+  void leave(SessionSink& sink);
+  void leave(MeshSink& sink);
+  void leave(CuttingSink& sink);
+
+  // Queued until the next tick. The sink, kept alive until then, hears the outcome.
+  void queue_cut(std::shared_ptr<SessionSink> sink, Cut cut, Clock::time_point arrived);
+  void offer_state(CuttingState state);  // newest of its author wins
+
+  void end_streams(const std::string& why);  // those open now and those that come later
+  void stop();                               // joins the threads; what is queued is decided before
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace osteon

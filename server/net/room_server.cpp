@@ -1,0 +1,126 @@
+#include "server/net/room_server.hpp"
+
+#include <grpc/support/log.h>
+#include <grpcpp/grpcpp.h>
+#include <grpcpp/impl/service_type.h>
+
+#include <charconv>
+#include <chrono>
+#include <utility>
+
+#include "server/net/services.hpp"
+
+namespace osteon {
+namespace {
+
+struct HostPort {
+  std::string host;
+  int port = 0;
+};
+
+Result<HostPort> parse_listen(const std::string& listen) {
+  const std::size_t colon = listen.rfind(':');
+  HostPort out;
+  if (colon != std::string::npos) {
+    out.host = listen.substr(0, colon);
+    const char *first = listen.data() + colon + 1, *last = listen.data() + listen.size();
+    const auto [end, error] = std::from_chars(first, last, out.port);
+    if (error == std::errc{} && end == last && out.port >= 0 && out.port <= 65535 && !out.host.empty()) return out;
+  }
+  return failure(ErrorCode::invalid_input, "--listen " + listen + " is not HOST:PORT with a port from 0 to 65535");
+}
+
+// Four numbers that begin with 127: a name or a longer text is not taken for an address.
+bool is_ipv4_loopback(const std::string& host) {
+  int parts[4] = {};
+  const char *at = host.data(), *last = at + host.size();
+  for (int i = 0; i < 4; ++i) {
+    const auto [end, error] = std::from_chars(at, last, parts[i]);
+    if (error != std::errc{} || parts[i] < 0 || parts[i] > 255) return false;
+    at = end;
+    if (i < 3 && (at == last || *at++ != '.')) return false;
+  }
+  return at == last && parts[0] == 127;
+}
+
+bool is_loopback(const std::string& host) { return host == "localhost" || host == "[::1]" || is_ipv4_loopback(host); }
+
+std::uint64_t new_server_epoch() {
+  // Without a journal that counts, the calendar is what rises from one opening to the next.
+  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
+  return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(since_1970).count());
+}
+
+constexpr int kMaxReceiveBytes = 256 * 1024;       // a cut of 64 knots is below 4 kB
+constexpr int kMaxSendBytes = 4 * 1024 * 1024;     // a piece of a case is 1 MiB
+constexpr int kKeepaliveMs = 10'000;               // a peer that answers no ping that long is gone
+
+}  // namespace
+
+struct RoomServer::Impl {
+  std::unique_ptr<RoomHost> host;
+  std::vector<std::unique_ptr<grpc::Service>> services;
+  std::unique_ptr<grpc::Server> server;
+  std::string address;
+};
+
+RoomServer::RoomServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+RoomServer::~RoomServer() {
+  if (impl_->server) stop();
+}
+
+Result<std::unique_ptr<RoomServer>> RoomServer::start(Room room, const RoomServerOptions& options,
+                                                      const std::function<void(double)>& progress) {
+  const Result<HostPort> listen = parse_listen(options.listen);
+  if (!listen) return tl::unexpected(listen.error());
+  if (!is_loopback(listen->host))
+    return failure(ErrorCode::invalid_input, "--listen " + options.listen +
+                                                 " is reachable from other machines, but this server speaks plain text; "
+                                                 "use 127.0.0.1, [::1] or localhost");
+  // What fails is told in one sentence by the caller, not in gRPC's own lines.
+  gpr_set_log_function([](gpr_log_func_args*) {});
+
+  auto impl = std::make_unique<Impl>();
+  impl->host = std::make_unique<RoomHost>(std::move(room), options.rates, progress);
+  const std::uint64_t epoch = new_server_epoch();
+  impl->services.push_back(make_room_service(*impl->host, options.case_folder, epoch));
+  impl->services.push_back(make_cutting_service(*impl->host, epoch));
+  impl->services.push_back(make_watch_service(*impl->host));
+
+  grpc::ServerBuilder builder;
+  int port = 0;
+  builder.AddListeningPort(options.listen, grpc::InsecureServerCredentials(), &port);
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveMs);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, 64);
+  builder.SetMaxReceiveMessageSize(kMaxReceiveBytes);
+  builder.SetMaxSendMessageSize(kMaxSendBytes);
+  for (const auto& service : impl->services) builder.RegisterService(service.get());
+  impl->server = builder.BuildAndStart();
+  if (!impl->server || port == 0) {
+    impl->host->stop();
+    return failure(ErrorCode::exists, "cannot listen on " + options.listen +
+                                          ": the port is in use by another program; choose another with --listen, or 0 "
+                                          "for a free one");
+  }
+  impl->address = listen->host + ":" + std::to_string(port);
+  return std::unique_ptr<RoomServer>(new RoomServer(std::move(impl)));
+}
+
+const std::string& RoomServer::address() const { return impl_->address; }
+HostHealth RoomServer::health() const { return impl_->host->health(); }
+
+RoomServerSummary RoomServer::stop() {
+  // Streams hear why first; those whose reader does not read are cut off after a moment.
+  impl_->host->end_streams("the server stops");
+  impl_->server->Shutdown(std::chrono::system_clock::now() + std::chrono::milliseconds(500));
+  impl_->server->Wait();
+  impl_->host->stop();
+  impl_->server.reset();
+  return {impl_->host->bone_status(), impl_->host->health()};
+}
+
+}  // namespace osteon

@@ -1,0 +1,45 @@
+// The room on the network: listens, serves proto/osteon/v1, stops cleanly.
+#pragma once
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "common/core/result.hpp"
+#include "server/net/room_host.hpp"
+
+namespace osteon {
+
+struct RoomServerOptions {
+  std::string listen = "127.0.0.1:0";   // HOST:PORT on this machine; port 0 lets the system choose
+  std::filesystem::path case_folder;    // what clients are sent; holds the room's case
+  HostRates rates;
+};
+
+struct RoomServerSummary {
+  BoneStatus bone;
+  HostHealth health;
+};
+
+class RoomServer {
+ public:
+  // Errors: invalid_input (`listen` is not HOST:PORT, or not of this machine alone), exists (the port is in use).
+  // `progress` hears how far the first surface is.
+  [[nodiscard]] static Result<std::unique_ptr<RoomServer>> start(Room room, const RoomServerOptions& options,
+                                                                 const std::function<void(double)>& progress);
+  ~RoomServer();
+  RoomServer(const RoomServer&) = delete;
+  RoomServer& operator=(const RoomServer&) = delete;
+
+  [[nodiscard]] const std::string& address() const;  // HOST:PORT with the real port
+  [[nodiscard]] HostHealth health() const;
+  // Ends every stream with a status and joins all threads. Once.
+  RoomServerSummary stop();
+
+ private:
+  struct Impl;
+  explicit RoomServer(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace osteon

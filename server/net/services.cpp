@@ -1,0 +1,534 @@
+#include "server/net/services.hpp"
+
+#include <grpcpp/grpcpp.h>
+
+#include <array>
+#include <fstream>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "common/field/kernel.hpp"
+#include "common/wire/convert.hpp"
+#include "osteon/v1/cutting.grpc.pb.h"
+#include "osteon/v1/room.grpc.pb.h"
+#include "osteon/v1/watch.grpc.pb.h"
+
+namespace osteon {
+namespace {
+
+using grpc::ByteBuffer;
+using grpc::Status;
+using grpc::StatusCode;
+
+// A slice that shares the bytes instead of copying them.
+grpc::Slice slice_of(const Bytes& bytes) {
+  auto* keep = new Bytes(bytes);
+  return {const_cast<char*>(bytes->data()), bytes->size(), [](void* kept) { delete static_cast<Bytes*>(kept); }, keep};
+}
+
+ByteBuffer buffer_of(const MessageParts& parts) {
+  std::vector<grpc::Slice> slices;
+  slices.reserve(parts.size());
+  for (const Bytes& part : parts) slices.push_back(slice_of(part));
+  return {slices.data(), slices.size()};
+}
+
+template <class Message>
+std::optional<Message> parse(const ByteBuffer& bytes) {
+  ByteBuffer copy(bytes);  // shares the slices
+  Message message;
+  if (!grpc::SerializationTraits<Message>::Deserialize(&copy, &message).ok()) return std::nullopt;
+  return message;
+}
+
+Status invalid(std::string why) { return {StatusCode::INVALID_ARGUMENT, std::move(why)}; }
+
+Status not_joined(const char* message, std::uint64_t author) {
+  return invalid(std::string(message) + ".author " + std::to_string(author) + " has not joined this room; call Join first");
+}
+
+// A stream that owns at most the message in flight; what waits behind it is the derived class's bounded set. Exactly one
+// path calls Finish, decided under the mutex.
+template <class Reactor>
+class OutStream : public Reactor {
+ public:
+  // Hands the stream to gRPC, which holds it until OnDone; queued jobs and cuts may hold it longer.
+  template <class Stream>
+  static Stream* launch(std::shared_ptr<Stream> stream) {
+    Stream* raw = stream.get();
+    raw->self_ = std::move(stream);
+    return raw;
+  }
+
+  void close(Status status) {
+    const std::lock_guard lock(mutex_);
+    close_locked(std::move(status));
+  }
+
+  void OnWriteDone(bool ok) final {
+    const std::lock_guard lock(mutex_);
+    writing_ = false;
+    message_.Clear();
+    if (!ok) close_locked({StatusCode::CANCELLED, "the reader is gone"});
+    pump();
+  }
+  void OnCancel() final { close({StatusCode::CANCELLED, "the reader is gone"}); }
+  void OnDone() final {
+    {
+      const std::lock_guard lock(mutex_);
+      done_ = true;
+    }
+    leave();
+    const std::shared_ptr<void> last = std::move(self_);
+  }
+
+ protected:
+  // The rest is called under mutex_, except leave().
+  // Fills the next message; false when nothing waits.
+  virtual bool take(ByteBuffer& message) = 0;
+  virtual void leave() = 0;
+
+  // Ends the stream after the message in flight; an OK end sends what waits first.
+  void close_locked(Status status) {
+    if (!closing_) closing_ = std::move(status);
+    pump();
+  }
+  void pump() {
+    if (writing_ || finished_) return;
+    if ((!closing_ || closing_->ok()) && take(message_)) {
+      writing_ = true;
+      this->StartWrite(&message_);
+    } else if (closing_) {
+      finished_ = true;
+      this->Finish(*closing_);
+    }
+  }
+  [[nodiscard]] bool closing() const { return closing_.has_value(); }
+  [[nodiscard]] bool done() const { return done_; }  // gRPC has let go of the stream
+  [[nodiscard]] std::shared_ptr<void> self() const { return self_; }
+
+  mutable std::mutex mutex_;
+
+ private:
+  std::shared_ptr<void> self_;
+  std::optional<Status> closing_;
+  bool writing_ = false, finished_ = false, done_ = false;
+  ByteBuffer message_;
+};
+
+using WriteReactor = grpc::ServerWriteReactor<ByteBuffer>;
+using BidiReactor = grpc::ServerBidiReactor<ByteBuffer, ByteBuffer>;
+
+// A stream that is refused at once.
+class RefusedStream final : public OutStream<WriteReactor> {
+  bool take(ByteBuffer&) override { return false; }
+  void leave() override {}
+};
+
+WriteReactor* refused(Status status) {
+  RefusedStream* stream = RefusedStream::launch(std::make_shared<RefusedStream>());
+  stream->close(std::move(status));
+  return stream;
+}
+
+class MeshStream final : public OutStream<WriteReactor>, public MeshSink {
+ public:
+  explicit MeshStream(RoomHost& host) : host_(host) {}
+
+  void begin(MeshUpdate whole_surface) override {
+    const std::lock_guard lock(mutex_);
+    outbox_.emplace(std::move(whole_surface));
+    pump();
+  }
+  void offer(const MeshUpdate& update) override {
+    const std::lock_guard lock(mutex_);
+    if (closing()) return;
+    outbox_->add(update);
+    pump();
+  }
+  void end(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
+  std::size_t waiting() const override {
+    const std::lock_guard lock(mutex_);
+    return outbox_ ? outbox_->waiting() : 0;
+  }
+
+ private:
+  bool take(ByteBuffer& message) override {
+    if (!outbox_) return false;
+    const MessageParts parts = outbox_->take();
+    if (!parts.empty()) message = buffer_of(parts);
+    return !parts.empty();
+  }
+  void leave() override { host_.leave(*this); }
+
+  RoomHost& host_;
+  std::optional<MeshOutbox> outbox_;
+};
+
+class CuttingStream final : public OutStream<WriteReactor>, public CuttingSink {
+ public:
+  explicit CuttingStream(RoomHost& host) : host_(host) {}
+
+  void offer(const Bytes& message) override {
+    const std::lock_guard lock(mutex_);
+    if (closing()) return;
+    waiting_ = message;
+    pump();
+  }
+  void end(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
+  std::size_t waiting() const override {
+    const std::lock_guard lock(mutex_);
+    return waiting_ ? 1 : 0;
+  }
+
+ private:
+  bool take(ByteBuffer& message) override {
+    if (!waiting_) return false;
+    message = buffer_of({std::exchange(waiting_, nullptr)});
+    return true;
+  }
+  void leave() override { host_.leave(*this); }
+
+  RoomHost& host_;
+  Bytes waiting_;
+};
+
+// One haptic client's session. Reading stops while kMaxQueuedCuts of its cuts wait for a tick, so a client that sends
+// faster than the room cuts is slowed down by the network instead of filling memory.
+class SessionStream final : public OutStream<BidiReactor>, public SessionSink {
+ public:
+  static constexpr int kMaxQueuedCuts = 256;
+
+  SessionStream(RoomHost& host, std::uint64_t server_epoch) : host_(host), server_epoch_(server_epoch) {}
+  void start() { StartRead(&request_); }
+
+  AuthorId author() const override { return author_; }
+  void begin(std::vector<FieldLeaf> leaves, RoomSeq contained) override {
+    const std::lock_guard lock(mutex_);
+    outbox_.begin(std::move(leaves), contained);
+    pump();
+  }
+  void offer(RoomSeq place, const Bytes& row) override {
+    const std::lock_guard lock(mutex_);
+    if (!closing()) send_or_give_up(outbox_.add(place, row));
+  }
+  void answer(const Bytes& row) override {
+    const std::lock_guard lock(mutex_);
+    if (!closing()) send_or_give_up(outbox_.add_answer(row));
+  }
+  void refuse(const Error& why) override { close(invalid(why.message)); }
+  void decided() override {
+    const std::lock_guard lock(mutex_);
+    --queued_;
+    if (closing()) return;
+    if (reading_ended_ && queued_ == 0) {
+      close_locked(Status::OK);
+    } else if (paused_ && queued_ < kMaxQueuedCuts) {
+      paused_ = false;
+      StartRead(&request_);
+    }
+  }
+  void end(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
+  std::size_t waiting() const override {
+    const std::lock_guard lock(mutex_);
+    return outbox_.waiting();
+  }
+
+  void OnReadDone(bool ok) override {
+    if (!ok) {
+      // The client has no more to say: what it queued is still decided and told.
+      const std::lock_guard lock(mutex_);
+      reading_ended_ = true;
+      if (queued_ == 0) close_locked(Status::OK);
+      return;
+    }
+    auto request = parse<v1::SessionRequest>(request_);
+    if (!request) return close(invalid("a SessionRequest could not be parsed"));
+    if (request->message_case() == v1::SessionRequest::kOpen) return open(request->open());
+    if (!opened_) return close(invalid("the first SessionRequest must be open"));
+    switch (request->message_case()) {
+      case v1::SessionRequest::kCut: return queue(request->cut());
+      case v1::SessionRequest::kState: return show(request->state());
+      default: return close(invalid("SessionRequest.message is not set"));
+    }
+  }
+
+ private:
+  void open(const v1::SessionOpen& request) {
+    if (opened_) return close(invalid("open was sent before"));
+    if (request.server_epoch() != server_epoch_)
+      return close(invalid("open.server_epoch is " + std::to_string(request.server_epoch()) + " and the server's " +
+                           std::to_string(server_epoch_) + "; join again"));
+    opened_ = true;
+    author_ = AuthorId{request.author()};
+    // Reading goes on after the leaves were taken, so that no cut of this author is among them.
+    host_.run_slowly([this, keep = self()] {
+      const std::shared_ptr<SessionSink> sink(keep, this);
+      if (const Result<void> opened = host_.open_session(sink); !opened) return close(invalid(opened.error().message));
+      // A reader that went away meanwhile has left the host's list before it was on it.
+      if (!read_on()) host_.leave(*this);
+    });
+  }
+
+  void queue(const v1::Cut& message) {
+    Result<Cut> cut = wire::from_wire(message);
+    if (!cut) return close(invalid(cut.error().message));
+    if (cut->author != author_) return close(invalid("cut.author is not the author who opened the session"));
+    {
+      const std::lock_guard lock(mutex_);
+      ++queued_;
+    }
+    host_.queue_cut(std::shared_ptr<SessionSink>(self(), this), std::move(*cut), RoomHost::Clock::now());
+    read_on();
+  }
+
+  void show(const v1::CuttingState& message) {
+    Result<CuttingState> state = wire::from_wire(message);
+    if (!state) return close(invalid(state.error().message));
+    if (state->author != author_) return close(invalid("state.author is not the author who opened the session"));
+    host_.offer_state(std::move(*state));
+    read_on();
+  }
+
+  // Reads the next request, or waits for decided() to do so. False when gRPC has let go of the stream.
+  bool read_on() {
+    const std::lock_guard lock(mutex_);
+    if (done()) return false;
+    paused_ = queued_ >= kMaxQueuedCuts;
+    if (!closing() && !paused_) StartRead(&request_);
+    return true;
+  }
+
+  void send_or_give_up(bool taken) {
+    if (taken)
+      pump();
+    else
+      close_locked({StatusCode::RESOURCE_EXHAUSTED, "the reader is more than " + std::to_string(SessionOutbox::kMaxRows) +
+                                                        " cuts behind the room; join again"});
+  }
+  bool take(ByteBuffer& message) override {
+    const MessageParts parts = outbox_.take();
+    if (!parts.empty()) message = buffer_of(parts);
+    return !parts.empty();
+  }
+  void leave() override { host_.leave(*this); }
+
+  RoomHost& host_;
+  const std::uint64_t server_epoch_;
+  ByteBuffer request_;
+  AuthorId author_;           // set before the host knows the stream
+  bool opened_ = false;       // only reactions to reads use it, and these come one by one
+  SessionOutbox outbox_;
+  int queued_ = 0;            // cuts between reading and deciding
+  bool paused_ = false, reading_ended_ = false;
+};
+
+// The case's files, read piece by piece on the host's thread for slow requests.
+class CaseStream final : public OutStream<WriteReactor> {
+ public:
+  static constexpr std::size_t kPieceBytes = 1024 * 1024;
+
+  CaseStream(RoomHost& host, std::filesystem::path folder) : host_(host), folder_(std::move(folder)) {}
+  void start() { read_next_later(); }
+
+ private:
+  static constexpr std::array<const char*, 2> kFiles{"case.json", "bone.vdb"};
+
+  void read_next_later() {
+    host_.run_slowly([this, keep = self()] { read_next(); });
+  }
+  void read_next() {
+    const std::filesystem::path path = folder_ / kFiles[file_index_];
+    if (!file_.is_open()) {
+      std::error_code failed;
+      file_size_ = std::filesystem::file_size(path, failed);
+      file_.open(path, std::ios::binary);
+      if (failed || !file_) return close({StatusCode::INTERNAL, "the server cannot read its case's " + path.filename().string()});
+      sent_ = 0;
+    }
+    v1::GetCaseResponse response;
+    response.set_file(kFiles[file_index_]);
+    response.set_file_size(file_size_);
+    std::string& data = *response.mutable_data();
+    data.resize(std::min<std::uintmax_t>(kPieceBytes, file_size_ - sent_));
+    if (!file_.read(data.data(), static_cast<std::streamsize>(data.size())))
+      return close({StatusCode::INTERNAL, "the server cannot read its case's " + path.filename().string()});
+    sent_ += data.size();
+    if (sent_ == file_size_) {
+      file_.close();
+      ++file_index_;
+    }
+    auto piece = std::make_shared<const std::string>(response.SerializeAsString());
+    const std::lock_guard lock(mutex_);
+    waiting_ = std::move(piece);
+    pump();
+    if (file_index_ == kFiles.size()) close_locked(Status::OK);
+  }
+  bool take(ByteBuffer& message) override {
+    if (!waiting_) return false;
+    message = buffer_of({std::exchange(waiting_, nullptr)});
+    if (file_index_ < kFiles.size()) read_next_later();
+    return true;
+  }
+  void leave() override {}
+
+  RoomHost& host_;
+  const std::filesystem::path folder_;
+  Bytes waiting_;
+  // Of the job that reads; the next job is queued only after it has left its piece.
+  std::size_t file_index_ = 0;
+  std::ifstream file_;
+  std::uintmax_t file_size_ = 0, sent_ = 0;
+};
+
+// Why a program of these versions cannot join; OK when it can.
+Status judge(const v1::JoinRequest& request) {
+  const auto mismatch = [](const char* what, std::uint32_t theirs, std::uint32_t ours) {
+    return Status(StatusCode::FAILED_PRECONDITION,
+                  std::string("the client speaks ") + what + " version " + std::to_string(theirs) + " and the server " +
+                      what + " version " + std::to_string(ours) + "; install the same Osteon release on both");
+  };
+  if (request.protocol_version() != wire::kProtocolVersion)
+    return mismatch("protocol", request.protocol_version(), wire::kProtocolVersion);
+  const bool needs_kernel = request.kind() == v1::CLIENT_KIND_HAPTIC;
+  if (request.kernel_version() != kKernelVersion && (needs_kernel || request.kernel_version() != 0))
+    return mismatch("cut kernel", request.kernel_version(), kKernelVersion);
+  if (!v1::ClientKind_IsValid(request.kind()) || request.kind() == v1::CLIENT_KIND_UNSPECIFIED)
+    return invalid("kind is not a kind of client that this server knows");
+  if (request.name().size() > 256) return invalid("name is longer than 256 bytes");
+  return Status::OK;
+}
+
+using RoomBase = v1::RoomService::WithCallbackMethod_Join<v1::RoomService::WithCallbackMethod_GetStatus<
+    v1::RoomService::WithRawCallbackMethod_GetCase<v1::RoomService::Service>>>;
+
+class RoomServiceImpl final : public RoomBase {
+ public:
+  RoomServiceImpl(RoomHost& host, std::filesystem::path case_folder, std::uint64_t server_epoch)
+      : host_(host), case_folder_(std::move(case_folder)), server_epoch_(server_epoch) {}
+
+  grpc::ServerUnaryReactor* Join(grpc::CallbackServerContext* context, const v1::JoinRequest* request,
+                                 v1::JoinResponse* response) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (Status status = judge(*request); !status.ok()) {
+      reactor->Finish(status);
+      return reactor;
+    }
+    const MemberKind kind = request->kind() == v1::CLIENT_KIND_HAPTIC ? MemberKind::surgeon : MemberKind::watcher;
+    host_.run_slowly([this, reactor, response, kind] {
+      const Case& bone = host_.bone();
+      response->set_author(host_.join(kind).value);
+      response->set_server_epoch(server_epoch_);
+      response->set_lease_epoch(host_.lease_epoch());
+      response->set_case_hash(wire::to_wire(bone.hash()));
+      response->set_case_title(bone.info().title);
+      response->set_pitch_mm(bone.pitch_mm());
+      const Box bounds = bone.bounds();
+      *response->mutable_bounds_min_mm() = wire::to_wire(bounds.min_mm);
+      *response->mutable_bounds_max_mm() = wire::to_wire(bounds.max_mm);
+      response->set_room_seq(host_.room_seq().value);
+      reactor->Finish(Status::OK);
+    });
+    return reactor;
+  }
+
+  grpc::ServerUnaryReactor* GetStatus(grpc::CallbackServerContext* context, const v1::GetStatusRequest*,
+                                      v1::GetStatusResponse* response) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    host_.run_slowly([this, reactor, response] {
+      const BoneStatus status = host_.bone_status();
+      const HostHealth health = host_.health();
+      response->set_room_seq(status.room_seq.value);
+      response->set_field_hash(wire::to_wire(status.field_hash));
+      response->set_removed_mm3(status.removed_mm3);
+      response->set_rejected(status.counts.rejected);
+      response->set_subscribers(static_cast<std::uint32_t>(health.mesh_streams + health.cutting_streams));
+      v1::TickHealth& tick = *response->mutable_tick();
+      tick.set_ticks(health.tick.work.count());
+      tick.set_missed(health.tick.missed);
+      tick.set_late_p50_us(health.tick.lateness.percentile_us(50));
+      tick.set_late_p99_us(health.tick.lateness.percentile_us(99));
+      tick.set_late_max_us(health.tick.lateness.max_us());
+      tick.set_work_p50_us(health.tick.work.percentile_us(50));
+      tick.set_work_p99_us(health.tick.work.percentile_us(99));
+      reactor->Finish(Status::OK);
+    });
+    return reactor;
+  }
+
+  WriteReactor* GetCase(grpc::CallbackServerContext*, const ByteBuffer* bytes) override {
+    const auto request = parse<v1::GetCaseRequest>(*bytes);
+    if (!request) return refused(invalid("the GetCaseRequest could not be parsed"));
+    const Result<Digest> hash = wire::digest_from_wire(request->case_hash());
+    if (!hash) return refused(invalid("case_hash is not a digest of 32 bytes"));
+    if (*hash != host_.bone().hash())
+      return refused({StatusCode::NOT_FOUND, "this server has no case " + to_hex(*hash)});
+    CaseStream* stream = CaseStream::launch(std::make_shared<CaseStream>(host_, case_folder_));
+    stream->start();
+    return stream;
+  }
+
+ private:
+  RoomHost& host_;
+  const std::filesystem::path case_folder_;
+  const std::uint64_t server_epoch_;
+};
+
+class CuttingServiceImpl final : public v1::CuttingService::WithRawCallbackMethod_Session<v1::CuttingService::Service> {
+ public:
+  CuttingServiceImpl(RoomHost& host, std::uint64_t server_epoch) : host_(host), server_epoch_(server_epoch) {}
+
+  BidiReactor* Session(grpc::CallbackServerContext*) override {
+    SessionStream* stream = SessionStream::launch(std::make_shared<SessionStream>(host_, server_epoch_));
+    stream->start();
+    return stream;
+  }
+
+ private:
+  RoomHost& host_;
+  const std::uint64_t server_epoch_;
+};
+
+using WatchBase = v1::WatchService::WithRawCallbackMethod_WatchMesh<
+    v1::WatchService::WithRawCallbackMethod_WatchCutting<v1::WatchService::Service>>;
+
+class WatchServiceImpl final : public WatchBase {
+ public:
+  explicit WatchServiceImpl(RoomHost& host) : host_(host) {}
+
+  WriteReactor* WatchMesh(grpc::CallbackServerContext*, const ByteBuffer* bytes) override {
+    const auto request = parse<v1::WatchMeshRequest>(*bytes);
+    if (!request) return refused(invalid("the WatchMeshRequest could not be parsed"));
+    if (!host_.knows(AuthorId{request->author()})) return refused(not_joined("WatchMeshRequest", request->author()));
+    MeshStream* stream = MeshStream::launch(std::make_shared<MeshStream>(host_));
+    host_.watch_mesh(*stream);
+    return stream;
+  }
+
+  WriteReactor* WatchCutting(grpc::CallbackServerContext*, const ByteBuffer* bytes) override {
+    const auto request = parse<v1::WatchCuttingRequest>(*bytes);
+    if (!request) return refused(invalid("the WatchCuttingRequest could not be parsed"));
+    if (!host_.knows(AuthorId{request->author()})) return refused(not_joined("WatchCuttingRequest", request->author()));
+    CuttingStream* stream = CuttingStream::launch(std::make_shared<CuttingStream>(host_));
+    host_.watch_cutting(*stream);
+    return stream;
+  }
+
+ private:
+  RoomHost& host_;
+};
+
+}  // namespace
+
+std::unique_ptr<grpc::Service> make_room_service(RoomHost& host, std::filesystem::path case_folder,
+                                                 std::uint64_t server_epoch) {
+  return std::make_unique<RoomServiceImpl>(host, std::move(case_folder), server_epoch);
+}
+std::unique_ptr<grpc::Service> make_cutting_service(RoomHost& host, std::uint64_t server_epoch) {
+  return std::make_unique<CuttingServiceImpl>(host, server_epoch);
+}
+std::unique_ptr<grpc::Service> make_watch_service(RoomHost& host) { return std::make_unique<WatchServiceImpl>(host); }
+
+}  // namespace osteon

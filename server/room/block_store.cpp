@@ -1,0 +1,21 @@
+#include "server/room/block_store.hpp"
+
+#include <utility>
+
+namespace osteon {
+
+BlockPayload make_block(const BlockSamples& samples) {
+  return encode_block(samples.solid_mm, samples.surface_mm, samples.covered, samples.level_pitch_mm);
+}
+
+const StoredBlock* BlockStore::put(const BlockKey& key, BlockPayload payload) {
+  const auto known = blocks_.find(key);
+  if (known == blocks_.end() ? payload.bytes.empty() : known->second.payload == payload) return nullptr;
+  StoredBlock& block = blocks_[key];
+  ++block.version;
+  block.mesh_hash = mesh_hash(payload);
+  block.payload = std::move(payload);
+  return &block;
+}
+
+}  // namespace osteon
