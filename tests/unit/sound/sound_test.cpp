@@ -1,0 +1,107 @@
+// The measures of sound against signals whose level, frequency and brightness are known in closed form.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "common/sound/levels.hpp"
+#include "common/sound/spectrum.hpp"
+#include "common/sound/tones.hpp"
+
+namespace osteon::sound {
+namespace {
+
+constexpr double kRate_hz = 48000.0;
+
+std::vector<float> sine(double hz, double amplitude, std::size_t count) {
+  std::vector<float> samples(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    samples[i] = static_cast<float>(amplitude * std::sin(2.0 * std::numbers::pi * hz * static_cast<double>(i) / kRate_hz));
+  }
+  return samples;
+}
+
+std::vector<float> sum(std::vector<float> a, const std::vector<float>& b) {
+  for (std::size_t i = 0; i < a.size(); ++i) a[i] += b[i];
+  return a;
+}
+
+TEST(Levels, SineOfFullScaleIsThreeDecibelsBelow) {
+  EXPECT_NEAR(rms_db(sine(1000, 1.0, 48000)), -3.0103, 1e-3);
+  EXPECT_NEAR(rms_db(sine(1000, 0.1, 48000)), -23.0103, 1e-3);
+  EXPECT_NEAR(peak(sine(1000, 0.5, 48000)), 0.5, 1e-6);
+}
+
+TEST(Levels, SilenceHasTheLowestLevelAndNoBrightness) {
+  const std::vector<float> silence(8192, 0.0F);
+  EXPECT_EQ(rms_db(silence), kSilence_db);
+  EXPECT_EQ(rms_db({}), kSilence_db);
+  EXPECT_EQ(centroid_hz(power_spectrum(silence, kRate_hz), 0, 24000), 0.0);
+}
+
+TEST(Levels, LargestStepIsTheSlopeOfASineAndFindsAClick) {
+  std::vector<float> samples = sine(100, 1.0, 48000);
+  EXPECT_NEAR(largest_step(samples), 2.0 * std::sin(std::numbers::pi * 100 / kRate_hz), 1e-4);
+  samples[20000] += 0.5F;
+  EXPECT_GT(largest_step(samples), 0.48);
+}
+
+TEST(Spectrum, PowerSumsToTheMeanSquare) {
+  std::mt19937 random(1);
+  std::normal_distribution<float> normal(0.0F, 0.1F);
+  std::vector<float> noise(480000);
+  for (float& x : noise) x = normal(random);
+  // Ten seconds of noise: the mean square is known to sqrt(2 / 480000) = 0.2 %, the windows weigh it unevenly.
+  EXPECT_NEAR(band_db(power_spectrum(noise, kRate_hz), 0, 24001), rms_db(noise), 0.05);
+  // White noise is flat: half of the band has half of the power, and its middle is the centroid.
+  const Spectrum flat = power_spectrum(noise, kRate_hz);
+  EXPECT_NEAR(band_db(flat, 0, 12000) - band_db(flat, 12000, 24000), 0.0, 0.1);
+  EXPECT_NEAR(centroid_hz(flat, 0, 24000), 12000, 100);
+}
+
+TEST(Spectrum, CentroidOfTwoTonesIsTheirPowerWeightedMean) {
+  const auto tones = sum(sine(1000, 0.2, 96000), sine(5000, 0.1, 96000));
+  // Powers 4 : 1.
+  EXPECT_NEAR(centroid_hz(power_spectrum(tones, kRate_hz), 0, 24000), (4 * 1000 + 5000) / 5.0, 2.0);
+}
+
+TEST(Spectrum, StrongestPeaksAreTheTonesLoudestFirst) {
+  const auto tones = sum(sum(sine(1234.5, 0.05, 96000), sine(3700.2, 0.2, 96000)), sine(9001.7, 0.1, 96000));
+  const std::vector<Peak> peaks = strongest_peaks(power_spectrum(tones, kRate_hz), 3, 100);
+  ASSERT_EQ(peaks.size(), 3U);
+  // The parabola on a Hann lobe is right to a few hundredths of a bin of 11.7 Hz.
+  EXPECT_NEAR(peaks[0].hz, 3700.2, 0.6);
+  EXPECT_NEAR(peaks[1].hz, 9001.7, 0.6);
+  EXPECT_NEAR(peaks[2].hz, 1234.5, 0.6);
+  EXPECT_NEAR(peaks[0].level_db, 20 * std::log10(0.2) - 3.01, 0.1);
+}
+
+TEST(Tones, FrequencyAndAmplitudeOfOneAmongOthers) {
+  const auto tones = sum(sine(437.21, 0.3, 24000), sine(2000, 0.3, 24000));
+  const Tone tone = find_tone(tones, kRate_hz, 400, 480);
+  EXPECT_NEAR(tone.hz, 437.21, 0.01);
+  EXPECT_NEAR(tone.level_db, 20 * std::log10(0.3), 0.05);
+  // Far from both, side lobes of the Hann window have fallen by more than 80 dB.
+  EXPECT_LT(tone_db(tones, kRate_hz, 1200), -90);
+}
+
+TEST(Tones, TrackFollowsAGlide) {
+  // f(t) = 1000 + 100 t: the phase is its integral.
+  std::vector<float> glide(96000);
+  for (std::size_t i = 0; i < glide.size(); ++i) {
+    const double t = static_cast<double>(i) / kRate_hz;
+    glide[i] = static_cast<float>(0.5 * std::sin(2.0 * std::numbers::pi * (1000 * t + 50 * t * t)));
+  }
+  const TrackParams params;
+  const std::vector<double> track = track_tone(glide, kRate_hz, 1000, params);
+  ASSERT_GT(track.size(), 80U);
+  for (std::size_t i = 0; i < track.size(); ++i) {
+    const double middle_s = (static_cast<double>(i) * params.hop + 0.5 * params.window) / kRate_hz;
+    EXPECT_NEAR(track[i], 1000 + 100 * middle_s, 0.2) << "point " << i;
+  }
+}
+
+}  // namespace
+}  // namespace osteon::sound
