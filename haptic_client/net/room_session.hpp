@@ -57,7 +57,7 @@ class RoomSession {
   // Any thread but the haptic and audio ones: these lock and allocate.
   // In order of the calls. False when kMaxWaitingCuts are waiting or the stream is lost; the cut is then not taken.
   [[nodiscard]] bool send(const Cut& cut);
-  // Newest wins: a state that is still waiting is replaced. It may overtake cuts that are waiting.
+  // Newest wins: a state that is still waiting is replaced. Cuts that are waiting go first.
   void send(const CuttingState& state);
   [[nodiscard]] std::size_t waiting_cuts() const;
   [[nodiscard]] Result<wire::RoomStatus> status() const;  // asks the server

@@ -1,0 +1,296 @@
+#include "haptic_client/net/room_session.hpp"
+
+#include <grpcpp/grpcpp.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdlib>
+#include <deque>
+#include <fstream>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "common/core/check.hpp"
+#include "common/wire/convert.hpp"
+#include "osteon/v1/cutting.grpc.pb.h"
+#include "osteon/v1/room.grpc.pb.h"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+
+constexpr auto kCloseTime = 1s;
+constexpr auto kCaseSilence = 60s;  // a whole case takes no longer on one machine
+
+Error cannot_cache(const fs::path& path, const std::string& why) {
+  return {ErrorCode::internal, "cannot keep the case in the cache: " + path.string() + ": " + why + "; give another folder with --cache"};
+}
+
+// Writes the case's files as they come. A correct server sends these names and no others.
+Result<void> receive_case(const wire::JoinedRoom& room, const fs::path& folder, const std::function<bool()>& stop) {
+  v1::GetCaseRequest request;
+  request.set_case_hash(wire::to_wire(room.case_hash));
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kCaseSilence);
+  const auto reader = v1::RoomService::NewStub(room.channel)->GetCase(&context, request);
+
+  std::optional<Error> failed;
+  std::string open_name;
+  std::ofstream file;
+  v1::GetCaseResponse piece;
+  while (!failed && reader->Read(&piece)) {
+    if (stop && stop()) {
+      failed = Error{ErrorCode::cancelled, "stopped while the case was fetched"};
+    } else if (piece.file() != "case.json" && piece.file() != "bone.vdb") {
+      failed = Error{ErrorCode::unsupported, "the server sent a file that no case has: " + piece.file()};
+    } else {
+      if (piece.file() != open_name) {
+        file.close();
+        file.clear();
+        file.open(folder / piece.file(), std::ios::binary | std::ios::trunc);
+        open_name = piece.file();
+      }
+      file.write(piece.data().data(), static_cast<std::streamsize>(piece.data().size()));
+      file.flush();
+      if (!file) failed = cannot_cache(folder / open_name, "it cannot be written (is the disk full?)");
+    }
+  }
+  if (failed) context.TryCancel();
+  const grpc::Status status = reader->Finish();
+  if (failed) return tl::unexpected(*failed);
+  if (!status.ok()) return failure(ErrorCode::unavailable, "the server stopped sending the case: " + status.error_message());
+  return {};
+}
+
+// The folder that a case is fetched into, removed unless it was moved to its place.
+class PartialFolder {
+ public:
+  explicit PartialFolder(fs::path path) : path_(std::move(path)) {}
+  ~PartialFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  PartialFolder(const PartialFolder&) = delete;
+  PartialFolder& operator=(const PartialFolder&) = delete;
+  [[nodiscard]] const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+Result<Case> fetch_case(const wire::JoinedRoom& room, const fs::path& cache, const std::function<bool()>& stop) {
+  const fs::path place = cache / to_hex(room.case_hash);
+  if (Result<Case> kept = Case::load(place); kept && kept->hash() == room.case_hash) return kept;
+
+  const PartialFolder part(cache / (to_hex(room.case_hash) + ".part-" + std::to_string(::getpid())));
+  std::error_code error;
+  fs::remove_all(part.path(), error);
+  fs::create_directories(part.path(), error);
+  if (error) return tl::unexpected(cannot_cache(part.path(), error.message()));
+  if (const Result<void> received = receive_case(room, part.path(), stop); !received) return tl::unexpected(received.error());
+  Result<Case> fetched = Case::load(part.path());
+  if (!fetched) return fetched;
+  if (fetched->hash() != room.case_hash)
+    return failure(ErrorCode::invalid_input, "the server sent the case " + to_hex(fetched->hash()) + " where " +
+                                                 to_hex(room.case_hash) + " was announced");
+
+  // A broken folder gives way; one that another client has put there meanwhile is as good as ours.
+  fs::rename(part.path(), place, error);
+  if (error) {
+    if (const Result<Case> other = Case::load(place); other && other->hash() == room.case_hash) return fetched;
+    fs::remove_all(place, error);
+    fs::rename(part.path(), place, error);
+    if (error) return tl::unexpected(cannot_cache(place, error.message()));
+  }
+  return fetched;
+}
+
+}  // namespace
+
+fs::path default_case_cache() {
+  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache) return fs::path(cache) / "osteon" / "cases";
+  if (const char* home = std::getenv("HOME"); home && *home) return fs::path(home) / ".cache" / "osteon" / "cases";
+  return fs::temp_directory_path() / "osteon" / "cases";
+}
+
+struct RoomSession::Impl {
+  Impl(wire::JoinedRoom r, Case b) : room(std::move(r)), bone(std::move(b)) {}
+
+  void read();
+  void write();
+  Result<void> deliver(const v1::SessionResponse& response);
+
+  wire::JoinedRoom room;
+  Case bone;
+  RoomEvents events;
+
+  grpc::ClientContext context;
+  std::unique_ptr<v1::CuttingService::Stub> stub;
+  std::unique_ptr<grpc::ClientReaderWriter<v1::SessionRequest, v1::SessionResponse>> stream;
+  std::thread reader, writer;
+
+  mutable std::mutex mutex;
+  std::condition_variable wake;
+  std::deque<v1::Cut> cuts;                   // at most kMaxWaitingCuts
+  std::optional<v1::CuttingState> state;      // the newest that was not sent
+  bool closing = false, over = false;
+};
+
+// On the writer thread: cuts before states, so that a state never tells of bone that the server still has.
+void RoomSession::Impl::write() {
+  v1::SessionRequest request;
+  request.mutable_open()->set_author(room.author.value);
+  request.mutable_open()->set_server_epoch(room.server_epoch);
+  bool sent = stream->Write(request);
+  while (sent) {
+    {
+      std::unique_lock lock(mutex);
+      wake.wait(lock, [&] { return !cuts.empty() || state || closing || over; });
+      if (over) break;
+      if (!cuts.empty()) {
+        *request.mutable_cut() = std::move(cuts.front());
+        cuts.pop_front();
+      } else if (state) {
+        *request.mutable_state() = std::move(*state);
+        state.reset();
+      } else {
+        break;
+      }
+    }
+    sent = stream->Write(request);
+  }
+  stream->WritesDone();
+}
+
+Result<void> RoomSession::Impl::deliver(const v1::SessionResponse& response) {
+  switch (response.message_case()) {
+    case v1::SessionResponse::kLeaf: {
+      const Result<FieldLeaf> leaf = wire::from_wire(response.leaf());
+      if (!leaf) return tl::unexpected(leaf.error());
+      if (events.leaf) events.leaf(*leaf);
+      return {};
+    }
+    case v1::SessionResponse::kComplete:
+      if (events.complete) events.complete(RoomSeq{response.complete().room_seq()});
+      return {};
+    case v1::SessionResponse::kCommitted: {
+      const Result<Cut> cut = wire::from_wire(response.committed().cut());
+      if (!cut) return tl::unexpected(cut.error());
+      if (events.committed) events.committed(RoomSeq{response.committed().room_seq()}, *cut);
+      return {};
+    }
+    case v1::SessionResponse::kRejected: {
+      const v1::RejectedCut& row = response.rejected();
+      if (events.rejected) events.rejected(RoomSeq{row.room_seq()}, row.author_seq(), row.reason());
+      return {};
+    }
+    default: return failure(ErrorCode::unsupported, "SessionResponse.message is not known to this client");
+  }
+}
+
+void RoomSession::Impl::read() {
+  v1::SessionResponse response;
+  std::optional<Error> broken;
+  while (!broken && stream->Read(&response)) {
+    {
+      const std::lock_guard lock(mutex);
+      if (over) break;
+    }
+    if (const Result<void> delivered = deliver(response); !delivered) {
+      broken = Error{delivered.error().code, "the server sent what no correct server sends: " + delivered.error().message};
+      context.TryCancel();
+    }
+  }
+  bool closed = false;
+  {
+    const std::lock_guard lock(mutex);
+    closed = closing;
+    over = true;
+    wake.notify_all();
+  }
+  // Finish waits for the status, which comes once the writer has stopped.
+  if (writer.joinable()) writer.join();
+  const grpc::Status status = stream->Finish();
+  if (closed || !events.lost) return;
+  events.lost(broken ? *broken
+                     : Error{ErrorCode::unavailable, "the server ended the session: " +
+                                                         (status.error_message().empty() ? std::string("it closed the connection")
+                                                                                         : status.error_message())});
+}
+
+RoomSession::RoomSession(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+RoomSession::RoomSession(RoomSession&&) noexcept = default;
+RoomSession& RoomSession::operator=(RoomSession&& other) noexcept {
+  if (this != &other) {
+    close();
+    impl_ = std::move(other.impl_);
+  }
+  return *this;
+}
+RoomSession::~RoomSession() { close(); }
+
+Result<RoomSession> RoomSession::join(const RoomSessionOptions& options, const std::function<bool()>& stop) {
+  Result<wire::JoinedRoom> room =
+      wire::join_room(options.address, wire::ClientKind::haptic, options.name, options.patience, stop);
+  if (!room) return tl::unexpected(room.error());
+  Result<Case> bone = fetch_case(*room, options.cache, stop);
+  if (!bone) return tl::unexpected(bone.error());
+  return RoomSession(std::make_unique<Impl>(std::move(*room), std::move(*bone)));
+}
+
+const wire::JoinedRoom& RoomSession::room() const { return impl_->room; }
+const Case& RoomSession::bone() const { return impl_->bone; }
+
+void RoomSession::open(RoomEvents events) {
+  OSTEON_CHECK(!impl_->stream);
+  impl_->events = std::move(events);
+  impl_->stub = v1::CuttingService::NewStub(impl_->room.channel);
+  impl_->stream = impl_->stub->Session(&impl_->context);
+  impl_->writer = std::thread([impl = impl_.get()] { impl->write(); });
+  impl_->reader = std::thread([impl = impl_.get()] { impl->read(); });
+}
+
+bool RoomSession::send(const Cut& cut) {
+  v1::Cut message = wire::to_wire(cut);
+  const std::lock_guard lock(impl_->mutex);
+  if (impl_->closing || impl_->over || impl_->cuts.size() >= kMaxWaitingCuts) return false;
+  impl_->cuts.push_back(std::move(message));
+  impl_->wake.notify_one();
+  return true;
+}
+
+void RoomSession::send(const CuttingState& state) {
+  v1::CuttingState message = wire::to_wire(state);
+  const std::lock_guard lock(impl_->mutex);
+  impl_->state = std::move(message);
+  impl_->wake.notify_one();
+}
+
+std::size_t RoomSession::waiting_cuts() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->cuts.size();
+}
+
+Result<wire::RoomStatus> RoomSession::status() const { return wire::room_status(impl_->room); }
+
+void RoomSession::close() {
+  if (!impl_ || !impl_->reader.joinable()) return;
+  {
+    std::unique_lock lock(impl_->mutex);
+    impl_->closing = true;
+    impl_->wake.notify_all();
+    // The server ends the stream when it has decided what was sent; one that does not is not waited for.
+    impl_->wake.wait_for(lock, kCloseTime, [&] { return impl_->over; });
+    impl_->over = true;
+    impl_->wake.notify_all();
+  }
+  impl_->context.TryCancel();
+  impl_->reader.join();
+}
+
+}  // namespace osteon
