@@ -1,0 +1,34 @@
+#include "common/imaging/hu_volume.hpp"
+
+#include <cstdio>
+
+namespace osteon::imaging {
+
+std::string describe(const HuVolume& volume) {
+  char text[128];
+  std::snprintf(text, sizeof text, "%dx%dx%d, %.3gx%.3gx%.3g mm", volume.dims[0], volume.dims[1], volume.dims[2],
+                volume.spacing_mm.x(), volume.spacing_mm.y(), volume.spacing_mm.z());
+  return text;
+}
+
+Box enclosing_box(const HuVolume& volume, const Vec3& first, const Vec3& last) {
+  Box box;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3 voxel((corner & 1) != 0 ? last.x() : first.x(), (corner & 2) != 0 ? last.y() : first.y(),
+                     (corner & 4) != 0 ? last.z() : first.z());
+    box.include(volume.position_mm(voxel));
+  }
+  return box;
+}
+
+double outside_scan_mm(const HuVolume& volume, const Vec3& position_mm) {
+  const Vec3 voxel = volume.voxel(position_mm);
+  Vec3 beyond;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double half = 0.5 * volume.dims[static_cast<std::size_t>(axis)];
+    beyond[axis] = (std::abs(voxel[axis] + 0.5 - half) - half) * volume.spacing_mm[axis];
+  }
+  return beyond.maxCoeff();
+}
+
+}  // namespace osteon::imaging

@@ -1,0 +1,48 @@
+// A CT volume as it was scanned: Hounsfield units on the scanner's own grid.
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/geometry/lattice.hpp"
+
+namespace osteon::imaging {
+
+struct HuVolume {
+  std::array<int, 3> dims{};                                   // columns, rows, slices
+  Vec3 spacing_mm = Vec3::Ones();                              // between neighbours along each
+  Vec3 origin_mm = Vec3::Zero();                               // centre of the first voxel, LPS
+  Eigen::Matrix3d directions = Eigen::Matrix3d::Identity();    // orthonormal: the way columns, rows, slices go, LPS
+  std::vector<std::int16_t> values;                            // columns fastest, then rows, then slices
+
+  [[nodiscard]] std::size_t count() const {
+    return static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]) * static_cast<std::size_t>(dims[2]);
+  }
+  [[nodiscard]] std::size_t index(int column, int row, int slice) const {
+    return (static_cast<std::size_t>(slice) * static_cast<std::size_t>(dims[1]) + static_cast<std::size_t>(row)) *
+               static_cast<std::size_t>(dims[0]) + static_cast<std::size_t>(column);
+  }
+  [[nodiscard]] std::int16_t at(int column, int row, int slice) const { return values[index(column, row, slice)]; }
+
+  // Voxel coordinates count voxels from the first one's centre.
+  [[nodiscard]] Vec3 position_mm(const Vec3& voxel) const {
+    return origin_mm + directions * spacing_mm.cwiseProduct(voxel);
+  }
+  [[nodiscard]] Vec3 voxel(const Vec3& position_mm) const {
+    return (directions.transpose() * (position_mm - origin_mm)).cwiseQuotient(spacing_mm);
+  }
+};
+
+// "256x256x108, 0.957x0.957x1.5 mm"
+[[nodiscard]] std::string describe(const HuVolume& volume);
+
+// The LPS box around voxel coordinates first .. last (both included), taken at the voxels' centres.
+[[nodiscard]] Box enclosing_box(const HuVolume& volume, const Vec3& first, const Vec3& last);
+
+// Distance from the block of space that was scanned (whole voxels, so half a voxel beyond the outer centres);
+// negative inside it, exact inside and beside its faces.
+[[nodiscard]] double outside_scan_mm(const HuVolume& volume, const Vec3& position_mm);
+
+}  // namespace osteon::imaging

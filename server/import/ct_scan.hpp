@@ -1,0 +1,14 @@
+// What a reader of CT files hands over.
+#pragma once
+#include <string>
+
+#include "common/imaging/hu_volume.hpp"
+
+namespace osteon::import {
+
+struct CtScan {
+  imaging::HuVolume volume;
+  std::string source;  // kind and geometry only: no name, date or number of a patient, nor the file's name
+};
+
+}  // namespace osteon::import

@@ -1,0 +1,15 @@
+// Writes a volume as a DICOM CT series, one file for each slice.
+#pragma once
+#include <filesystem>
+
+#include "common/imaging/hu_volume.hpp"
+#include "common/volume/iso_surface.hpp"
+
+namespace osteon::import {
+
+// Makes the folder, which must not exist, and fills it; what was written is removed when anything fails.
+// Errors: exists, internal (disk), cancelled.
+[[nodiscard]] Result<void> write_dicom_series(const imaging::HuVolume& volume, const std::filesystem::path& folder,
+                                              const KeepGoing& keep_going);
+
+}  // namespace osteon::import
