@@ -1,0 +1,258 @@
+// Pictures are looked at: what is drawn is asked of the pixels.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "synthetic.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/support/xvfb.hpp"
+#include "viewer_client/app/viewer.hpp"
+#include "viewer_client/render/window.hpp"
+
+namespace osteon {
+namespace {
+
+using test::sphere_mesh;
+
+constexpr int kWidth = 320, kHeight = 240;
+constexpr RegionKey kHere{BodyId{0}, 0, {0, 0, 0}}, kThere{BodyId{0}, 0, {1, 0, 0}};
+
+// From the front at this distance, z upwards.
+CameraView from_front(double distance_mm) {
+  CameraView view;
+  view.target_mm = Vec3::Zero();
+  view.eye_mm = Vec3(0, -distance_mm, 0);
+  view.up = Vec3::UnitZ();
+  return view;
+}
+
+// Pixels for one radian at the picture's centre.
+double focal_px(const CameraView& view) { return 0.5 * kHeight / std::tan(0.5 * view.view_angle_rad); }
+
+int differing_pixels(const Image& a, const Image& b) {
+  int count = 0;
+  for (std::size_t i = 0; i < a.rgb.size(); ++i) count += a.rgb[i] != b.rgb[i] ? 1 : 0;
+  return count;
+}
+
+class Picture : public testing::Test {
+ protected:
+  void SetUp() override {
+    screen_ = test::Xvfb::start();
+    ASSERT_TRUE(screen_) << "Xvfb, of Debian's package xvfb, did not start";
+    ::setenv("DISPLAY", screen_->display().c_str(), 1);
+    auto window = BoneWindow::open({kWidth, kHeight, "picture test"});
+    ASSERT_TRUE(window) << window.error().message;
+    window_ = std::move(*window);
+    window_->look(from_front(100.0));
+  }
+  void TearDown() override {
+    window_.reset();
+    screen_.reset();
+  }
+
+  Image drawn() {
+    window_->draw();
+    return window_->image();
+  }
+  // Mean colour of a square of 9 pixels round a place.
+  static Vec3 colour(const Image& image, int x, int y) {
+    Vec3 sum = Vec3::Zero();
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const auto& [r, g, b] = image.at(x + dx, y + dy);
+        sum += Vec3(r, g, b);
+      }
+    }
+    return sum / 9.0;
+  }
+
+  std::optional<test::Xvfb> screen_;
+  std::unique_ptr<BoneWindow> window_;
+};
+
+TEST_F(Picture, ASphereCoversItsOutline) {
+  const Image empty = drawn();
+  window_->show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 0));
+  const Image image = drawn();
+  ASSERT_EQ(image.width_px, kWidth);
+  ASSERT_EQ(image.height_px, kHeight);
+
+  // Seen from distance d a sphere's outline is a circle of angle asin(r / d).
+  const double radius_px = focal_px(from_front(100.0)) * std::tan(std::asin(15.0 / 100.0));
+  const double expected = std::numbers::pi * radius_px * radius_px;
+  EXPECT_NEAR(differing_pixels(image, empty), expected, 0.03 * expected);
+  for (const auto& [x, y] : {std::pair{2, 2}, {kWidth - 3, 2}, {2, kHeight - 3}, {kWidth - 3, kHeight - 3}}) {
+    EXPECT_EQ(image.at(x, y), empty.at(x, y));
+  }
+  // Bone is bright against the background, and warm: red over blue.
+  const Vec3 middle = colour(image, kWidth / 2, kHeight / 2);
+  EXPECT_GT(middle.sum(), colour(empty, kWidth / 2, kHeight / 2).sum() + 200.0);
+  EXPECT_GT(middle.x(), middle.z() + 10.0);
+}
+
+TEST_F(Picture, WhatIsRemovedLeavesBackground) {
+  const Image empty = drawn();
+  window_->show_region(kHere, sphere_mesh(Vec3(-15, 0, 0), 8.0, 0));
+  const Image one = drawn();
+  window_->show_region(kThere, sphere_mesh(Vec3(15, 0, 0), 8.0, 0));
+  EXPECT_GT(differing_pixels(drawn(), one), 500);
+  window_->show_region(kThere, {});
+  EXPECT_EQ(differing_pixels(drawn(), one), 0);
+  window_->show_region(kHere, {});
+  EXPECT_EQ(differing_pixels(drawn(), empty), 0);
+}
+
+TEST_F(Picture, CutFacesAreRedder) {
+  window_->show_region(kHere, sphere_mesh(Vec3(-15, 0, 0), 10.0, 0));
+  window_->show_region(kThere, sphere_mesh(Vec3(15, 0, 0), 10.0, 1));
+  const Image image = drawn();
+  const int offset = static_cast<int>(focal_px(from_front(100.0)) * 15.0 / 100.0);
+  const Vec3 imported = colour(image, kWidth / 2 - offset, kHeight / 2);
+  const Vec3 cut = colour(image, kWidth / 2 + offset, kHeight / 2);
+  EXPECT_GT(cut.x() / cut.y(), 1.25 * imported.x() / imported.y());
+}
+
+TEST_F(Picture, DoesNotDependOnTheOrderOfArrival) {
+  // Two spheres of different colour in one place: the depth test cannot decide between them.
+  window_->show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 0));
+  window_->show_region(kThere, sphere_mesh(Vec3::Zero(), 15.0, 1));
+  const Image forwards = drawn();
+  window_->show_region(kHere, {});
+  window_->show_region(kThere, {});
+  window_->show_region(kThere, sphere_mesh(Vec3::Zero(), 15.0, 1));
+  window_->show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 0));
+  EXPECT_EQ(differing_pixels(drawn(), forwards), 0);
+}
+
+TEST_F(Picture, TheToolStandsAtTheProxyAndTheGhostAtTheHand) {
+  const Image empty = drawn();
+  CuttingState state;
+  state.author = AuthorId{7};
+  state.tool_name = "burr-round-5";
+  state.pose_bone_tool = pose_along(Vec3::Zero(), -Vec3::UnitZ());  // tip down: the shank rises from the centre
+  state.pose_bone_device = state.pose_bone_tool;
+  window_->show_tools(std::span(&state, 1));
+  const Image tool = drawn();
+  // Between tip and shank the ball's middle, a radius above the tip.
+  const int up_px = static_cast<int>(focal_px(from_front(100.0)) * 2.5 / 100.0);
+  EXPECT_NE(tool.at(kWidth / 2, kHeight / 2 - up_px), empty.at(kWidth / 2, kHeight / 2 - up_px));
+  EXPECT_EQ(tool.at(kWidth / 2, kHeight / 2 + 2 * up_px), empty.at(kWidth / 2, kHeight / 2 + 2 * up_px));
+
+  // The hand 10 mm to the right: something translucent there, the tool unchanged.
+  state.pose_bone_device.position_mm += Vec3(10, 0, 0);
+  window_->show_tools(std::span(&state, 1));
+  const Image ghost = drawn();
+  const int right_px = static_cast<int>(focal_px(from_front(100.0)) * 10.0 / 100.0);
+  EXPECT_EQ(ghost.at(kWidth / 2, kHeight / 2 - up_px), tool.at(kWidth / 2, kHeight / 2 - up_px));
+  const Vec3 there = colour(ghost, kWidth / 2 + right_px, kHeight / 2 - up_px);
+  const Vec3 before = colour(empty, kWidth / 2 + right_px, kHeight / 2 - up_px);
+  EXPECT_GT((there - before).norm(), 10.0);
+  EXPECT_LT((there - before).norm(), (colour(tool, kWidth / 2, kHeight / 2 - up_px) - before).norm());
+
+  window_->show_tools({});
+  EXPECT_EQ(differing_pixels(drawn(), empty), 0);
+}
+
+TEST_F(Picture, TheCameraIsWhereItWasPut) {
+  const CameraView view = from_front(321.0);
+  window_->look(view);
+  const CameraView back = window_->camera();
+  EXPECT_NEAR((back.eye_mm - view.eye_mm).norm(), 0.0, 1e-9);
+  EXPECT_NEAR((back.target_mm - view.target_mm).norm(), 0.0, 1e-9);
+  EXPECT_NEAR(back.view_angle_rad, view.view_angle_rad, 1e-9);
+}
+
+TEST_F(Picture, IsSavedAsPng) {
+  window_->show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 0));
+  const test::TempDir folder;
+  const auto file = folder / "picture.png";
+  ASSERT_TRUE(window_->save_png(file));
+  std::ifstream in(file, std::ios::binary);
+  std::array<unsigned char, 24> head{};
+  in.read(reinterpret_cast<char*>(head.data()), head.size());
+  EXPECT_EQ(std::string(head.begin() + 1, head.begin() + 4), "PNG");
+  // IHDR: width and height as big-endian 32-bit numbers.
+  EXPECT_EQ(head[18] * 256 + head[19], kWidth);
+  EXPECT_EQ(head[22] * 256 + head[23], kHeight);
+  EXPECT_FALSE(window_->save_png("/nowhere/at/all.png"));
+}
+
+// The render loop between a network thread's inbox and the window.
+TEST_F(Picture, TheLoopShowsWhatTheInboxBrings) {
+  const test::TempDir folder;
+  ViewerOptions options;
+  options.bounds = {Vec3(-20, -20, -20), Vec3(20, 20, 20)};
+  options.frame_log = folder / "frames.csv";
+  Inbox inbox;
+  auto viewer = Viewer::make(options, *window_, inbox,
+                             ScriptReader::of("wait surface\nwait seq 5\nstatus " + (folder / "status.json").string()));
+  ASSERT_TRUE(viewer);
+
+  const BlockKey key{BodyId{0}, 0, {0, 0, 0}};
+  const auto deliver = [&](std::uint64_t seq, double radius_mm, bool complete) {
+    std::vector<ReceivedBlock> blocks;
+    blocks.push_back(test::block(key, seq + 1, std::to_string(seq), sphere_mesh(Vec3::Zero(), radius_mm, 0)));
+    const auto now = std::chrono::steady_clock::now().time_since_epoch();
+    inbox.put_mesh(RoomSeq{seq}, std::move(blocks), complete, 1, std::chrono::nanoseconds(now).count());
+  };
+  const auto turns = [&](int count) {
+    for (int i = 0; i < count; ++i) {
+      const auto state = viewer->turn(false);
+      if (!state || *state == Viewer::State::finished) return true;
+    }
+    return false;
+  };
+  // Until the whole surface is there, nothing of it is drawn.
+  inbox.begin_stream();
+  deliver(3, 15.0, false);
+  EXPECT_FALSE(turns(8));
+  const Image before = window_->image();
+  deliver(4, 15.0, true);
+  EXPECT_FALSE(turns(8));
+  EXPECT_GT(differing_pixels(window_->image(), before), 1000);
+  deliver(5, 18.0, true);
+  EXPECT_TRUE(turns(100));
+
+  const auto status = nlohmann::json::parse(std::ifstream(folder / "status.json"));
+  EXPECT_EQ(status["room_seq"], 5);
+  EXPECT_EQ(status["blocks"], 1);
+  EXPECT_EQ(status["triangles"], sphere_mesh(Vec3::Zero(), 18.0, 0).triangles.size());
+  EXPECT_EQ(status["updates"], 2);
+
+  std::ifstream log(folder / "frames.csv");
+  std::string line;
+  std::getline(log, line);
+  EXPECT_EQ(line, "room_seq,received_mono_ns,rendered_mono_ns");
+  std::vector<std::uint64_t> seqs;
+  while (std::getline(log, line)) {
+    long long seq = 0, received = 0, rendered = 0;
+    ASSERT_EQ(std::sscanf(line.c_str(), "%lld,%lld,%lld", &seq, &received, &rendered), 3);
+    EXPECT_LT(received, rendered);
+    seqs.push_back(static_cast<std::uint64_t>(seq));
+  }
+  EXPECT_EQ(seqs, (std::vector<std::uint64_t>{3, 4, 5}));
+}
+
+TEST(NoScreen, IsSaidInOneSentence) {
+  ::unsetenv("DISPLAY");
+  const auto without = BoneWindow::open({kWidth, kHeight, ""});
+  ASSERT_FALSE(without);
+  EXPECT_NE(without.error().message.find("DISPLAY"), std::string::npos);
+  EXPECT_NE(without.error().message.find("xvfb-run"), std::string::npos);
+
+  ::setenv("DISPLAY", "nowhere.invalid:99", 1);
+  const auto unreachable = BoneWindow::open({kWidth, kHeight, ""});
+  ASSERT_FALSE(unreachable);
+  EXPECT_NE(unreachable.error().message.find("nowhere.invalid:99"), std::string::npos);
+  ::unsetenv("DISPLAY");
+}
+
+}  // namespace
+}  // namespace osteon

@@ -1,0 +1,253 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "synthetic.hpp"
+#include "viewer_client/scene/camera_view.hpp"
+#include "viewer_client/scene/gauges.hpp"
+#include "viewer_client/scene/inbox.hpp"
+#include "viewer_client/scene/surface_scene.hpp"
+#include "viewer_client/scene/tool_mesh.hpp"
+
+namespace osteon {
+namespace {
+
+using test::block;
+using test::sphere_mesh;
+
+constexpr BlockKey key(int x, int y = 0, int z = 0, int level = 0) { return {BodyId{0}, level, Coord{x, y, z}}; }
+Mesh small_sphere(double x_mm) { return sphere_mesh({x_mm, 0, 0}, 1.0, 0, 6); }
+const std::size_t kSmallTriangles = small_sphere(0).triangles.size();
+
+TEST(SurfaceScene, NewestVersionWinsInWhateverOrderItComes) {
+  SurfaceScene forwards, backwards;
+  for (const std::uint64_t version : {1, 2, 3}) {
+    forwards.replace(block(key(0), version, std::to_string(version), small_sphere(double(version))));
+  }
+  for (const std::uint64_t version : {3, 1, 2}) {
+    backwards.replace(block(key(0), version, std::to_string(version), small_sphere(double(version))));
+  }
+  EXPECT_EQ(forwards.hash(), backwards.hash());
+  const RegionKey region = region_of(key(0));
+  EXPECT_EQ(forwards.region_mesh(region).positions_mm, backwards.region_mesh(region).positions_mm);
+  EXPECT_EQ(forwards.region_mesh(region).positions_mm, small_sphere(3).positions_mm);
+}
+
+TEST(SurfaceScene, HashNamesContentNotOrderVersionOrEmptyBlocks) {
+  SurfaceScene a, b;
+  a.replace(block(key(0), 1, "left", small_sphere(0)));
+  a.replace(block(key(9), 1, "right", small_sphere(9)));
+  b.replace(block(key(9), 7, "right", small_sphere(9)));
+  b.replace(block(key(4), 2, "nothing", {}));
+  b.replace(block(key(0), 5, "left", small_sphere(0)));
+  EXPECT_EQ(a.hash(), b.hash());
+  // The same two meshes in each other's place are another surface.
+  SurfaceScene swapped;
+  swapped.replace(block(key(0), 1, "right", small_sphere(9)));
+  swapped.replace(block(key(9), 1, "left", small_sphere(0)));
+  EXPECT_NE(a.hash(), swapped.hash());
+}
+
+TEST(SurfaceScene, AChangeTouchesOnlyItsRegion) {
+  SurfaceScene scene;
+  for (int x = -8; x < 8; ++x) scene.replace(block(key(x), 1, std::to_string(x), small_sphere(x)));
+  EXPECT_EQ(scene.take_dirty().size(), 4u);  // 16 blocks in a row, 4 to a region
+  EXPECT_TRUE(scene.take_dirty().empty());
+
+  scene.replace(block(key(-1), 2, "cut", small_sphere(-1)));
+  EXPECT_EQ(scene.take_dirty(), std::vector{region_of(key(-1))});
+  EXPECT_NE(region_of(key(-1)), region_of(key(0)));
+  // A fine block has a region of its own although it lies in the same place.
+  scene.replace(block(key(-1, 0, 0, 2), 1, "fine", small_sphere(-1)));
+  EXPECT_EQ(scene.take_dirty(), std::vector{region_of(key(-1, 0, 0, 2))});
+}
+
+TEST(SurfaceScene, SameBytesAgainRebuildNothing) {
+  SurfaceScene scene;
+  scene.replace(block(key(0), 1, "same", small_sphere(0)));
+  (void)scene.take_dirty();
+  EXPECT_FALSE(scene.replace(block(key(0), 2, "same", small_sphere(0))));
+  EXPECT_TRUE(scene.take_dirty().empty());
+}
+
+TEST(SurfaceScene, CountsFollowReplacementAndRemoval) {
+  SurfaceScene scene;
+  scene.replace(block(key(0), 1, "a", small_sphere(0)));
+  scene.replace(block(key(1), 1, "b", small_sphere(1)));
+  EXPECT_EQ(scene.blocks(), 2u);
+  EXPECT_EQ(scene.triangles(), 2 * kSmallTriangles);
+  scene.replace(block(key(0), 2, "gone", {}));
+  EXPECT_EQ(scene.blocks(), 1u);
+  EXPECT_EQ(scene.triangles(), kSmallTriangles);
+  scene.replace(block(key(1), 2, "gone too", {}));
+  EXPECT_EQ(scene.regions(), 0u);
+  EXPECT_EQ(scene.triangles(), 0u);
+  EXPECT_TRUE(scene.region_mesh(region_of(key(0))).triangles.empty());
+}
+
+TEST(SurfaceScene, RegionMeshKeepsEveryTriangleOfItsBlocks) {
+  SurfaceScene scene;
+  scene.replace(block(key(2), 1, "b", small_sphere(20)));
+  scene.replace(block(key(1), 1, "a", sphere_mesh({10, 0, 0}, 1.0, 1, 6)));
+  const Mesh mesh = scene.region_mesh(region_of(key(1)));
+  ASSERT_EQ(mesh.triangles.size(), 2 * kSmallTriangles);
+  ASSERT_EQ(mesh.cut_face.size(), mesh.positions_mm.size());
+  ASSERT_EQ(mesh.normals.size(), mesh.positions_mm.size());
+  // No triangle reaches from one sphere to the other, and the marks went with their sphere.
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const bool first = mesh.positions_mm[a][0] < 15.0f;
+    EXPECT_EQ(first, mesh.positions_mm[b][0] < 15.0f);
+    EXPECT_EQ(first, mesh.positions_mm[c][0] < 15.0f);
+    EXPECT_EQ(mesh.cut_face[a], first ? 1 : 0);
+  }
+}
+
+TEST(SurfaceScene, ASnapshotAfterAnInterruptionReplacesEverything) {
+  SurfaceScene scene, late;
+  scene.begin_snapshot();
+  scene.replace(block(key(0), 40, "old", small_sphere(0)));
+  scene.replace(block(key(9), 41, "vanishes", small_sphere(9)));
+  scene.end_snapshot();
+
+  // A server started anew counts versions from one and knows nothing of block 9.
+  for (SurfaceScene* each : {&scene, &late}) {
+    each->begin_snapshot();
+    each->replace(block(key(0), 1, "new", small_sphere(5)));
+    each->end_snapshot();
+  }
+  EXPECT_EQ(scene.hash(), late.hash());
+  EXPECT_EQ(scene.blocks(), 1u);
+  const auto dirty = scene.take_dirty();
+  EXPECT_TRUE(std::ranges::count(dirty, region_of(key(9))));
+  // And from here on versions count again.
+  EXPECT_FALSE(scene.replace(block(key(0), 1, "late copy", small_sphere(7))));
+}
+
+TEST(Inbox, HoldsOnlyTheNewestOfEachBlock) {
+  Inbox inbox;
+  inbox.begin_stream();
+  for (std::uint64_t version = 1; version <= 500; ++version) {
+    std::vector<ReceivedBlock> blocks;
+    blocks.push_back(block(key(0), version, std::to_string(version), small_sphere(0)));
+    inbox.put_mesh(RoomSeq{version}, std::move(blocks), version > 10, 1, static_cast<std::int64_t>(version));
+  }
+  Delivery delivery = inbox.take();
+  EXPECT_TRUE(delivery.snapshot_begun);
+  EXPECT_TRUE(delivery.snapshot_complete);
+  ASSERT_EQ(delivery.blocks.size(), 1u);
+  EXPECT_EQ(delivery.blocks.begin()->second.version, 500u);
+  EXPECT_EQ(delivery.room_seq, RoomSeq{500});
+  EXPECT_EQ(delivery.arrivals.size(), 500u);
+  EXPECT_FALSE(inbox.take().any_mesh);
+}
+
+TEST(Inbox, ArrivalsOfAStalledViewerAreBounded) {
+  Inbox inbox;
+  for (std::uint64_t i = 1; i <= 5000; ++i) inbox.put_mesh(RoomSeq{i}, {}, true, 0, 0);
+  const Delivery delivery = inbox.take();
+  EXPECT_LT(delivery.arrivals.size(), 2000u);
+  EXPECT_EQ(delivery.arrivals.back().room_seq, RoomSeq{5000});
+}
+
+TEST(CameraView, OverviewHoldsTheWholeBone) {
+  const Box bone{Vec3(-70, -90, 10), Vec3(80, 100, 190)};
+  const CameraView view = overview(bone);
+  const Vec3 sight = (view.target_mm - view.eye_mm).normalized();
+  // The inscribed ellipsoid's extremes, the bone's likely reach, lie within the view's cone.
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double side : {-1.0, 1.0}) {
+      Vec3 p = 0.5 * (bone.min_mm + bone.max_mm);
+      p[axis] += side * 0.5 * (bone.max_mm - bone.min_mm)[axis];
+      const double angle = std::acos(sight.dot((p - view.eye_mm).normalized()));
+      EXPECT_LT(angle, 0.5 * view.view_angle_rad);
+    }
+  }
+  EXPECT_GT(view.up.dot(Vec3::UnitZ()), 0.9);
+}
+
+TEST(CameraView, BesideToolSeesTheTipFromBehindTheTool) {
+  for (const Vec3& axis : {Vec3(0, 0, 1), Vec3(0, 1, 0), Vec3(0, -1, 0), Vec3(-1, 0.2, -0.4), Vec3(0.5, 0.5, 0.7)}) {
+    const Pose pose = pose_along({10, 20, 30}, axis);
+    const CameraView view = beside_tool(pose, 80.0);
+    EXPECT_NEAR((view.eye_mm - pose.position_mm).norm(), 80.0, 1e-9);
+    EXPECT_NEAR((view.target_mm - pose.position_mm).norm(), 0.0, 1e-12);
+    const double angle = std::acos((view.eye_mm - pose.position_mm).normalized().dot(-axis.normalized()));
+    EXPECT_GT(angle, 0.3);  // the shank does not hide the tip
+    EXPECT_LT(angle, 1.0);  // the bone does not either
+    EXPECT_GT(view.up.cross((view.target_mm - view.eye_mm).normalized()).norm(), 0.9);
+  }
+}
+
+class ToolMeshes : public testing::TestWithParam<Tool> {};
+
+TEST_P(ToolMeshes, LiesOnTheToolAndReachesItsDiameter) {
+  const Tool& tool = GetParam();
+  const ToolMesh mesh = tool_mesh(tool);
+  ASSERT_EQ(mesh.normals.size(), mesh.positions_mm.size());
+  double widest = 0.0, lowest = 0.0;
+  for (std::size_t i = 0; i < mesh.positions_mm.size(); ++i) {
+    const Vec3 p(mesh.positions_mm[i][0], mesh.positions_mm[i][1], mesh.positions_mm[i][2]);
+    if (mesh.cutting[i] != 0) {
+      EXPECT_LT(signed_distance_mm(tool, p), 2e-3);
+      widest = std::max(widest, std::hypot(p.x(), p.y()));
+    } else {
+      // A burr's neck is drawn on into the ball, which the definition leaves open there.
+      EXPECT_LT(signed_distance_mm(tool, p), 0.1 * tool.diameter_mm);
+    }
+    lowest = std::min(lowest, p.z());
+    EXPECT_LE(p.z(), 1e-6);
+  }
+  EXPECT_NEAR(2.0 * widest, tool.diameter_mm, 0.01 * tool.diameter_mm);
+  EXPECT_NEAR(-lowest, tool.reach_mm(), 1e-3);
+}
+
+// Gauss: the flux of the position through a closed surface is three times its volume, which is positive only if all
+// triangles turn outwards; flutes take away less than half of the solid.
+TEST_P(ToolMeshes, IsClosedAndTurnsOutwards) {
+  const Tool& tool = GetParam();
+  const ToolMesh mesh = tool_mesh(tool);
+  double volume_mm3 = 0.0;
+  Vec3 area_mm2 = Vec3::Zero();
+  std::size_t against = 0;
+  const auto point = [&](std::uint32_t i) {
+    return Vec3(mesh.positions_mm[i][0], mesh.positions_mm[i][1], mesh.positions_mm[i][2]);
+  };
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vec3 normal = 0.5 * (point(b) - point(a)).cross(point(c) - point(a));
+    volume_mm3 += point(a).dot(normal) / 3.0;
+    area_mm2 += normal;
+    const Vec3 shading(mesh.normals[a][0], mesh.normals[a][1], mesh.normals[a][2]);
+    if (normal.norm() > 1e-5 && shading.dot(normal) < 0.0) ++against;
+  }
+  const double radius = 0.5 * tool.diameter_mm, shank = 0.5 * tool.shank_diameter_mm;
+  const double shank_mm3 = std::numbers::pi * shank * shank * tool.shank_length_mm;
+  const double head_mm3 = tool.kind == ToolKind::drill
+                              ? std::numbers::pi * radius * radius * (tool.cutting_length_mm - 2.0 / 3.0 * radius / std::tan(0.5 * tool.point_angle_rad))
+                              : 4.0 / 3.0 * std::numbers::pi * radius * radius * radius;
+  EXPECT_GT(volume_mm3, shank_mm3 + 0.5 * head_mm3);
+  EXPECT_LT(volume_mm3, 1.02 * (shank_mm3 + head_mm3));
+  EXPECT_LT(area_mm2.norm(), 0.01);  // a closed surface has no net area
+  EXPECT_LT(against, mesh.triangles.size() / 100);
+}
+
+INSTANTIATE_TEST_SUITE_P(Builtin, ToolMeshes, testing::ValuesIn(builtin_tools().begin(), builtin_tools().end()),
+                         [](const auto& param) {
+                           std::string name = param.param.name;
+                           std::ranges::replace_if(name, [](char c) { return !std::isalnum(c); }, '_');
+                           return name;
+                         });
+
+TEST(Gauges, NameToolForceAndDepth) {
+  CuttingState state;
+  state.tool_name = "drill-3.2";
+  state.spindle_rpm = 999.7;
+  state.force_physical_N = Vec3(3, 4, 12);
+  state.depth_mm = -0.01;
+  state.density_g_cm3 = 1.9;
+  state.phase = CuttingPhase::cutting;
+  state.engaged_fraction = 0.5;
+  EXPECT_EQ(gauge_text(state), "drill-3.2, cutting\n1000 rpm\nforce 13.0 N\ndepth 0.0 mm\ndensity 1.90 g/cm\xC2\xB3");
+}
+
+}  // namespace
+}  // namespace osteon

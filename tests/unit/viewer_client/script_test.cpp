@@ -1,0 +1,84 @@
+#include "viewer_client/app/script.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+namespace osteon {
+namespace {
+
+template <class T>
+T parsed(std::string_view line) {
+  const auto command = parse_command(line);
+  EXPECT_TRUE(command && *command && std::holds_alternative<T>(**command)) << line;
+  if (!command || !*command || !std::holds_alternative<T>(**command)) return T{};
+  return std::get<T>(**command);
+}
+
+TEST(Script, ReadsEveryCommand) {
+  parsed<WaitForSurface>("wait surface");
+  EXPECT_EQ(parsed<WaitForSeq>("  wait seq 18446744073709551615").room_seq.value, 18446744073709551615u);
+  parsed<LookAtWhole>("look overview\r");
+  const CameraView view = parsed<LookFrom>("look at 1 2 3 from -4.5 1e2 6 up 0 0 2").view;
+  EXPECT_EQ(view.target_mm, Vec3(1, 2, 3));
+  EXPECT_EQ(view.eye_mm, Vec3(-4.5, 100, 6));
+  EXPECT_EQ(view.up, Vec3(0, 0, 1));
+  EXPECT_EQ(parsed<LookAtTool>("look tool 80").distance_mm, 80.0);
+  EXPECT_TRUE(parsed<ShowTool>("tool on").on);
+  EXPECT_FALSE(parsed<ShowTool>("tool off").on);
+  EXPECT_EQ(parsed<SaveScreenshot>("screenshot  a picture.png ").file, "a picture.png");
+  EXPECT_EQ(parsed<SaveStatus>("status now.json").file, "now.json");
+  parsed<Quit>("quit");
+}
+
+TEST(Script, SkipsEmptyLinesAndComments) {
+  for (const char* line : {"", "   ", "\t\r", "# look overview", "#"}) {
+    const auto command = parse_command(line);
+    ASSERT_TRUE(command) << line;
+    EXPECT_FALSE(*command) << line;
+  }
+}
+
+TEST(Script, SaysWhatItExpected) {
+  for (const char* line : {"wait", "wait seq", "wait seq -1", "wait seq 1x", "look", "look tool 0", "look tool nan",
+                           "look at 1 2 3 from 1 2 3 up 0 0 1", "look at 0 0 0 from 0 0 5 up 0 0 1",
+                           "look at 0 0 0 from 0 0 5 up 0 0 0", "tool", "tool maybe", "screenshot", "status ",
+                           "quit now", "dance"}) {
+    const auto command = parse_command(line);
+    ASSERT_FALSE(command) << line;
+    EXPECT_EQ(command.error().code, ErrorCode::invalid_input);
+    EXPECT_NE(command.error().message.find('`'), std::string::npos) << command.error().message;
+  }
+}
+
+TEST(Script, LinesComeWithoutWaitingForThem) {
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  const int standard_input = ::dup(STDIN_FILENO);
+  ::dup2(ends[0], STDIN_FILENO);
+  auto reader = ScriptReader::open("-");
+  ::dup2(standard_input, STDIN_FILENO);
+  ASSERT_TRUE(reader);
+
+  EXPECT_EQ(reader->next(), std::nullopt);
+  ASSERT_EQ(::write(ends[1], "wait sur", 8), 8);
+  EXPECT_EQ(reader->next(), std::nullopt);
+  ASSERT_EQ(::write(ends[1], "face\nquit", 9), 9);
+  EXPECT_EQ(reader->next(), "wait surface");
+  EXPECT_EQ(reader->next(), std::nullopt);
+  EXPECT_FALSE(reader->ended());
+  ::close(ends[1]);
+  EXPECT_EQ(reader->next(), "quit");  // a last line without an end
+  EXPECT_EQ(reader->next(), std::nullopt);
+  EXPECT_TRUE(reader->ended());
+  ::close(ends[0]);
+  ::close(standard_input);
+}
+
+TEST(Script, NamesAFileThatIsNotThere) {
+  const auto reader = ScriptReader::open("/nowhere/at-all.script");
+  ASSERT_FALSE(reader);
+  EXPECT_NE(reader.error().message.find("/nowhere/at-all.script"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace osteon

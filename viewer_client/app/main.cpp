@@ -1,0 +1,144 @@
+// osteon-viewer: shows a room's bone and tools in a window.
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <cstdio>
+#include <optional>
+#include <string>
+
+#include "common/runtime/files.hpp"
+#include "common/runtime/log.hpp"
+#include "common/runtime/stop_signal.hpp"
+#include "viewer_client/app/viewer.hpp"
+#include "viewer_client/net/room_watch.hpp"
+#include "viewer_client/render/window.hpp"
+
+namespace {
+
+using namespace osteon;
+
+constexpr const char* kProgram = "osteon-viewer";
+
+constexpr const char* kScriptHelp =
+    "Script commands, one a line, each answered by `ok ...` or `error ...` on standard output:\n"
+    "  wait surface                          until the whole surface is drawn\n"
+    "  wait seq N                            until the room's event N is drawn\n"
+    "  look overview                         the whole bone\n"
+    "  look at X Y Z from X Y Z up X Y Z     millimetres in the bone's frame (x left, y back, z up)\n"
+    "  look tool DIST_MM                     the tip of the tool from this distance\n"
+    "  tool on|off                           draw the tool and its gauges\n"
+    "  screenshot FILE.png\n"
+    "  status FILE.json                      blocks, triangles, hash and times so far\n"
+    "  quit                                  as does the script's end\n"
+    "Mouse: left turns, middle or shift-left shifts, right or wheel goes nearer. Keys: O overview, T tool, Q quit.";
+
+struct Arguments {
+  std::string server, size = "1280x720", script, screenshot, frame_log, summary;
+  double patience_s = 5.0;
+};
+
+Result<WindowOptions> window_options(const std::string& size) {
+  WindowOptions options;
+  const char* end = size.data() + size.size();
+  const auto width = std::from_chars(size.data(), end, options.width_px);
+  if (width.ec == std::errc{} && width.ptr != end && *width.ptr == 'x') {
+    const auto height = std::from_chars(width.ptr + 1, end, options.height_px);
+    const auto usable = [](int pixels) { return pixels >= 64 && pixels <= 8192; };
+    if (height.ec == std::errc{} && height.ptr == end && usable(options.width_px) && usable(options.height_px)) {
+      return options;
+    }
+  }
+  return failure(ErrorCode::invalid_input,
+                 "--size " + size + " is not a size: give WIDTHxHEIGHT in pixels, each 64 to 8192, as in 1280x720");
+}
+
+Result<void> run(const Arguments& arguments) {
+  StopSignal stop;
+
+  // What can be wrong with the arguments is told before anything is started.
+  auto window_size = window_options(arguments.size);
+  if (!window_size) return tl::unexpected(window_size.error());
+  std::optional<ScriptReader> script;
+  if (!arguments.script.empty()) {
+    auto opened = ScriptReader::open(arguments.script);
+    if (!opened) return tl::unexpected(opened.error());
+    script.emplace(std::move(*opened));
+  } else if (!arguments.screenshot.empty()) {
+    script.emplace(ScriptReader::of("wait surface\nlook overview\nscreenshot " + arguments.screenshot + "\nquit\n"));
+  }
+  const bool scripted = script.has_value();
+
+  auto window = BoneWindow::open(*window_size);
+  if (!window) return tl::unexpected(window.error());
+
+  Inbox inbox;
+  RoomWatchOptions watch_options;
+  watch_options.address = arguments.server;
+  watch_options.patience = std::chrono::milliseconds(static_cast<long>(1000.0 * arguments.patience_s));
+  watch_options.keep_trying = !scripted;
+  auto watch = RoomWatch::start(watch_options, inbox, [&stop] { return stop.requested(); });
+  if (!watch) {
+    if (stop.requested()) return {};
+    return tl::unexpected(watch.error());
+  }
+
+  ViewerOptions options;
+  options.case_title = (*watch)->room().case_title;
+  options.bounds = (*watch)->room().bounds;
+  options.frame_log = arguments.frame_log;
+  options.answers = !arguments.script.empty();
+  options.stop_at_error = scripted && arguments.script != "-";
+  auto viewer = Viewer::make(options, **window, inbox, std::move(script));
+  if (!viewer) return tl::unexpected(viewer.error());
+  log::info("watching", {{"server", arguments.server}, {"case", options.case_title}});
+
+  Result<void> outcome;
+  while (outcome && !stop.requested()) {
+    const auto state = viewer->turn((*watch)->interrupted());
+    if (!state) {
+      outcome = tl::unexpected(state.error());
+    } else if (*state == Viewer::State::finished) {
+      break;
+    } else if (const auto failed = (*watch)->failure_seen(); failed && !stop.requested()) {
+      outcome = tl::unexpected(*failed);
+    }
+  }
+
+  // A script that asks for more than a picture may want that one too: the last picture of the run.
+  if (outcome && !arguments.script.empty() && !arguments.screenshot.empty()) {
+    outcome = (*window)->save_png(arguments.screenshot);
+  }
+  if (!arguments.summary.empty()) {
+    const auto written = write_file(arguments.summary, viewer->summary_json());
+    if (outcome) outcome = written;
+  }
+  return outcome;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Arguments arguments;
+  CLI::App app{"Shows the bone of an Osteon server and the tools that work on it.", kProgram};
+  app.footer(kScriptHelp);
+  app.add_option("--server", arguments.server, "Address of the server, HOST:PORT")->required();
+  app.add_option("--size", arguments.size, "Size of the window in pixels")->capture_default_str();
+  app.add_option("--script", arguments.script, "File of commands, - for standard input; its end closes the viewer");
+  app.add_option("--screenshot", arguments.screenshot,
+                 "Without a script: wait for the surface, save the whole bone as PNG, exit. With one: save the last "
+                 "picture");
+  app.add_option("--frame-log", arguments.frame_log, "CSV: when each event's surface came in and was drawn");
+  app.add_option("--summary", arguments.summary, "JSON written at the end: blocks, triangles, hash, times");
+  app.add_option("--patience", arguments.patience_s, "Seconds to wait for the server")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 3600.0));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    return log::exit_with(kProgram, {ErrorCode::invalid_input, std::string(error.what()) + "; see --help"});
+  }
+  log::open(kProgram);
+  if (const auto outcome = run(arguments); !outcome) return log::exit_with(kProgram, outcome.error());
+  return 0;
+}

@@ -1,0 +1,171 @@
+#include "viewer_client/app/script.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <utility>
+#include <vector>
+
+namespace osteon {
+
+namespace {
+
+std::vector<std::string_view> words_of(std::string_view line) {
+  std::vector<std::string_view> words;
+  constexpr std::string_view kBlank = " \t\r";
+  for (std::size_t at = line.find_first_not_of(kBlank); at != std::string_view::npos;) {
+    const std::size_t end = std::min(line.find_first_of(kBlank, at), line.size());
+    words.push_back(line.substr(at, end - at));
+    at = line.find_first_not_of(kBlank, end);
+  }
+  return words;
+}
+
+// The rest of the line after its first word: file names may contain spaces.
+std::string rest_of(std::string_view line, std::string_view first_word) {
+  constexpr std::string_view kBlank = " \t\r";
+  line.remove_prefix(static_cast<std::size_t>(first_word.data() + first_word.size() - line.data()));
+  const std::size_t from = line.find_first_not_of(kBlank);
+  if (from == std::string_view::npos) return {};
+  return std::string(line.substr(from, line.find_last_not_of(kBlank) - from + 1));
+}
+
+template <class T>
+std::optional<T> number(std::string_view word) {
+  T value{};
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (error != std::errc{} || end != word.data() + word.size()) return std::nullopt;
+  if constexpr (std::is_floating_point_v<T>) {
+    if (!std::isfinite(value)) return std::nullopt;
+  }
+  return value;
+}
+
+std::optional<Vec3> vector_at(const std::vector<std::string_view>& words, std::size_t first) {
+  Vec3 v;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto component = number<double>(words[first + i]);
+    if (!component) return std::nullopt;
+    v[static_cast<Eigen::Index>(i)] = *component;
+  }
+  return v;
+}
+
+using Parsed = Result<std::optional<Command>>;
+
+Parsed expected(std::string_view form) {
+  return failure(ErrorCode::invalid_input, "expected `" + std::string(form) + "`");
+}
+
+Parsed parse_wait(const std::vector<std::string_view>& words) {
+  if (words.size() == 2 && words[1] == "surface") return Command(WaitForSurface{});
+  if (words.size() == 3 && words[1] == "seq") {
+    if (const auto seq = number<std::uint64_t>(words[2])) return Command(WaitForSeq{RoomSeq{*seq}});
+  }
+  return expected("wait surface` or `wait seq NUMBER");
+}
+
+Parsed parse_look(const std::vector<std::string_view>& words) {
+  if (words.size() == 2 && words[1] == "overview") return Command(LookAtWhole{});
+  if (words.size() == 3 && words[1] == "tool") {
+    const auto distance = number<double>(words[2]);
+    if (distance && *distance > 0.0) return Command(LookAtTool{*distance});
+  }
+  if (words.size() == 13 && words[1] == "at" && words[5] == "from" && words[9] == "up") {
+    const auto target = vector_at(words, 2), eye = vector_at(words, 6), up = vector_at(words, 10);
+    if (target && eye && up) {
+      const Vec3 sight = *target - *eye;
+      if (sight.norm() > 1e-6 && sight.cross(*up).norm() > 1e-6 * sight.norm() * up->norm() && up->norm() > 0.0) {
+        CameraView view;
+        view.target_mm = *target;
+        view.eye_mm = *eye;
+        view.up = up->normalized();
+        return Command(LookFrom{view});
+      }
+      return failure(ErrorCode::invalid_input, "`look` needs an eye away from its target and an `up` across the line "
+                                               "of sight");
+    }
+  }
+  return expected("look overview`, `look tool DISTANCE_MM` or `look at X Y Z from X Y Z up X Y Z");
+}
+
+}  // namespace
+
+Parsed parse_command(std::string_view line) {
+  const auto words = words_of(line);
+  if (words.empty() || words[0].starts_with('#')) return std::optional<Command>{};
+  const std::string_view verb = words[0];
+  if (verb == "wait") return parse_wait(words);
+  if (verb == "look") return parse_look(words);
+  if (verb == "tool") {
+    if (words.size() == 2 && (words[1] == "on" || words[1] == "off")) return Command(ShowTool{words[1] == "on"});
+    return expected("tool on` or `tool off");
+  }
+  if (verb == "screenshot" || verb == "status") {
+    const std::string file = rest_of(line, verb);
+    if (file.empty()) return expected(verb == "status" ? "status FILE.json" : "screenshot FILE.png");
+    if (verb == "status") return Command(SaveStatus{file});
+    return Command(SaveScreenshot{file});
+  }
+  if (verb == "quit" && words.size() == 1) return Command(Quit{});
+  return failure(ErrorCode::invalid_input, "there is no command `" + std::string(verb) +
+                                               "`; the commands are wait, look, tool, screenshot, status and quit");
+}
+
+Result<ScriptReader> ScriptReader::open(const std::string& file) {
+  ScriptReader reader;
+  if (file == "-") {
+    reader.descriptor_ = ::dup(STDIN_FILENO);
+  } else {
+    reader.descriptor_ = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  }
+  if (reader.descriptor_ < 0) {
+    return failure(ErrorCode::not_found, "the script " + file + " cannot be read: " + std::strerror(errno));
+  }
+  return reader;
+}
+
+ScriptReader ScriptReader::of(std::string text) {
+  ScriptReader reader;
+  reader.text_ = std::move(text);
+  return reader;
+}
+
+ScriptReader::ScriptReader(ScriptReader&& other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)), text_(std::move(other.text_)) {}
+
+ScriptReader::~ScriptReader() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+std::optional<std::string> ScriptReader::next() {
+  // Reads what is there, up to a page at a time, until a line is whole.
+  while (text_.find('\n') == std::string::npos && descriptor_ >= 0) {
+    pollfd input{descriptor_, POLLIN, 0};
+    if (::poll(&input, 1, 0) <= 0) return std::nullopt;
+    std::array<char, 4096> page;
+    const ssize_t got = ::read(descriptor_, page.data(), page.size());
+    if (got < 0 && errno == EINTR) continue;
+    if (got > 0) {
+      text_.append(page.data(), static_cast<std::size_t>(got));
+    } else {
+      ::close(descriptor_);
+      descriptor_ = -1;
+    }
+  }
+  if (text_.empty()) return std::nullopt;
+  const std::size_t end = std::min(text_.find('\n'), text_.size());
+  std::string line = text_.substr(0, end);
+  text_.erase(0, end + 1);
+  return line;
+}
+
+bool ScriptReader::ended() const { return descriptor_ < 0 && text_.empty(); }
+
+}  // namespace osteon

@@ -1,0 +1,53 @@
+// The viewer's script: one command a line, so that a person, a test or the demo can direct the camera.
+#pragma once
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "common/core/id.hpp"
+#include "common/core/result.hpp"
+#include "viewer_client/scene/camera_view.hpp"
+
+namespace osteon {
+
+struct WaitForSurface {};
+struct WaitForSeq { RoomSeq room_seq; };
+struct LookAtWhole {};
+struct LookFrom { CameraView view; };
+struct LookAtTool { double distance_mm = 0; };
+struct ShowTool { bool on = true; };
+struct SaveScreenshot { std::filesystem::path file; };
+struct SaveStatus { std::filesystem::path file; };
+struct Quit {};
+
+using Command = std::variant<WaitForSurface, WaitForSeq, LookAtWhole, LookFrom, LookAtTool, ShowTool, SaveScreenshot,
+                             SaveStatus, Quit>;
+
+// Null for an empty line and for one that begins with #. Error invalid_input, naming the form expected.
+[[nodiscard]] Result<std::optional<Command>> parse_command(std::string_view line);
+
+// Lines of a file or of standard input as they come, without waiting for them.
+class ScriptReader {
+ public:
+  // "-" is standard input. Error not_found, naming the file.
+  [[nodiscard]] static Result<ScriptReader> open(const std::string& file);
+  // A script in the program itself.
+  [[nodiscard]] static ScriptReader of(std::string text);
+  ScriptReader(ScriptReader&& other) noexcept;
+  ScriptReader& operator=(ScriptReader&&) = delete;
+  ~ScriptReader();
+
+  // The next whole line, if one has come.
+  [[nodiscard]] std::optional<std::string> next();
+  // The end was reached and every line taken.
+  [[nodiscard]] bool ended() const;
+
+ private:
+  ScriptReader() = default;
+  int descriptor_ = -1;  // -1: none is open, or its end was reached
+  std::string text_;     // come, not taken
+};
+
+}  // namespace osteon

@@ -1,0 +1,253 @@
+#include "viewer_client/app/viewer.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "common/runtime/files.hpp"
+#include "viewer_client/scene/camera_view.hpp"
+#include "viewer_client/scene/gauges.hpp"
+
+namespace osteon {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds kFramePeriod{33};
+// How long a turn waits for the network; mouse and script are asked as often.
+constexpr std::chrono::milliseconds kTurn{10};
+constexpr double kToolKeyDistance_mm = 120.0;
+
+std::int64_t mono_ns(Clock::time_point at) { return std::chrono::nanoseconds(at.time_since_epoch()).count(); }
+
+template <class... F>
+struct Overloaded : F... {
+  using F::operator()...;
+};
+
+}  // namespace
+
+Result<Viewer> Viewer::make(const ViewerOptions& options, BoneWindow& window, Inbox& inbox,
+                            std::optional<ScriptReader> script) {
+  Viewer viewer(options, window, inbox, std::move(script));
+  if (!options.frame_log.empty()) {
+    viewer.frame_log_.open(options.frame_log);
+    viewer.frame_log_ << "room_seq,received_mono_ns,rendered_mono_ns\n" << std::flush;
+    if (!viewer.frame_log_) {
+      return failure(ErrorCode::internal, "the frame log " + options.frame_log.string() + " cannot be written: " +
+                                              std::strerror(errno));
+    }
+  }
+  window.look(overview(options.bounds));
+  return viewer;
+}
+
+Viewer::Viewer(const ViewerOptions& options, BoneWindow& window, Inbox& inbox, std::optional<ScriptReader> script)
+    : options_(options), window_(&window), inbox_(&inbox), script_(std::move(script)) {}
+
+Result<Viewer::State> Viewer::turn(bool interrupted) {
+  inbox_->wait_for(kTurn);
+  dirty_ = dirty_ || interrupted != interrupted_;
+  interrupted_ = interrupted;
+
+  const WindowEvents events = window_->events();
+  if (events.closed) return State::finished;
+  dirty_ = dirty_ || events.redraw;
+  if (events.wants_overview) dirty_ = obey(LookAtWhole{}).has_value();
+  if (events.wants_tool && !states_.empty()) dirty_ = obey(LookAtTool{kToolKeyDistance_mm}).has_value();
+
+  receive();
+  draw_if_due(false);
+  return obey_script();
+}
+
+void Viewer::receive() {
+  Delivery delivery = inbox_->take();
+  if (delivery.any_states) {
+    states_ = std::move(delivery.states);
+    dirty_ = dirty_ || tool_shown_;
+  }
+  if (delivery.snapshot_begun) {
+    scene_.begin_snapshot();
+    surface_complete_ = false;
+    snapshot_received_ = 0;
+    not_logged_.clear();
+  }
+  if (!delivery.any_mesh) return;
+
+  if (delivery.snapshot_blocks != 0) snapshot_blocks_ = delivery.snapshot_blocks;
+  snapshot_received_ += delivery.blocks.size();
+  for (auto& [key, block] : delivery.blocks) scene_.replace(std::move(block));
+  received_seq_ = delivery.room_seq;
+  not_logged_.insert(not_logged_.end(), delivery.arrivals.begin(), delivery.arrivals.end());
+  if (delivery.snapshot_complete && !surface_complete_) {
+    scene_.end_snapshot();
+    surface_complete_ = true;
+    dirty_ = true;
+  }
+  // Until the whole surface has come the picture shows the one before it, or how far the first one is.
+  if (surface_complete_) {
+    rebuild();
+  } else {
+    dirty_ = true;
+  }
+}
+
+void Viewer::rebuild() {
+  const auto begin = Clock::now();
+  const std::vector<RegionKey> regions = scene_.take_dirty();
+  if (regions.empty()) return;
+  for (const RegionKey& region : regions) window_->show_region(region, scene_.region_mesh(region));
+  regions_rebuilt_ += regions.size();
+  update_times_.record(Clock::now() - begin);
+  dirty_ = true;
+}
+
+std::string Viewer::notice() const {
+  if (interrupted_) return options_.case_title + "\nconnection lost, trying again";
+  if (!surface_complete_ && snapshot_blocks_ != 0) {
+    const std::size_t per_cent = std::min<std::size_t>(99, 100 * snapshot_received_ / snapshot_blocks_);
+    return options_.case_title + "\nreceiving the surface, " + std::to_string(per_cent) + " %";
+  }
+  return options_.case_title;
+}
+
+void Viewer::draw_if_due(bool at_once) {
+  if (dirty_ && (at_once || Clock::now() >= next_draw_)) draw_now();
+  // What came without changing the picture is shown by the picture that is there.
+  if (!dirty_ && surface_shown_ && !not_logged_.empty()) log_shown(mono_ns(Clock::now()));
+}
+
+void Viewer::draw_now() {
+  const auto begin = Clock::now();
+  const bool with_tool = tool_shown_ && !states_.empty();
+  window_->show_tools(with_tool ? std::span<const CuttingState>(states_) : std::span<const CuttingState>{});
+  window_->show_text(with_tool ? gauge_text(states_.front()) : std::string{}, notice());
+  window_->draw();
+  const auto end = Clock::now();
+
+  dirty_ = false;
+  ++frames_;
+  // Where drawing is slow, other programs of this machine still get half of the time.
+  next_draw_ = std::max(begin + kFramePeriod, end + (end - begin) / 2);
+  if (!surface_complete_) return;
+  frame_times_.record(end - begin);
+  surface_shown_ = true;
+  log_shown(mono_ns(end));
+}
+
+void Viewer::log_shown(std::int64_t rendered_mono_ns) {
+  shown_seq_ = received_seq_;
+  if (frame_log_.is_open()) {
+    for (const Arrival& arrival : not_logged_) {
+      frame_log_ << arrival.room_seq.value << ',' << arrival.received_mono_ns << ',' << rendered_mono_ns << '\n';
+    }
+    frame_log_.flush();
+  }
+  not_logged_.clear();
+}
+
+Result<Viewer::State> Viewer::obey_script() {
+  while (script_) {
+    if (!pending_) {
+      const auto line = script_->next();
+      if (!line) return script_->ended() ? State::finished : State::running;
+      auto parsed = parse_command(*line);
+      if (parsed && !*parsed) continue;
+      if (!parsed) {
+        if (options_.answers) std::printf("error %s\n", parsed.error().message.c_str());
+        std::fflush(stdout);
+        if (options_.stop_at_error) {
+          return failure(ErrorCode::invalid_input, "script line `" + *line + "`: " + parsed.error().message);
+        }
+        continue;
+      }
+      pending_ = Pending{*line, std::move(**parsed)};
+    }
+
+    if (std::holds_alternative<Quit>(pending_->command)) {
+      if (options_.answers) std::printf("ok quit\n");
+      std::fflush(stdout);
+      return State::finished;
+    }
+    const auto outcome = obey(pending_->command);
+    if (!outcome) return State::running;
+    if (options_.answers) {
+      if (*outcome) std::printf("ok %s\n", pending_->line.c_str());
+      else std::printf("error %s\n", outcome->error().message.c_str());
+      std::fflush(stdout);
+    }
+    pending_.reset();
+    if (!*outcome && options_.stop_at_error) return tl::unexpected(outcome->error());
+  }
+  return State::running;
+}
+
+std::optional<Result<void>> Viewer::obey(const Command& command) {
+  using Answer = std::optional<Result<void>>;
+  const auto done = [this] {
+    dirty_ = true;
+    return Answer(Result<void>{});
+  };
+  return std::visit(
+      Overloaded{
+          [&](const WaitForSurface&) { return surface_shown_ && !dirty_ ? Answer(Result<void>{}) : Answer{}; },
+          [&](const WaitForSeq& wait) {
+            return surface_shown_ && shown_seq_ >= wait.room_seq ? Answer(Result<void>{}) : Answer{};
+          },
+          [&](const LookAtWhole&) {
+            window_->look(overview(options_.bounds));
+            return done();
+          },
+          [&](const LookFrom& look) {
+            window_->look(look.view);
+            return done();
+          },
+          [&](const LookAtTool& look) {
+            if (states_.empty()) {
+              return Answer(failure(ErrorCode::unavailable, "there is no tool in the room to look at yet"));
+            }
+            window_->look(beside_tool(states_.front().pose_bone_tool, look.distance_mm));
+            return done();
+          },
+          [&](const ShowTool& show) {
+            tool_shown_ = show.on;
+            return done();
+          },
+          [&](const SaveScreenshot& save) {
+            draw_if_due(true);
+            dirty_ = true;  // the next picture is a live one again
+            return Answer(window_->save_png(save.file));
+          },
+          [&](const SaveStatus& save) { return Answer(write_file(save.file, summary_json())); },
+          [&](const Quit&) { return Answer(Result<void>{}); },
+      },
+      command);
+}
+
+std::string Viewer::summary_json() const {
+  const auto milliseconds = [](const DurationHistogram& times) {
+    return nlohmann::ordered_json{{"p50", times.percentile_us(50) / 1000.0},
+                                  {"p99", times.percentile_us(99) / 1000.0},
+                                  {"max", times.max_us() / 1000.0}};
+  };
+  const nlohmann::ordered_json summary{
+      {"blocks", scene_.blocks()},
+      {"regions", scene_.regions()},
+      {"triangles", scene_.triangles()},
+      {"scene_mesh_hash", to_hex(scene_.hash())},
+      {"room_seq", shown_seq_.value},
+      {"frames", frames_},
+      {"frame_ms", milliseconds(frame_times_)},
+      {"update_ms", milliseconds(update_times_)},
+      {"updates", update_times_.count()},
+      {"regions_rebuilt", regions_rebuilt_},
+  };
+  return summary.dump(2) + "\n";
+}
+
+}  // namespace osteon

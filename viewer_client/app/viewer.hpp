@@ -1,0 +1,85 @@
+// The render loop: takes what the network brought, rebuilds the regions that changed, draws when the picture did,
+// and obeys the script between pictures.
+#pragma once
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/core/result.hpp"
+#include "common/geometry/lattice.hpp"
+#include "common/runtime/tick_stats.hpp"
+#include "viewer_client/app/script.hpp"
+#include "viewer_client/render/window.hpp"
+#include "viewer_client/scene/inbox.hpp"
+
+namespace osteon {
+
+struct ViewerOptions {
+  std::string case_title;
+  Box bounds;                       // of the bone
+  std::filesystem::path frame_log;  // empty: none
+  bool answers = false;             // say ok or error on standard output after each command
+  bool stop_at_error = false;       // a command that fails ends the run
+};
+
+// [render]
+class Viewer {
+ public:
+  // Error internal: the frame log cannot be written.
+  [[nodiscard]] static Result<Viewer> make(const ViewerOptions& options, BoneWindow& window, Inbox& inbox,
+                                           std::optional<ScriptReader> script);
+
+  enum class State { running, finished };
+  // One turn of the loop; waits at most some milliseconds for something to happen. `interrupted`: the connection is
+  // being made anew. Error: what ends the run.
+  [[nodiscard]] Result<State> turn(bool interrupted);
+
+  // Blocks, triangles, hash, place in the room's order and times as JSON.
+  [[nodiscard]] std::string summary_json() const;
+
+ private:
+  Viewer(const ViewerOptions& options, BoneWindow& window, Inbox& inbox, std::optional<ScriptReader> script);
+
+  void receive();
+  void rebuild();
+  void draw_if_due(bool at_once);
+  void draw_now();
+  void log_shown(std::int64_t rendered_mono_ns);
+  [[nodiscard]] Result<State> obey_script();
+  // Null: not yet, ask again in the next turn.
+  [[nodiscard]] std::optional<Result<void>> obey(const Command& command);
+  [[nodiscard]] std::string notice() const;
+
+  ViewerOptions options_;
+  BoneWindow* window_;
+  Inbox* inbox_;
+  std::optional<ScriptReader> script_;
+  std::ofstream frame_log_;
+
+  SurfaceScene scene_;
+  std::vector<CuttingState> states_;
+  bool tool_shown_ = true;
+  bool interrupted_ = false;
+  bool surface_complete_ = false;  // the whole surface has come
+  bool surface_shown_ = false;     // and was drawn
+  std::size_t snapshot_blocks_ = 0, snapshot_received_ = 0;
+  RoomSeq received_seq_, shown_seq_;
+  std::vector<Arrival> not_logged_;
+
+  struct Pending {
+    std::string line;
+    Command command;
+  };
+  std::optional<Pending> pending_;
+
+  bool dirty_ = true;
+  std::chrono::steady_clock::time_point next_draw_{};
+  DurationHistogram frame_times_, update_times_;
+  std::uint64_t frames_ = 0, regions_rebuilt_ = 0;
+};
+
+}  // namespace osteon

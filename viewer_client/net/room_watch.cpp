@@ -1,0 +1,255 @@
+#include "viewer_client/net/room_watch.hpp"
+
+#include <grpcpp/grpcpp.h>
+
+#include <atomic>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "common/runtime/log.hpp"
+#include "common/wire/convert.hpp"
+#include "common/wire/room_client.hpp"
+#include "osteon/v1/watch.grpc.pb.h"
+
+namespace osteon {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds kRetryPause{200};
+
+std::int64_t mono_ns() { return std::chrono::nanoseconds(Clock::now().time_since_epoch()).count(); }
+
+// Decodes and checks one block.
+Result<ReceivedBlock> receive(const v1::MeshBlock& wire_block, double pitch_mm) {
+  if (wire_block.level() >= static_cast<std::uint32_t>(kLevels)) {
+    return failure(ErrorCode::invalid_input,
+                   "the server sent a mesh block of level " + std::to_string(wire_block.level()) + ", which is none");
+  }
+  ReceivedBlock block;
+  block.key = {BodyId{wire_block.body()}, static_cast<int>(wire_block.level()), wire::from_wire(wire_block.index())};
+  block.version = wire_block.version();
+
+  BlockPayload payload;
+  payload.bytes.assign(wire_block.payload().begin(), wire_block.payload().end());
+  const Result<Digest> stated = wire::digest_from_wire(wire_block.mesh_hash());
+  if (!stated) return tl::unexpected(stated.error());
+  block.mesh_hash = mesh_hash(payload);
+  if (block.mesh_hash != *stated) {
+    return failure(ErrorCode::invalid_input, "a mesh block from the server does not match its hash");
+  }
+  if (!payload.bytes.empty()) {
+    Result<Mesh> mesh = decode_block(block.key, payload, level_pitch_mm(pitch_mm, block.key.level));
+    if (!mesh) return tl::unexpected(mesh.error());
+    block.mesh = std::move(*mesh);
+  }
+  return block;
+}
+
+}  // namespace
+
+struct RoomWatch::Impl {
+  RoomWatchOptions options;
+  Inbox& inbox;
+  std::function<bool()> asked_to_stop;
+  WatchedRoom room;
+  std::atomic<bool> ending{false};
+  std::atomic<bool> interrupted{false};
+
+  // Guards what both readers and the owner touch; never held over a call to the server.
+  mutable std::mutex mutex;
+  std::condition_variable changed;
+  wire::JoinedRoom joined;
+  std::uint64_t joins = 0;  // rises with every join, so that the second reader knows that the first has rejoined
+  grpc::ClientContext* mesh_context = nullptr;
+  grpc::ClientContext* cutting_context = nullptr;
+  std::optional<Error> failed;
+
+  std::thread mesh_thread, cutting_thread;
+
+  Impl(RoomWatchOptions o, Inbox& i, std::function<bool()> s)
+      : options(std::move(o)), inbox(i), asked_to_stop(std::move(s)) {}
+
+  bool stopping() const { return ending.load() || asked_to_stop(); }
+  Result<void> join(std::chrono::milliseconds patience);
+  Result<void> rejoin();
+  void read_mesh();
+  void read_cutting();
+  Result<void> read_mesh_stream();
+  bool enter(grpc::ClientContext*& slot, grpc::ClientContext& context);
+  void leave(grpc::ClientContext*& slot);
+};
+
+Result<void> RoomWatch::Impl::join(std::chrono::milliseconds patience) {
+  auto answer = wire::join_room(options.address, wire::ClientKind::viewer, options.name, patience,
+                                [this] { return stopping(); });
+  if (!answer) return tl::unexpected(answer.error());
+  const std::lock_guard lock(mutex);
+  joined = std::move(*answer);
+  ++joins;
+  changed.notify_all();
+  return {};
+}
+
+// After the connection was lost: a new join, because a server that was started anew knows no authors of the old one.
+Result<void> RoomWatch::Impl::rejoin() {
+  const Digest case_before = joined.case_hash;
+  do {
+    auto again = join(options.patience);
+    if (again) {
+      if (joined.case_hash == case_before) return {};
+      return failure(ErrorCode::unsupported, "the server at " + options.address +
+                                                 " now has another case: start the viewer anew to see it");
+    }
+    if (again.error().code != ErrorCode::unavailable || !options.keep_trying) return again;
+  } while (!stopping());
+  return failure(ErrorCode::cancelled, "stopped");
+}
+
+// A stream's context is known to the destructor, which cancels it; false where that has already begun.
+bool RoomWatch::Impl::enter(grpc::ClientContext*& slot, grpc::ClientContext& context) {
+  const std::lock_guard lock(mutex);
+  if (ending) return false;
+  slot = &context;
+  return true;
+}
+
+void RoomWatch::Impl::leave(grpc::ClientContext*& slot) {
+  const std::lock_guard lock(mutex);
+  slot = nullptr;
+}
+
+// Returns when the stream ends: without error when the server ended it or went, with one for what it must not send.
+Result<void> RoomWatch::Impl::read_mesh_stream() {
+  grpc::ClientContext context;
+  if (!enter(mesh_context, context)) return {};
+  v1::WatchMeshRequest request;
+  request.set_author(joined.author.value);
+  const auto stub = v1::WatchService::NewStub(joined.channel);
+  const auto reader = stub->WatchMesh(&context, request);
+
+  Result<void> outcome;
+  inbox.begin_stream();
+  v1::WatchMeshResponse message;
+  while (outcome && reader->Read(&message)) {
+    const std::int64_t received = mono_ns();
+    interrupted = false;
+    std::vector<ReceivedBlock> blocks;
+    blocks.reserve(static_cast<std::size_t>(message.blocks_size()));
+    for (const v1::MeshBlock& wire_block : message.blocks()) {
+      Result<ReceivedBlock> block = receive(wire_block, room.pitch_mm);
+      if (!block) {
+        outcome = tl::unexpected(block.error());
+        context.TryCancel();
+        break;
+      }
+      blocks.push_back(std::move(*block));
+    }
+    if (outcome) {
+      inbox.put_mesh(RoomSeq{message.room_seq()}, std::move(blocks), message.snapshot_complete(),
+                     message.snapshot_blocks(), received);
+    }
+  }
+  const grpc::Status ended = reader->Finish();
+  leave(mesh_context);
+  if (outcome && !stopping()) {
+    log::warn("mesh stream ended", {{"server", options.address}, {"reason", ended.error_message()}});
+  }
+  return outcome;
+}
+
+// [mesh thread] This thread alone rejoins; the other follows.
+void RoomWatch::Impl::read_mesh() {
+  const auto give_up = [this](Error error) {
+    const std::lock_guard lock(mutex);
+    failed = std::move(error);
+    changed.notify_all();
+  };
+  while (!stopping()) {
+    if (Result<void> outcome = read_mesh_stream(); !outcome) return give_up(outcome.error());
+    if (stopping()) return;
+    interrupted = true;
+    std::this_thread::sleep_for(kRetryPause);
+    if (Result<void> again = rejoin(); !again) {
+      if (again.error().code == ErrorCode::unavailable) {
+        return give_up({ErrorCode::unavailable, "the server at " + options.address +
+                                                    " went away and did not come back: start it again, then the "
+                                                    "viewer"});
+      }
+      return give_up(again.error());
+    }
+  }
+}
+
+// [cutting thread]
+void RoomWatch::Impl::read_cutting() {
+  std::uint64_t of_join = 0;
+  while (!stopping()) {
+    std::shared_ptr<grpc::Channel> channel;  // shared with the stub, which may outlive a rejoin
+    v1::WatchCuttingRequest request;
+    {
+      // A stream that ended is opened again with the same join at most every pause, with a new one at once.
+      std::unique_lock lock(mutex);
+      changed.wait_for(lock, of_join == 0 ? std::chrono::milliseconds(0) : kRetryPause,
+                       [&] { return ending.load() || joins != of_join; });
+      if (failed) return;
+      of_join = joins;
+      channel = joined.channel;
+      request.set_author(joined.author.value);
+    }
+    if (interrupted) continue;
+    grpc::ClientContext context;
+    if (!enter(cutting_context, context)) return;
+    const auto stub = v1::WatchService::NewStub(channel);
+    const auto reader = stub->WatchCutting(&context, request);
+    v1::WatchCuttingResponse message;
+    while (reader->Read(&message)) {
+      std::vector<CuttingState> states;
+      for (const v1::CuttingState& wire_state : message.states()) {
+        // A state that cannot be read is left out: the next one comes within 10 ms.
+        if (Result<CuttingState> state = wire::from_wire(wire_state)) states.push_back(std::move(*state));
+      }
+      inbox.put_states(std::move(states));
+    }
+    reader->Finish();
+    leave(cutting_context);
+  }
+}
+
+RoomWatch::RoomWatch(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Result<std::unique_ptr<RoomWatch>> RoomWatch::start(const RoomWatchOptions& options, Inbox& inbox,
+                                                    std::function<bool()> stop) {
+  auto impl = std::make_unique<Impl>(options, inbox, std::move(stop));
+  if (auto joined = impl->join(options.patience); !joined) return tl::unexpected(joined.error());
+  impl->room = {impl->joined.case_title, impl->joined.pitch_mm, impl->joined.bounds};
+  impl->mesh_thread = std::thread([&at = *impl] { at.read_mesh(); });
+  impl->cutting_thread = std::thread([&at = *impl] { at.read_cutting(); });
+  return std::unique_ptr<RoomWatch>(new RoomWatch(std::move(impl)));
+}
+
+RoomWatch::~RoomWatch() {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->ending = true;
+    if (impl_->mesh_context != nullptr) impl_->mesh_context->TryCancel();
+    if (impl_->cutting_context != nullptr) impl_->cutting_context->TryCancel();
+    impl_->changed.notify_all();
+  }
+  impl_->mesh_thread.join();
+  impl_->cutting_thread.join();
+}
+
+const WatchedRoom& RoomWatch::room() const { return impl_->room; }
+
+std::optional<Error> RoomWatch::failure_seen() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->failed;
+}
+
+bool RoomWatch::interrupted() const { return impl_->interrupted.load(); }
+
+}  // namespace osteon

@@ -1,0 +1,444 @@
+#include "viewer_client/render/window.hpp"
+
+#include <X11/Xlib.h>
+#include <vtkActor.h>
+#include <vtkCallbackCommand.h>
+#include <vtkCamera.h>
+#include <vtkCellArray.h>
+#include <vtkFloatArray.h>
+#include <vtkInteractorStyleTrackballCamera.h>
+#include <vtkLight.h>
+#include <vtkMatrix4x4.h>
+#include <vtkNew.h>
+#include <vtkObjectFactory.h>
+#include <vtkPNGWriter.h>
+#include <vtkImageData.h>
+#include <vtkPointData.h>
+#include <vtkPolyData.h>
+#include <vtkPolyDataMapper.h>
+#include <vtkProperty.h>
+#include <vtkRenderWindow.h>
+#include <vtkRenderWindowInteractor.h>
+#include <vtkRenderer.h>
+#include <vtkSmartPointer.h>
+#include <vtkTextActor.h>
+#include <vtkTextProperty.h>
+#include <vtkTypeInt32Array.h>
+#include <vtkUnsignedCharArray.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <map>
+#include <numbers>
+#include <utility>
+
+#include "common/runtime/files.hpp"
+#include "common/tools/tool.hpp"
+#include "viewer_client/scene/tool_mesh.hpp"
+
+namespace osteon {
+
+namespace {
+
+using Colour = std::array<std::uint8_t, 3>;
+
+constexpr Colour kBone{236, 222, 193};     // dry ivory
+constexpr Colour kCutBone{205, 128, 106};  // fresh bone with marrow in it
+constexpr Colour kSteel{196, 201, 208};
+constexpr Colour kCuttingSteel{171, 170, 166};
+
+// Beyond this the hand is visibly elsewhere than the tool.
+constexpr double kGhostFrom_mm = 0.15;
+constexpr double kGhostOpacity = 0.28;
+
+// Soft shadows in hollows, for saved pictures: of hollows up to this size.
+constexpr double kShadowRadius_mm = 6.0;
+constexpr int kShadowSamples = 96;
+
+vtkSmartPointer<vtkFloatArray> vectors(const std::vector<std::array<float, 3>>& from) {
+  auto to = vtkSmartPointer<vtkFloatArray>::New();
+  to->SetNumberOfComponents(3);
+  to->SetNumberOfTuples(static_cast<vtkIdType>(from.size()));
+  if (!from.empty()) std::memcpy(to->GetPointer(0), from.data(), from.size() * sizeof(from[0]));
+  return to;
+}
+
+// `marked` chooses between two colours vertex by vertex.
+vtkSmartPointer<vtkPolyData> poly_data(const std::vector<std::array<float, 3>>& positions,
+                                       const std::vector<std::array<float, 3>>& normals,
+                                       const std::vector<std::uint8_t>& marked,
+                                       const std::vector<std::array<std::uint32_t, 3>>& triangles, const Colour& plain,
+                                       const Colour& mark) {
+  vtkNew<vtkPoints> points;
+  points->SetData(vectors(positions));
+
+  vtkNew<vtkUnsignedCharArray> colours;
+  colours->SetNumberOfComponents(3);
+  colours->SetNumberOfTuples(static_cast<vtkIdType>(marked.size()));
+  for (std::size_t i = 0; i < marked.size(); ++i) {
+    std::memcpy(colours->GetPointer(static_cast<vtkIdType>(3 * i)), (marked[i] != 0 ? mark : plain).data(), 3);
+  }
+
+  // 32-bit connectivity is a copy of our own array; offsets of triangles are multiples of three.
+  vtkNew<vtkTypeInt32Array> corners, offsets;
+  corners->SetNumberOfValues(static_cast<vtkIdType>(3 * triangles.size()));
+  if (!triangles.empty()) std::memcpy(corners->GetPointer(0), triangles.data(), triangles.size() * sizeof(triangles[0]));
+  offsets->SetNumberOfValues(static_cast<vtkIdType>(triangles.size() + 1));
+  for (std::size_t i = 0; i <= triangles.size(); ++i) {
+    offsets->SetValue(static_cast<vtkIdType>(i), static_cast<vtkTypeInt32>(3 * i));
+  }
+  vtkNew<vtkCellArray> cells;
+  cells->SetData(offsets, corners);
+
+  auto data = vtkSmartPointer<vtkPolyData>::New();
+  data->SetPoints(points);
+  data->SetPolys(cells);
+  const auto normal_array = vectors(normals);
+  data->GetPointData()->SetNormals(normal_array);
+  data->GetPointData()->SetScalars(colours);
+  return data;
+}
+
+vtkSmartPointer<vtkActor> actor_of(vtkPolyData* data) {
+  vtkNew<vtkPolyDataMapper> mapper;
+  mapper->SetInputData(data);
+  auto actor = vtkSmartPointer<vtkActor>::New();
+  actor->SetMapper(mapper);
+  return actor;
+}
+
+void set_pose(vtkActor* actor, const Pose& pose) {
+  const Eigen::Matrix3d rotation = pose.rotation.toRotationMatrix();
+  vtkNew<vtkMatrix4x4> matrix;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) matrix->SetElement(row, column, rotation(row, column));
+    matrix->SetElement(row, 3, pose.position_mm[row]);
+  }
+  actor->SetUserMatrix(matrix);
+}
+
+bool same_place(const Pose& a, const Pose& b) {
+  return (a.position_mm - b.position_mm).norm() < kGhostFrom_mm && a.rotation.angularDistance(b.rotation) < 0.02;
+}
+
+// A light that goes with the camera; `place` in units of the eye's distance: right, up, towards the eye.
+void add_light(vtkRenderer* renderer, double x, double y, double z, double intensity, double r, double g, double b) {
+  vtkNew<vtkLight> light;
+  light->SetLightTypeToCameraLight();
+  light->SetPosition(x, y, z);
+  light->SetFocalPoint(0.0, 0.0, 0.0);
+  light->SetColor(r, g, b);
+  light->SetIntensity(intensity);
+  renderer->AddLight(light);
+}
+
+// The trackball, with our own keys in place of VTK's many.
+class BoneStyle : public vtkInteractorStyleTrackballCamera {
+ public:
+  static BoneStyle* New();
+  vtkTypeMacro(BoneStyle, vtkInteractorStyleTrackballCamera);
+  WindowEvents pending;
+
+  void OnChar() override {
+    switch (Interactor->GetKeyCode()) {
+      case 'o': case 'O': pending.wants_overview = true; break;
+      case 't': case 'T': pending.wants_tool = true; break;
+      case 'q': case 'Q': pending.closed = true; break;
+      default: break;
+    }
+  }
+};
+vtkStandardNewMacro(BoneStyle);
+
+// Asks the X server itself, because VTK aborts the process where there is none.
+Result<void> check_display() {
+  const char* name = std::getenv("DISPLAY");
+  if (name == nullptr || *name == '\0') {
+    return failure(ErrorCode::not_found,
+                   "there is no screen to draw on: set DISPLAY to an X server's display, or start the program with "
+                   "`xvfb-run -a`");
+  }
+  Display* display = XOpenDisplay(name);
+  if (display == nullptr) {
+    return failure(ErrorCode::not_found, "the X display " + std::string(name) +
+                                             " named by DISPLAY cannot be opened: correct DISPLAY, or start the "
+                                             "program with `xvfb-run -a`");
+  }
+  int opcode = 0, event = 0, error = 0;
+  const bool has_gl = XQueryExtension(display, "GLX", &opcode, &event, &error) != 0;
+  XCloseDisplay(display);
+  if (!has_gl) {
+    return failure(ErrorCode::not_found, "the X display " + std::string(name) +
+                                             " has no OpenGL (GLX): use one that has, or start the program with "
+                                             "`xvfb-run -a`");
+  }
+  return {};
+}
+
+}  // namespace
+
+struct BoneWindow::Impl {
+  vtkNew<vtkRenderer> renderer;
+  vtkNew<vtkRenderWindow> window;
+  vtkSmartPointer<vtkRenderWindowInteractor> interactor;
+  vtkNew<BoneStyle> style;
+  vtkNew<vtkTextActor> gauges, notice;
+
+  std::map<RegionKey, vtkSmartPointer<vtkActor>> regions;
+
+  struct DrawnTool {
+    std::string name;
+    vtkSmartPointer<vtkActor> body, ghost;
+  };
+  std::map<AuthorId, DrawnTool> tools;
+  std::map<std::string, vtkSmartPointer<vtkPolyData>> tool_data;  // null: no such tool
+
+  vtkPolyData* data_of(const std::string& name);
+  void add_in_order();
+};
+
+vtkPolyData* BoneWindow::Impl::data_of(const std::string& name) {
+  const auto [place, fresh] = tool_data.try_emplace(name);
+  if (fresh) {
+    if (const Result<Tool> tool = find_tool(name)) {
+      const ToolMesh mesh = tool_mesh(*tool);
+      place->second = poly_data(mesh.positions_mm, mesh.normals, mesh.cutting, mesh.triangles, kSteel, kCuttingSteel);
+    }
+  }
+  return place->second;
+}
+
+// Regions are drawn in the order of their keys, however they came, so that one surface gives one picture even where
+// two triangles lie in one place.
+void BoneWindow::Impl::add_in_order() {
+  for (const auto& [key, actor] : regions) renderer->RemoveActor(actor);
+  for (const auto& [author, tool] : tools) {
+    renderer->RemoveActor(tool.body);
+    renderer->RemoveActor(tool.ghost);
+  }
+  for (const auto& [key, actor] : regions) renderer->AddActor(actor);
+  for (const auto& [author, tool] : tools) {
+    renderer->AddActor(tool.body);
+    renderer->AddActor(tool.ghost);
+  }
+}
+
+BoneWindow::BoneWindow(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+BoneWindow::~BoneWindow() {
+  // The window must go before the style and renderer that it still points to.
+  impl_->interactor->SetInteractorStyle(nullptr);
+  impl_->window->Finalize();
+}
+
+Result<std::unique_ptr<BoneWindow>> BoneWindow::open(const WindowOptions& options) {
+  if (auto display = check_display(); !display) return tl::unexpected(display.error());
+  auto impl = std::make_unique<Impl>();
+  vtkRenderer* renderer = impl->renderer;
+  vtkRenderWindow* window = impl->window;
+
+  // Default multisampling is several times slower in software.
+  window->SetMultiSamples(0);
+  window->SetSize(options.width_px, options.height_px);
+  window->SetWindowName(options.title.c_str());
+  window->AddRenderer(renderer);
+
+  renderer->GradientBackgroundOn();
+  renderer->SetBackground(0.055, 0.070, 0.090);
+  renderer->SetBackground2(0.200, 0.245, 0.290);
+  renderer->SetUseFXAA(true);
+  renderer->SetAutomaticLightCreation(0);
+  add_light(renderer, -0.55, 0.75, 1.0, 0.78, 1.00, 0.97, 0.92);  // key, from the upper left
+  add_light(renderer, 0.90, -0.10, 0.7, 0.26, 0.86, 0.92, 1.00);  // fill, from the right
+  add_light(renderer, 0.0, 0.0, 1.0, 0.18, 1.0, 1.0, 1.0);        // headlight, so that no hole is black
+  renderer->SetSSAORadius(kShadowRadius_mm);
+  renderer->SetSSAOBias(0.02 * kShadowRadius_mm);
+  renderer->SetSSAOKernelSize(kShadowSamples);
+  renderer->SetSSAOBlur(true);
+
+  const auto text = [&](vtkTextActor* actor, int size, double r, double g, double b) {
+    actor->GetTextProperty()->SetFontFamilyToArial();
+    actor->GetTextProperty()->SetFontSize(size);
+    actor->GetTextProperty()->SetColor(r, g, b);
+    actor->GetTextProperty()->SetShadow(1);
+    renderer->AddActor2D(actor);
+  };
+  text(impl->gauges, 18, 0.93, 0.94, 0.95);
+  impl->gauges->GetPositionCoordinate()->SetCoordinateSystemToNormalizedViewport();
+  impl->gauges->SetPosition(0.016, 0.972);
+  impl->gauges->GetTextProperty()->SetVerticalJustificationToTop();
+  impl->gauges->GetTextProperty()->SetLineSpacing(1.25);
+  text(impl->notice, 15, 0.78, 0.82, 0.86);
+  impl->notice->GetPositionCoordinate()->SetCoordinateSystemToNormalizedViewport();
+  impl->notice->SetPosition(0.016, 0.024);
+
+  impl->interactor = vtkSmartPointer<vtkRenderWindowInteractor>::New();
+  impl->interactor->SetRenderWindow(window);
+  impl->interactor->SetInteractorStyle(impl->style);
+  // The interactor must not draw by itself: the program draws, at its own rate.
+  impl->interactor->EnableRenderOff();
+  vtkNew<vtkCallbackCommand> redraw, closed;
+  redraw->SetClientData(impl->style);
+  redraw->SetCallback([](vtkObject*, unsigned long, void* style, void*) {
+    static_cast<BoneStyle*>(style)->pending.redraw = true;
+  });
+  closed->SetClientData(impl->style);
+  closed->SetCallback([](vtkObject*, unsigned long, void* style, void*) {
+    static_cast<BoneStyle*>(style)->pending.closed = true;
+  });
+  impl->interactor->AddObserver(vtkCommand::RenderEvent, redraw);
+  impl->interactor->AddObserver(vtkCommand::ExposeEvent, redraw);
+  impl->interactor->AddObserver(vtkCommand::ConfigureEvent, redraw);
+  impl->interactor->AddObserver(vtkCommand::ExitEvent, closed);
+  impl->interactor->Initialize();
+  return std::unique_ptr<BoneWindow>(new BoneWindow(std::move(impl)));
+}
+
+void BoneWindow::show_region(const RegionKey& region, const Mesh& mesh) {
+  const auto held = impl_->regions.find(region);
+  if (mesh.triangles.empty()) {
+    if (held != impl_->regions.end()) {
+      impl_->renderer->RemoveActor(held->second);
+      impl_->regions.erase(held);
+    }
+    return;
+  }
+
+  const auto data = poly_data(mesh.positions_mm, mesh.normals, mesh.cut_face, mesh.triangles, kBone, kCutBone);
+  if (held != impl_->regions.end()) {
+    static_cast<vtkPolyDataMapper*>(held->second->GetMapper())->SetInputData(data);
+    return;
+  }
+  auto actor = actor_of(data);
+  vtkProperty* bone = actor->GetProperty();
+  bone->SetInterpolationToPhong();
+  bone->SetAmbient(0.10);
+  bone->SetDiffuse(0.88);
+  bone->SetSpecular(0.13);
+  bone->SetSpecularPower(22.0);
+  impl_->regions.emplace(region, actor);
+  impl_->add_in_order();
+}
+
+void BoneWindow::show_tools(std::span<const CuttingState> states) {
+  std::map<AuthorId, Impl::DrawnTool> shown;
+  bool changed = false;
+  for (const CuttingState& state : states) {
+    vtkPolyData* data = impl_->data_of(state.tool_name);
+    if (data == nullptr) continue;
+
+    auto held = impl_->tools.extract(state.author);
+    Impl::DrawnTool tool;
+    if (!held.empty() && held.mapped().name == state.tool_name) {
+      tool = held.mapped();
+    } else {
+      if (!held.empty()) impl_->tools.insert(std::move(held));
+      changed = true;
+      tool.name = state.tool_name;
+      tool.body = actor_of(data);
+      vtkProperty* steel = tool.body->GetProperty();
+      steel->SetInterpolationToPhong();
+      steel->SetAmbient(0.10);
+      steel->SetDiffuse(0.62);
+      steel->SetSpecular(0.75);
+      steel->SetSpecularPower(38.0);
+      tool.ghost = actor_of(data);
+      tool.ghost->GetMapper()->ScalarVisibilityOff();
+      tool.ghost->GetProperty()->SetColor(0.55, 0.78, 0.95);
+      tool.ghost->GetProperty()->SetOpacity(kGhostOpacity);
+      tool.ghost->GetProperty()->SetBackfaceCulling(1);
+    }
+    set_pose(tool.body, state.pose_bone_tool);
+    set_pose(tool.ghost, state.pose_bone_device);
+    tool.ghost->SetVisibility(same_place(state.pose_bone_tool, state.pose_bone_device) ? 0 : 1);
+    shown.emplace(state.author, std::move(tool));
+  }
+  // What is left belongs to tools that went or changed.
+  for (const auto& [author, tool] : impl_->tools) {
+    impl_->renderer->RemoveActor(tool.body);
+    impl_->renderer->RemoveActor(tool.ghost);
+  }
+  impl_->tools = std::move(shown);
+  if (changed) impl_->add_in_order();
+}
+
+void BoneWindow::show_text(const std::string& gauges, const std::string& notice) {
+  impl_->gauges->SetInput(gauges.c_str());
+  impl_->notice->SetInput(notice.c_str());
+  impl_->gauges->SetVisibility(gauges.empty() ? 0 : 1);
+  impl_->notice->SetVisibility(notice.empty() ? 0 : 1);
+}
+
+void BoneWindow::look(const CameraView& view) {
+  vtkCamera* camera = impl_->renderer->GetActiveCamera();
+  camera->SetPosition(view.eye_mm.x(), view.eye_mm.y(), view.eye_mm.z());
+  camera->SetFocalPoint(view.target_mm.x(), view.target_mm.y(), view.target_mm.z());
+  camera->SetViewUp(view.up.x(), view.up.y(), view.up.z());
+  camera->SetViewAngle(view.view_angle_rad * 180.0 / std::numbers::pi);
+}
+
+CameraView BoneWindow::camera() const {
+  vtkCamera* camera = impl_->renderer->GetActiveCamera();
+  CameraView view;
+  camera->GetPosition(view.eye_mm.data());
+  camera->GetFocalPoint(view.target_mm.data());
+  camera->GetViewUp(view.up.data());
+  view.view_angle_rad = camera->GetViewAngle() * std::numbers::pi / 180.0;
+  return view;
+}
+
+void BoneWindow::draw() {
+  impl_->renderer->ResetCameraClippingRange();
+  impl_->window->Render();
+}
+
+Result<void> BoneWindow::save_png(const std::filesystem::path& file) {
+  impl_->renderer->SetUseSSAO(true);
+  draw();
+  const Image picture = image();
+  impl_->renderer->SetUseSSAO(false);
+
+  // VTK's rows run from the bottom.
+  vtkNew<vtkImageData> pixels;
+  pixels->SetDimensions(picture.width_px, picture.height_px, 1);
+  pixels->AllocateScalars(VTK_UNSIGNED_CHAR, 3);
+  for (int y = 0; y < picture.height_px; ++y) {
+    std::memcpy(pixels->GetScalarPointer(0, picture.height_px - 1 - y, 0), picture.at(0, y).data(),
+                3 * static_cast<std::size_t>(picture.width_px));
+  }
+  vtkNew<vtkPNGWriter> writer;
+  writer->SetInputData(pixels);
+  writer->WriteToMemoryOn();
+  writer->Write();
+  vtkUnsignedCharArray* png = writer->GetResult();
+  if (png == nullptr || png->GetNumberOfValues() == 0) {
+    return failure(ErrorCode::internal, "the picture for " + file.string() + " could not be made into a PNG");
+  }
+  return write_file(file, std::string_view(reinterpret_cast<const char*>(png->GetPointer(0)),
+                                           static_cast<std::size_t>(png->GetNumberOfValues())));
+}
+
+Image BoneWindow::image() const {
+  const int* size = impl_->window->GetActualSize();
+  Image image;
+  image.width_px = size[0];
+  image.height_px = size[1];
+  image.rgb.resize(static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]));
+  vtkNew<vtkUnsignedCharArray> rows;
+  impl_->window->GetPixelData(0, 0, size[0] - 1, size[1] - 1, 0, rows);
+  const std::size_t row_bytes = 3 * static_cast<std::size_t>(image.width_px);
+  for (int y = 0; y < image.height_px; ++y) {
+    std::memcpy(image.rgb[static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width_px)].data(),
+                rows->GetPointer(0) + static_cast<std::size_t>(image.height_px - 1 - y) * row_bytes, row_bytes);
+  }
+  return image;
+}
+
+WindowEvents BoneWindow::events() {
+  impl_->interactor->ProcessEvents();
+  if (impl_->interactor->GetDone()) impl_->style->pending.closed = true;
+  return std::exchange(impl_->style->pending, WindowEvents{});
+}
+
+}  // namespace osteon

@@ -1,0 +1,73 @@
+// The picture: one window with the bone, the tools and a line of gauges. VTK stays behind this page.
+// All functions: [render], the thread that opened the window.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/core/result.hpp"
+#include "common/mechanics/cutting_state.hpp"
+#include "viewer_client/scene/camera_view.hpp"
+#include "viewer_client/scene/surface_scene.hpp"
+
+namespace osteon {
+
+struct WindowOptions {
+  int width_px = 1280;
+  int height_px = 720;
+  std::string title = "Osteon";
+};
+
+// Pixels as one sees them, rows from the top.
+struct Image {
+  int width_px = 0;
+  int height_px = 0;
+  std::vector<std::array<std::uint8_t, 3>> rgb;
+  [[nodiscard]] const std::array<std::uint8_t, 3>& at(int x, int y) const {
+    return rgb[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_px) + static_cast<std::size_t>(x)];
+  }
+};
+
+// What the user did in the window since it was last asked.
+struct WindowEvents {
+  bool closed = false;
+  bool redraw = false;         // the camera moved or the window was uncovered or resized
+  bool wants_overview = false; // key O
+  bool wants_tool = false;     // key T
+};
+
+class BoneWindow {
+ public:
+  // Error not_found: no X display, one that cannot be reached, or one without OpenGL.
+  [[nodiscard]] static Result<std::unique_ptr<BoneWindow>> open(const WindowOptions& options);
+  ~BoneWindow();
+
+  // The region's whole mesh, bone frame; an empty mesh takes the region out of the picture.
+  void show_region(const RegionKey& region, const Mesh& mesh);
+  // The tools of the room; those not in the list vanish. A translucent ghost stands where the hand is, if not there.
+  void show_tools(std::span<const CuttingState> states);
+  void show_text(const std::string& gauges, const std::string& notice);
+
+  void look(const CameraView& view);
+  [[nodiscard]] CameraView camera() const;
+
+  void draw();
+  // Draws once more with soft shadows in hollows, which a live picture in software has no time for, and saves that.
+  [[nodiscard]] Result<void> save_png(const std::filesystem::path& file);
+  // What the last draw() made.
+  [[nodiscard]] Image image() const;
+
+  // Handles what the window system has sent.
+  [[nodiscard]] WindowEvents events();
+
+ private:
+  struct Impl;
+  explicit BoneWindow(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace osteon

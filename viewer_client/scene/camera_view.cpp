@@ -1,0 +1,42 @@
+#include "viewer_client/scene/camera_view.hpp"
+
+#include <cmath>
+
+namespace osteon {
+
+namespace {
+
+// The direction's part across `axis` as a unit vector; `otherwise` where the direction runs along the axis.
+Vec3 across(const Vec3& direction, const Vec3& axis, const Vec3& otherwise) {
+  const Vec3 part = direction - direction.dot(axis) * axis;
+  return part.norm() > 0.1 * direction.norm() ? part.normalized() : otherwise;
+}
+
+}  // namespace
+
+CameraView overview(const Box& bone) {
+  CameraView view;
+  view.target_mm = 0.5 * (bone.min_mm + bone.max_mm);
+  // The sphere round the box fits the vertical angle; bones are seldom boxes, so come a little closer than that.
+  const double radius_mm = 0.5 * (bone.max_mm - bone.min_mm).norm();
+  const double distance_mm = 0.85 * radius_mm / std::sin(0.5 * view.view_angle_rad);
+  const Vec3 towards_eye = Vec3(0.62, -0.72, 0.30).normalized();
+  view.eye_mm = view.target_mm + distance_mm * towards_eye;
+  view.up = Vec3::UnitZ();
+  return view;
+}
+
+CameraView beside_tool(const Pose& pose_bone_tool, double distance_mm) {
+  const Vec3 back = -pose_bone_tool.direction(Vec3::UnitZ());
+  // Aside: towards the patient's front where the axis allows it, which is where the overview looks from.
+  const Vec3 aside = across(-Vec3::UnitY(), back, across(Vec3::UnitX(), back, Vec3::UnitX()));
+  const double off_axis_rad = 0.66;
+  CameraView view;
+  view.target_mm = pose_bone_tool.position_mm;
+  view.eye_mm = view.target_mm + distance_mm * (std::cos(off_axis_rad) * back + std::sin(off_axis_rad) * aside);
+  const Vec3 sight = (view.target_mm - view.eye_mm).normalized();
+  view.up = across(Vec3::UnitZ(), sight, across(back, sight, Vec3::UnitX()));
+  return view;
+}
+
+}  // namespace osteon

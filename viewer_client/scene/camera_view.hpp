@@ -1,0 +1,22 @@
+// Where one looks from: pure geometry, bone frame.
+#pragma once
+#include "common/geometry/lattice.hpp"
+#include "common/geometry/pose.hpp"
+
+namespace osteon {
+
+struct CameraView {
+  Vec3 eye_mm = Vec3(0.0, -1.0, 0.0);
+  Vec3 target_mm = Vec3::Zero();
+  Vec3 up = Vec3::UnitZ();
+  double view_angle_rad = 0.5236;  // full vertical angle
+};
+
+// The whole bone from the front, its left and a little above (DICOM LPS: +x left, -y front, +z up).
+[[nodiscard]] CameraView overview(const Box& bone);
+
+// The tool's tip from `distance_mm`, from behind the tool and aside of its axis, so that the shank does not hide the
+// hole.
+[[nodiscard]] CameraView beside_tool(const Pose& pose_bone_tool, double distance_mm);
+
+}  // namespace osteon

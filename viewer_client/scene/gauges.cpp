@@ -1,0 +1,43 @@
+#include "viewer_client/scene/gauges.hpp"
+
+#include <cmath>
+#include <cstdio>
+#include <string_view>
+
+namespace osteon {
+
+namespace {
+
+std::string_view word(CuttingPhase phase) {
+  switch (phase) {
+    case CuttingPhase::idle: return "idle";
+    case CuttingPhase::free: return "running free";
+    case CuttingPhase::cutting: return "cutting";
+    case CuttingPhase::rubbing: return "rubbing";
+  }
+  return "";
+}
+
+template <class... Values>
+std::string line(const char* format, Values... values) {
+  char text[96];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+// Rounded so that no gauge ever shows a negative zero.
+double rounded(double value, double step) { return std::round(value / step) * step + 0.0; }
+
+}  // namespace
+
+std::string gauge_text(const CuttingState& state) {
+  std::string text = state.tool_name + ", " + std::string(word(state.phase));
+  text += line("\n%.0f rpm", rounded(state.spindle_rpm, 1.0));
+  text += line("\nforce %.1f N", rounded(state.force_physical_N.norm(), 0.1));
+  text += line("\ndepth %.1f mm", rounded(state.depth_mm, 0.1));
+  // Away from bone there is nothing to weigh.
+  if (state.engaged_fraction > 0.0) text += line("\ndensity %.2f g/cm\xC2\xB3", rounded(state.density_g_cm3, 0.01));
+  return text;
+}
+
+}  // namespace osteon

@@ -1,0 +1,60 @@
+#include "viewer_client/scene/inbox.hpp"
+
+#include <utility>
+
+namespace osteon {
+
+namespace {
+// Arrivals are figures for the log; a render thread that stands still for half a minute keeps the newest of them.
+constexpr std::size_t kMostArrivals = 1024;
+}  // namespace
+
+void Inbox::begin_stream() {
+  const std::lock_guard lock(mutex_);
+  next_.snapshot_begun = true;
+  next_.snapshot_complete = false;
+  next_.blocks.clear();
+  next_.arrivals.clear();
+}
+
+void Inbox::put_mesh(RoomSeq room_seq, std::vector<ReceivedBlock> blocks, bool snapshot_complete,
+                     std::uint32_t snapshot_blocks, std::int64_t received_mono_ns) {
+  {
+    const std::lock_guard lock(mutex_);
+    for (ReceivedBlock& block : blocks) {
+      auto [place, fresh] = next_.blocks.try_emplace(block.key);
+      if (fresh || block.version > place->second.version) place->second = std::move(block);
+    }
+    next_.snapshot_complete = next_.snapshot_complete || snapshot_complete;
+    if (snapshot_blocks != 0) next_.snapshot_blocks = snapshot_blocks;
+    next_.room_seq = room_seq;
+    next_.any_mesh = true;
+    if (next_.arrivals.size() == kMostArrivals) next_.arrivals.erase(next_.arrivals.begin());
+    next_.arrivals.push_back({room_seq, received_mono_ns});
+    waiting_ = true;
+  }
+  arrived_.notify_one();
+}
+
+void Inbox::put_states(std::vector<CuttingState> states) {
+  {
+    const std::lock_guard lock(mutex_);
+    next_.states = std::move(states);
+    next_.any_states = true;
+    waiting_ = true;
+  }
+  arrived_.notify_one();
+}
+
+Delivery Inbox::take() {
+  const std::lock_guard lock(mutex_);
+  waiting_ = false;
+  return std::exchange(next_, Delivery{});
+}
+
+void Inbox::wait_for(std::chrono::milliseconds time) {
+  std::unique_lock lock(mutex_);
+  arrived_.wait_for(lock, time, [this] { return waiting_; });
+}
+
+}  // namespace osteon

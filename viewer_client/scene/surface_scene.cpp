@@ -1,0 +1,118 @@
+#include "viewer_client/scene/surface_scene.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace osteon {
+
+RegionKey region_of(const BlockKey& key) { return {key.body, key.level, shift_down(key.index, kRegionShift)}; }
+
+void SurfaceScene::count(const Block& block, int sign) {
+  if (block.mesh.triangles.empty()) return;
+  const auto triangles = block.mesh.triangles.size();
+  drawn_blocks_ += sign > 0 ? 1 : std::size_t(-1);
+  triangles_ += sign > 0 ? triangles : std::size_t(0) - triangles;
+}
+
+bool SurfaceScene::replace(ReceivedBlock received) {
+  const RegionKey region = region_of(received.key);
+  auto [place, fresh] = regions_[region].try_emplace(received.key);
+  Block& block = place->second;
+
+  // Within a stream a higher version replaces a lower one. What an earlier stream brought yields to a snapshot.
+  const bool from_earlier_stream = in_snapshot_ && block.snapshot != snapshot_;
+  if (!fresh && !from_earlier_stream && received.version <= block.version) return false;
+  block.version = received.version;
+  block.snapshot = snapshot_;
+  if (fresh && received.mesh.triangles.empty()) return false;
+  if (!fresh && received.mesh_hash == block.mesh_hash) return false;
+
+  count(block, -1);
+  block.mesh_hash = received.mesh_hash;
+  block.mesh = std::move(received.mesh);
+  count(block, +1);
+  dirty_.insert(region);
+  return true;
+}
+
+void SurfaceScene::begin_snapshot() {
+  ++snapshot_;
+  in_snapshot_ = true;
+}
+
+void SurfaceScene::end_snapshot() {
+  if (!in_snapshot_) return;
+  in_snapshot_ = false;
+  for (auto region = regions_.begin(); region != regions_.end();) {
+    std::erase_if(region->second, [&](const auto& entry) {
+      if (entry.second.snapshot == snapshot_) return false;
+      if (!entry.second.mesh.triangles.empty()) dirty_.insert(region->first);
+      count(entry.second, -1);
+      return true;
+    });
+    region = region->second.empty() ? regions_.erase(region) : std::next(region);
+  }
+}
+
+std::vector<RegionKey> SurfaceScene::take_dirty() {
+  std::vector<RegionKey> keys(dirty_.begin(), dirty_.end());
+  dirty_.clear();
+  return keys;
+}
+
+Mesh SurfaceScene::region_mesh(const RegionKey& region) const {
+  Mesh whole;
+  const auto found = regions_.find(region);
+  if (found == regions_.end()) return whole;
+
+  std::size_t vertices = 0, triangles = 0;
+  for (const auto& [key, block] : found->second) {
+    vertices += block.mesh.positions_mm.size();
+    triangles += block.mesh.triangles.size();
+  }
+  whole.positions_mm.reserve(vertices);
+  whole.normals.reserve(vertices);
+  whole.cut_face.reserve(vertices);
+  whole.triangles.reserve(triangles);
+
+  for (const auto& [key, block] : found->second) {
+    const Mesh& part = block.mesh;
+    const auto first = static_cast<std::uint32_t>(whole.positions_mm.size());
+    whole.positions_mm.insert(whole.positions_mm.end(), part.positions_mm.begin(), part.positions_mm.end());
+    whole.normals.insert(whole.normals.end(), part.normals.begin(), part.normals.end());
+    whole.cut_face.insert(whole.cut_face.end(), part.cut_face.begin(), part.cut_face.end());
+    for (const auto& [a, b, c] : part.triangles) whole.triangles.push_back({a + first, b + first, c + first});
+  }
+  return whole;
+}
+
+std::size_t SurfaceScene::regions() const {
+  return static_cast<std::size_t>(std::count_if(regions_.begin(), regions_.end(), [](const auto& region) {
+    return std::any_of(region.second.begin(), region.second.end(),
+                       [](const auto& entry) { return !entry.second.mesh.triangles.empty(); });
+  }));
+}
+
+Digest SurfaceScene::hash() const {
+  // The regions are a grouping of this program; the hash is over blocks in the order of their own keys.
+  std::vector<std::pair<BlockKey, const Block*>> all;
+  for (const auto& [region, blocks] : regions_) {
+    for (const auto& [key, block] : blocks) {
+      if (!block.mesh.triangles.empty()) all.emplace_back(key, &block);
+    }
+  }
+  std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+
+  Hasher hasher;
+  for (const auto& [key, block] : all) {
+    hasher.integer(key.body.value);
+    hasher.integer(static_cast<std::uint64_t>(key.level));
+    for (const std::int32_t i : {key.index.x, key.index.y, key.index.z}) {
+      hasher.integer(static_cast<std::uint64_t>(std::int64_t{i}));
+    }
+    hasher.bytes(std::as_bytes(std::span(block->mesh_hash.bytes)));
+  }
+  return hasher.finish();
+}
+
+}  // namespace osteon

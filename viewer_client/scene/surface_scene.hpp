@@ -1,0 +1,77 @@
+// The surface as received from the server: blocks, the newest of each, in regions that are rebuilt one at a time.
+#pragma once
+#include <cstdint>
+#include <map>
+#include <set>
+#include <vector>
+
+#include "common/core/digest.hpp"
+#include "common/core/id.hpp"
+#include "common/surface/mesh_block.hpp"
+
+namespace osteon {
+
+// One block as the network thread hands it over: decoded and checked against its hash. No triangles: no surface left.
+struct ReceivedBlock {
+  BlockKey key;
+  std::uint64_t version = 0;
+  Digest mesh_hash;
+  Mesh mesh;
+};
+
+// 4³ blocks of one level, drawn as one object. Fine blocks have regions of their own, so a cut with a small tool
+// rebuilds a region of 64 h / 4 at most, never the bone around it.
+inline constexpr int kRegionShift = 2;
+
+struct RegionKey {
+  BodyId body;
+  int level = 0;
+  Coord index;  // block index divided by 4, rounded down
+  friend auto operator<=>(const RegionKey&, const RegionKey&) = default;
+};
+
+[[nodiscard]] RegionKey region_of(const BlockKey& key);
+
+// [render]
+class SurfaceScene {
+ public:
+  // Takes a block unless a version at least as new is held; true when the picture changes.
+  bool replace(ReceivedBlock block);
+
+  // A stream begins with the whole surface. After it was interrupted, versions may have started anew (another
+  // server) and blocks may have gone: between the two calls every block is taken as new, and what the snapshot did
+  // not contain is dropped at its end.
+  void begin_snapshot();
+  void end_snapshot();
+
+  // Regions changed since the last call, each once, in order.
+  [[nodiscard]] std::vector<RegionKey> take_dirty();
+  // All triangles of a region as one mesh, blocks in the order of their keys; empty where nothing is left.
+  [[nodiscard]] Mesh region_mesh(const RegionKey& region) const;
+
+  [[nodiscard]] std::size_t blocks() const { return drawn_blocks_; }  // with triangles
+  [[nodiscard]] std::size_t triangles() const { return triangles_; }
+  [[nodiscard]] std::size_t regions() const;                          // with triangles
+  // SHA-256 over the sorted (key, mesh_hash) of all blocks with triangles: equal in every viewer of one surface.
+  [[nodiscard]] Digest hash() const;
+
+ private:
+  struct Block {
+    std::uint64_t version = 0;
+    std::uint64_t snapshot = 0;  // in which it came last
+    Digest mesh_hash;
+    Mesh mesh;
+  };
+  using Region = std::map<BlockKey, Block>;
+
+  void count(const Block& block, int sign);
+
+  std::map<RegionKey, Region> regions_;
+  std::set<RegionKey> dirty_;
+  std::uint64_t snapshot_ = 0;
+  bool in_snapshot_ = false;
+  std::size_t drawn_blocks_ = 0;
+  std::size_t triangles_ = 0;
+};
+
+}  // namespace osteon
