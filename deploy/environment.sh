@@ -6,4 +6,7 @@ export PATH="${PATH:-/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bi
 export HOME="${HOME:-$(getent passwd "$(id -u)" | cut -d: -f6)}"
 export LC_ALL=C.UTF-8 PYTHONDONTWRITEBYTECODE=1
 
+# Debian's own Python has the packages of deploy/packages.txt; another one in PATH may not.
+python=/usr/bin/python3
+
 die() { printf 'deploy/%s: %s\n' "${0##*/}" "$*" >&2; exit 1; }

@@ -30,3 +30,6 @@ find_package(OpenVDB 10 REQUIRED)
 include(GoogleTest)
 find_package(GTest REQUIRED)
 find_package(benchmark REQUIRED)
+
+# Debian's own Python, which has the packages of deploy/packages.txt; another one in PATH may not.
+find_program(OSTEON_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)

@@ -1,0 +1,127 @@
+"""deploy/figures after building: runs what the asked figures need and prints one line for each."""
+import argparse
+import json
+import math
+import shutil
+import signal
+import subprocess
+import sys
+from datetime import datetime, timezone
+from pathlib import Path
+
+import registry
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def line(figure, value, baseline):
+    """NAME VALUE UNIT (baseline VALUE, ratio R) target T ok|short|info"""
+    beside = ""
+    if baseline is not None:
+        ratio = f"{value / baseline:.3g}" if value is not None and baseline else "-"
+        beside = f"baseline {number(baseline)}, ratio {ratio}"
+    return (f"{figure.name} {number(value)} {figure.unit} ({beside or 'baseline -, ratio -'}) "
+            f"target {figure.target_text()} {figure.verdict(value)}")
+
+
+def number(value):
+    if value is None:
+        return "-"
+    return str(value) if isinstance(value, int) else f"{value:.4g}"
+
+
+def list_figures(figures, as_json):
+    if as_json:
+        print(json.dumps([{"name": f.name, "unit": f.unit, "measures": f.measures, "target": f.target_text(),
+                           "baseline": f.baseline} for f in figures], indent=2))
+        return
+    width = max(len(f.name) for f in figures)
+    for f in figures:
+        beside = f"; baseline: {f.baseline}" if f.baseline else ""
+        print(f"{f.name:{width}}  {f.unit:9}  {f.target_text():8}  {f.measures}{beside}")
+
+
+def commit():
+    def git(*arguments):
+        return subprocess.run(["git", "-C", str(ROOT), *arguments], capture_output=True, text=True, check=False).stdout.strip()
+    changed = " with uncommitted changes" if git("status", "--porcelain", "--untracked-files=no") else ""
+    return (git("rev-parse", "--short=12", "HEAD") or "unknown") + changed
+
+
+def results(figures, values, soak, machine):
+    """What is committed under tests/perf/results: numbers with the commit and the conditions."""
+    return {
+        "commit": commit(), "date": datetime.now(timezone.utc).strftime("%Y-%m-%d"), "machine": machine,
+        "size": "soak" if soak else "quick", "build": "perf",
+        "figures": {f.name: {"value": rounded(values[f.name][0]), "unit": f.unit, "baseline": rounded(values[f.name][1]),
+                             "target": f.target_text(), "verdict": f.verdict(values[f.name][0])} for f in figures},
+    }
+
+
+def rounded(value):
+    if value is None or isinstance(value, int):
+        return value
+    return float(f"{value:.5g}") if math.isfinite(value) else None
+
+
+def measure(figures, run, groups):
+    """{figure: (value, baseline)} of the asked figures, group by group."""
+    values = {}
+    wanted = {f.group for f in figures}
+    for name, produce in groups.items():
+        if name in wanted:
+            values.update(produce(run))
+    return values
+
+
+def stop(*_):
+    raise KeyboardInterrupt
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="deploy/figures", description="Measures the numbers that Osteon promises.")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="figures to run; all without any")
+    parser.add_argument("--list", action="store_true", help="show the figures and what they measure; run nothing")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of lines")
+    parser.add_argument("--soak", action="store_true", help="longer runs and more repetitions")
+    parser.add_argument("--save", type=Path, metavar="FILE", help="write the results with commit and conditions")
+    parser.add_argument("--build", type=Path, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    try:
+        figures = registry.by_name(options.names)
+    except ValueError as error:
+        print(f"deploy/figures: {error}", file=sys.stderr)
+        return 2
+    if options.list:
+        list_figures(figures, options.json)
+        return 0
+    if options.build is None:
+        return 0  # the caller only asked whether the arguments are right
+
+    import groups  # needs numpy, which --list does not
+    signal.signal(signal.SIGTERM, stop)
+    folder = options.build / "figures"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    run = groups.Run(options.build / "bin", folder, options.soak, lambda text: print(f"# {text}", file=sys.stderr, flush=True))
+    try:
+        values = measure(figures, run, groups.GROUPS)
+    except groups.Failure as failure:
+        print(f"deploy/figures: {failure}", *([failure.detail] if failure.detail else []), sep="\n", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("deploy/figures: stopped; every program has been ended", file=sys.stderr)
+        return 130
+    outcome = results(figures, values, options.soak, groups.record.machine())
+    if options.save:
+        options.save.write_text(json.dumps(outcome, indent=2) + "\n", encoding="utf-8")
+    if options.json:
+        print(json.dumps(outcome, indent=2))
+    else:
+        for figure in figures:
+            print(line(figure, *values[figure.name]))
+    return 1 if any(f.verdict(values[f.name][0]) == "short" for f in figures) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,195 @@
+"""Produces the values of the registry: each group runs once and gives {figure: (value, baseline)}."""
+import json
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT / "deploy/session"))
+
+import plans  # noqa: E402  (found through the path above)
+import record  # noqa: E402
+from processes import Failure  # noqa: E402
+from session import Session  # noqa: E402
+
+# The phantom of the reference simulations: thickness mm, density g/cm3.
+LAYERS = [(5.0, 1.9), (20.0, 0.3), (5.0, 1.9)]
+THICKNESS_MM = sum(thickness for thickness, _ in LAYERS)
+DRILL_RADIUS_MM = 1.6
+POINT_HEIGHT_MM = DRILL_RADIUS_MM / np.tan(np.radians(118 / 2))
+RPM = 1000.0
+MESH_PERIOD_MS = 1000.0 / 30.0
+# Plunges and feed ratio of the reference simulation of the hands.
+REFERENCE_PLUNGE_MM = {"expert": 6.0, "novice": 14.4}
+REFERENCE_FEED_RATIO = 10.7 / 0.89
+
+
+def chi_force_n(feed_mm_per_s, density_g_cm3):
+    """Chi's law, equation 7.3, at the phantom's spindle speed."""
+    return 134.6 * RPM ** -0.3327 * feed_mm_per_s ** 0.5189 * density_g_cm3 ** 1.1841
+
+
+def error_percent(value, expected):
+    return 100.0 * abs(value - expected) / abs(expected)
+
+
+@dataclass
+class Run:
+    """One invocation of deploy/figures; keeps what several groups need."""
+    programs: Path
+    folder: Path
+    soak: bool
+    say: object
+    sessions: list = field(default_factory=list)   # numbers of every session so far
+    plunges: dict = field(default_factory=dict)
+    _loop: dict = None
+
+    def empty_loop(self):
+        if self._loop is None:
+            self.say("empty 1 kHz loop")
+            self._loop = json.loads(self.output("osteon-empty-loop", 60 if self.soak else 10))
+        return self._loop
+
+    def output(self, program, *arguments):
+        command = [self.programs / program, *map(str, arguments)]
+        result = subprocess.run(command, capture_output=True, text=True, check=False)
+        if result.returncode != 0:
+            raise Failure(f"{program} ended with {result.returncode}: {result.stderr.strip()[-400:]}")
+        return result.stdout
+
+    def phantom(self):
+        case = self.folder / "phantom"
+        if not (case / "case.json").exists():
+            self.say("phantom")
+            layers = ",".join(f"{thickness:g}:{density:g}" for thickness, density in LAYERS)
+            self.output("osteon-import", "phantom", "block", "--layers", layers, "--out", case)
+        return case
+
+    def session(self, name, plan):
+        self.say(f"session: {name}")
+        folder = self.folder / name
+        numbers = Session(self.programs, self.phantom(), plan, folder, self.say_in_session, pictures=False,
+                          size="640x480").run()
+        self.sessions.append(numbers)
+        return folder, numbers
+
+    def say_in_session(self, line):
+        if line.startswith(" "):
+            self.say(line)
+
+
+def in_layer(session, layer, margin_mm=1.5):
+    """Rows whose whole cone is inside one layer, away from its faces."""
+    top = sum(thickness for thickness, _ in LAYERS[:layer])
+    bottom = top + LAYERS[layer][0]
+    depth = session["depth_mm"]
+    inside = (depth > top + POINT_HEIGHT_MM + margin_mm * 0.4) & (depth < bottom - margin_mm * 0.2)
+    return inside & (session["feed_mm_per_s"] > 0)
+
+
+def loop_figures(run, numbers):
+    loop, haptic = run.empty_loop(), numbers["programs"]["haptic"]["loop"]
+    return {
+        "haptic_work_p50": (haptic["work_p50_us"], loop["late_p50_us"]),
+        "haptic_work_p99": (haptic["work_p99_us"], loop["late_p99_us"]),
+        "haptic_late_p50": (haptic["late_p50_us"], loop["late_p50_us"]),
+        "haptic_late_p99": (haptic["late_p99_us"], loop["late_p99_us"]),
+        "haptic_missed_ticks": (1e4 * haptic["missed"] / max(1, haptic["ticks"]),
+                                1e4 * loop["missed"] / max(1, loop["ticks"])),
+    }
+
+
+def latency_figures(numbers):
+    latency = numbers["latency_ms"]
+    return {
+        "cut_to_commit_p50": (latency["cut_to_commit"]["p50"], None),
+        "mesh_update_p50": (latency["cut_to_mesh"]["p50"], MESH_PERIOD_MS),
+        "mesh_update_p99": (latency["cut_to_mesh"]["p99"], MESH_PERIOD_MS),
+        "cut_to_picture_p50": (latency["cut_to_picture"]["p50"], MESH_PERIOD_MS),
+        "cut_to_picture_p99": (latency["cut_to_picture"]["p99"], MESH_PERIOD_MS),
+        "cut_to_sound_p50": (latency["cut_to_sound"]["p50"], None),
+        "cut_to_sound_p99": (latency["cut_to_sound"]["p99"], None),
+    }
+
+
+def rig(run):
+    """The feed rig through the phantom, all programs running; in a soak several times."""
+    values = {}
+    for repetition in range(5 if run.soak else 1):
+        folder, numbers = run.session(f"rig-{repetition + 1}", plans.drill("rig", feed_mm_per_s=1.0, beyond_mm=5))
+        values.update(loop_figures(run, numbers))
+        values.update(latency_figures(numbers))
+        values.update(rig_physics(folder, numbers))
+    values["field_hash_differences"] = (sum(not s["agreement"]["field_hash_equal"] for s in run.sessions), None)
+    values["mesh_hash_differences"] = (sum(s["agreement"]["mesh_differences"] for s in run.sessions), None)
+    return values
+
+
+def rig_physics(folder, numbers):
+    session = record.read_table(folder / "session.csv")
+    force = session["force_physical_n"]
+    cortical, medullary = chi_force_n(1.0, 1.9), chi_force_n(1.0, 0.3)
+    measured = [float(np.mean(force[in_layer(session, layer)])) for layer in range(3)]
+    gone = session["depth_mm"] > THICKNESS_MM + POINT_HEIGHT_MM + 1.0
+    removed = numbers["programs"]["server"]["removed_mm3"]
+    cylinder = np.pi * DRILL_RADIUS_MM ** 2 * THICKNESS_MM
+    return {
+        "rig_force_cortical_error": (max(error_percent(measured[i], cortical) for i in (0, 2)), cortical),
+        "rig_force_medullary_error": (error_percent(measured[1], medullary), medullary),
+        "rig_force_after_exit": (float(np.max(np.abs(force[gone]))) if gone.any() else None, None),
+        "rig_removed_volume_error": (error_percent(removed, cylinder), cylinder),
+    }
+
+
+def hand(run, who):
+    """One hand through the phantom: its feeds and its plunge behind the far cortex."""
+    folder, _ = run.session(who, plans.drill(who))
+    session = record.read_table(folder / "session.csv")
+    feeds = [float(np.median(session["feed_mm_per_s"][in_layer(session, layer)])) for layer in range(2)]
+    # The plunge begins where the drill's lips reach the far face.
+    plunge = float(np.max(session["device_depth_mm"])) - (THICKNESS_MM + POINT_HEIGHT_MM)
+    run.plunges[who] = plunge
+    return feeds, plunge
+
+
+def expert(run):
+    feeds, plunge = hand(run, "expert")
+    return {
+        "feed_medullary_over_cortical": (feeds[1] / feeds[0], REFERENCE_FEED_RATIO),
+        "plunge_expert_error": (error_percent(plunge, REFERENCE_PLUNGE_MM["expert"]), REFERENCE_PLUNGE_MM["expert"]),
+    }
+
+
+def novice(run):
+    _, plunge = hand(run, "novice")
+    if "expert" not in run.plunges:
+        hand(run, "expert")
+    return {
+        "plunge_novice_error": (error_percent(plunge, REFERENCE_PLUNGE_MM["novice"]), REFERENCE_PLUNGE_MM["novice"]),
+        "plunge_novice_over_expert": (plunge / run.plunges["expert"],
+                                      REFERENCE_PLUNGE_MM["novice"] / REFERENCE_PLUNGE_MM["expert"]),
+    }
+
+
+def bench(run):
+    """Google Benchmark; medians of repetitions, each beside the plain way of doing the same."""
+    run.say("kernels")
+    out = json.loads(run.output("osteon-bench", "--benchmark_format=json", "--benchmark_min_time=0.2",
+                                f"--benchmark_repetitions={15 if run.soak else 5}",
+                                "--benchmark_report_aggregates_only=true"))
+    median = {b["run_name"]: b for b in out["benchmarks"] if b.get("aggregate_name") == "median"}
+    time = {name: b["real_time"] for name, b in median.items()}
+    return {
+        "cut_burr": (time["cut_burr"], time["cut_burr_plain"]),
+        "cut_drill": (time["cut_drill"], time["cut_drill_plain"]),
+        "mesh_encode": (time["mesh_encode"], time["mesh_flying_edges"]),
+        "mesh_decode": (time["mesh_decode"], time["mesh_flying_edges"]),
+        "mesh_bytes_per_triangle": (median["mesh_encode"]["bytes_per_triangle"], None),
+    }
+
+
+# In the order in which they run: agreement is counted after every session.
+GROUPS = {"bench": bench, "expert": expert, "novice": novice, "rig": rig}
