@@ -1,9 +1,9 @@
 #include "tests/architecture/proto_rules.hpp"
 
-#include <algorithm>
-#include <functional>
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
+#include <algorithm>
+#include <functional>
 #include <map>
 #include <regex>
 #include <set>
@@ -78,9 +78,9 @@ std::string short_name(const Element* element) {
 }
 
 struct Entry {
-  std::string key;        // "Cut.author"
-  std::string owner;      // "Cut"
-  int number = 0;         // -1 for an RPC
+  std::string key;    // "Cut.author"
+  std::string owner;  // "Cut"
+  int number = 0;     // -1 for an RPC
   std::string line;
 };
 
@@ -93,7 +93,8 @@ std::vector<Entry> entries(const Protocol& protocol) {
   visit_messages(protocol, [&](const pb::Descriptor* message) {
     for (int i = 0; i < message->field_count(); ++i) {
       const auto* field = message->field(i);
-      add(short_name(message), field->name(), field->number(), std::to_string(field->number()) + " " + type_name(field));
+      add(short_name(message), field->name(), field->number(),
+          std::to_string(field->number()) + " " + type_name(field));
     }
   });
   visit_enums(protocol, [&](const pb::EnumDescriptor* type) {
@@ -186,8 +187,8 @@ std::vector<std::string> rpc_faults(const Protocol& protocol) {
   std::vector<std::string> faults;
   std::map<std::string, std::string> used_by;
   visit_methods(protocol, [&](const pb::MethodDescriptor* method) {
-    const std::pair<const pb::Descriptor*, std::string> roles[] = {{method->input_type(), method->name() + "Request"},
-                                                                   {method->output_type(), method->name() + "Response"}};
+    const std::pair<const pb::Descriptor*, std::string> roles[] = {
+        {method->input_type(), method->name() + "Request"}, {method->output_type(), method->name() + "Response"}};
     for (const auto& [message, wanted] : roles) {
       if (message->name() != wanted) {
         faults.push_back(method->full_name() + ": its message is " + message->name() + " and should be " + wanted);
@@ -213,7 +214,8 @@ std::vector<std::string> number_faults(const Protocol& protocol, std::string_vie
     const std::string owner = key.substr(0, key.rfind('.'));
     known.insert(key);
     if (const auto found = now.find(key); found != now.end()) {
-      if (found->second.line != line) faults.push_back(key + ": was \"" + line + "\", is \"" + found->second.line + "\"");
+      if (found->second.line != line)
+        faults.push_back(key + ": was \"" + line + "\", is \"" + found->second.line + "\"");
       continue;
     }
     const bool is_rpc = line.find(" -> ") != std::string::npos;

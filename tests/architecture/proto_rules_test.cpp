@@ -1,11 +1,11 @@
 // Holds the protocol to its rules, and shows on small wrong protocols that each rule can fail.
-#include <fstream>
 #include <gmock/gmock.h>
 #include <google/protobuf/compiler/parser.h>
 #include <google/protobuf/descriptor.pb.h>
 #include <google/protobuf/io/tokenizer.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <gtest/gtest.h>
+#include <fstream>
 #include <iterator>
 
 #include "tests/architecture/proto_rules.hpp"
@@ -66,9 +66,9 @@ TEST(EnumRule, SeesAMeaningAtZero) {
 }
 
 TEST(RpcRule, SeesSharedMessages) {
-  const auto faults = rpc_faults(parsed(
-      "message GoRequest {} message GoResponse {} message RunRequest {}"
-      "service S { rpc Go(GoRequest) returns (GoResponse); rpc Run(RunRequest) returns (GoResponse); }"));
+  const auto faults = rpc_faults(
+      parsed("message GoRequest {} message GoResponse {} message RunRequest {}"
+             "service S { rpc Go(GoRequest) returns (GoResponse); rpc Run(RunRequest) returns (GoResponse); }"));
   EXPECT_THAT(faults, ElementsAre(HasSubstr("should be RunResponse"), HasSubstr("shares GoResponse")));
 }
 
@@ -79,7 +79,8 @@ TEST(NumberRule, SeesReuseRetypingRemovalAndAddition) {
               ElementsAre(HasSubstr("M.b: was")));
   EXPECT_THAT(number_faults(parsed("message M { uint32 a = 1; string b = 2; }"), committed),
               ElementsAre(HasSubstr("M.a: was")));
-  EXPECT_THAT(number_faults(parsed("message M { uint64 a = 1; }"), committed), ElementsAre(HasSubstr("must be reserved")));
+  EXPECT_THAT(number_faults(parsed("message M { uint64 a = 1; }"), committed),
+              ElementsAre(HasSubstr("must be reserved")));
   EXPECT_THAT(number_faults(parsed("message M { reserved 2; uint64 a = 1; }"), committed), IsEmpty());
   EXPECT_THAT(number_faults(parsed("message M { uint64 a = 1; string b = 2; bool c = 3; }"), committed),
               ElementsAre(HasSubstr("not yet in")));

@@ -1,9 +1,9 @@
-// What one cut of a haptic client (8 ms of tool path) costs at a pitch of 0.125 mm, against the plain way of writing it:
-// every voxel of the cut's box by an OpenVDB ValueAccessor.
-#include <algorithm>
+// What one cut of a haptic client (8 ms of tool path) costs at a pitch of 0.125 mm, against the plain way of writing
+// it: every voxel of the cut's box by an OpenVDB ValueAccessor.
 #include <benchmark/benchmark.h>
-#include <cmath>
 #include <openvdb/openvdb.h>
+#include <algorithm>
+#include <cmath>
 
 #include "common/core/check.hpp"
 #include "common/field/kernel.hpp"
@@ -24,7 +24,9 @@ Tool tool_named(const char* name) {
 }
 
 // A burr half in bone moving sideways, and a drill going in.
-Cut burr_cut() { return straight_cut(tool_named("burr-round-5"), {0, 0, -1.5}, {15 * kCutSeconds, 0, -1.5}, {0, 0, -1}); }
+Cut burr_cut() {
+  return straight_cut(tool_named("burr-round-5"), {0, 0, -1.5}, {15 * kCutSeconds, 0, -1.5}, {0, 0, -1});
+}
 Cut drill_cut() { return straight_cut(tool_named("drill-3.2"), {0, 0, -6}, {0, 0, -6 - 1 * kCutSeconds}, {0, 0, -1}); }
 
 const Case& bone() {

@@ -1,11 +1,11 @@
 // What one block of surface costs to make and to read, against VTK's flying edges on the same samples.
 #include <benchmark/benchmark.h>
-#include <cmath>
-#include <vector>
 #include <vtkFlyingEdges3D.h>
 #include <vtkImageData.h>
 #include <vtkNew.h>
 #include <vtkPolyData.h>
+#include <cmath>
+#include <vector>
 
 #include "common/core/check.hpp"
 #include "common/surface/mesh_block.hpp"
@@ -60,8 +60,9 @@ void mesh_flying_edges(benchmark::State& state) {
   for (int x = 0; x < kBlockSamples; ++x)
     for (int y = 0; y < kBlockSamples; ++y)
       for (int z = 0; z < kBlockSamples; ++z) {
-        const auto at = (static_cast<std::size_t>(x + 1) * kBlockApron + static_cast<std::size_t>(y + 1)) * kBlockApron +
-                        static_cast<std::size_t>(z + 1);
+        const auto at =
+            (static_cast<std::size_t>(x + 1) * kBlockApron + static_cast<std::size_t>(y + 1)) * kBlockApron +
+            static_cast<std::size_t>(z + 1);
         *static_cast<float*>(image->GetScalarPointer(x, y, z)) = solid[at];
       }
   vtkNew<vtkFlyingEdges3D> filter;

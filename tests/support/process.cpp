@@ -1,17 +1,17 @@
 #include "tests/support/process.hpp"
 
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <cstring>
-#include <fcntl.h>
 #include <map>
 #include <mutex>
-#include <poll.h>
-#include <sys/prctl.h>
-#include <sys/wait.h>
 #include <thread>
-#include <unistd.h>
 
 #include "common/core/check.hpp"
 #include "tests/support/wait.hpp"
@@ -65,7 +65,7 @@ struct Process::State {
   pid_t pid = -1;
   int input = -1, output = -1, errors = -1;
   std::optional<int> exit_code;
-  std::size_t read_to = 0;  // of standard output, by read_line
+  std::size_t read_to = 0;   // of standard output, by read_line
   mutable std::mutex mutex;  // guards out and err
   std::string out, err;
   std::atomic<bool> ended = false;
@@ -119,7 +119,7 @@ Process::Process(const std::filesystem::path& program, const std::vector<std::st
 
   const pid_t pid = ::fork();
   OSTEON_CHECK(pid >= 0);
-  if (pid == 0) {  // only async-signal-safe calls from here on
+  if (pid == 0) {                        // only async-signal-safe calls from here on
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // a test that crashes leaves no program behind
     ::dup2(in.read, STDIN_FILENO);
     ::dup2(out.write, STDOUT_FILENO);

@@ -1,12 +1,12 @@
 // A real program as a child of a test: its output is captured, and it ends with the scope, by its own process id.
 #pragma once
+#include <sys/types.h>
 #include <chrono>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <sys/types.h>
 #include <utility>
 #include <vector>
 

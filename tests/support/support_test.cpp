@@ -1,9 +1,9 @@
 // The test helpers themselves: a helper that cannot notice a fault hides every fault behind it.
+#include <gtest/gtest.h>
 #include <atomic>
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
-#include <gtest/gtest.h>
 #include <memory>
 #include <new>
 #include <thread>
@@ -100,7 +100,7 @@ TEST(AllocationCounter, CountsNewAndMallocOfThisThreadOnly) {
   EXPECT_EQ(heap.count(), 0);
   ::operator delete(::operator new(64));
   EXPECT_EQ(heap.count(), 1);
-  ::operator delete(::operator new(64, std::align_val_t{128}), std::align_val_t{128});
+  ::operator delete (::operator new (64, std::align_val_t{128}), std::align_val_t{128});
   EXPECT_EQ(heap.count(), 2);
   void* volatile block = std::malloc(64);
   std::free(block);
@@ -118,7 +118,9 @@ TEST(AllocationCounter, CountsNewAndMallocOfThisThreadOnly) {
   EXPECT_EQ(heap.count(), after_start);
 }
 
-TEST(SharedData, SourceFolderIsTheCheckout) { EXPECT_TRUE(std::filesystem::exists(source_dir() / "CMakePresets.json")); }
+TEST(SharedData, SourceFolderIsTheCheckout) {
+  EXPECT_TRUE(std::filesystem::exists(source_dir() / "CMakePresets.json"));
+}
 
 }  // namespace
 }  // namespace osteon::test
