@@ -72,7 +72,7 @@ class Run:
         self.say(f"session: {name}")
         folder = self.folder / name
         numbers = Session(self.programs, self.phantom(), plan, folder, self.say_in_session, pictures=False,
-                          size="640x480").run()
+                          late_viewer=True, size="640x480").run()
         self.sessions.append(numbers)
         return folder, numbers
 

@@ -1,0 +1,128 @@
+"""deploy/demo after installing and building: imports the case, runs a session, writes its report."""
+import argparse
+import hashlib
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import plans
+import plots
+import record
+import report
+from processes import Failure
+from session import ROOT, Session
+
+EXAMPLE = "usr/share/doc/invesalius-examples/examples/Cranium.inv3"
+
+
+def say(line):
+    print(line, flush=True)
+
+
+def example_skull():
+    for root in (Path("/"), ROOT / "build" / "examples"):
+        if (root / EXAMPLE).exists():
+            return root / EXAMPLE
+    raise Failure(f"the example CT (/{EXAMPLE}) is not there; deploy/install fetches it")
+
+
+def fingerprint(source: Path, importer: Path):
+    """Names an import: the same files read by the same importer give the same case."""
+    files = sorted(source.rglob("*")) if source.is_dir() else [source]
+    digest = hashlib.sha256()
+    for file in [importer, *files]:
+        status = file.stat()
+        name = "" if file == importer else str(file.relative_to(source))
+        digest.update(f"{name}\0{status.st_size}\0{status.st_mtime_ns}\n".encode())
+    return digest.hexdigest()[:16]
+
+
+def prepare_case(source: Path, programs: Path):
+    """The case to work on: a case as it is, anything else imported once and then found again."""
+    if (source / "case.json").exists():
+        return source
+    importer = programs / "osteon-import"
+    name = "".join(c if c.isalnum() else "-" for c in source.stem) or "case"
+    case = ROOT / "build" / "cases" / f"{name}-{fingerprint(source, importer)}"
+    if (case / "case.json").exists():
+        return case
+    case.parent.mkdir(parents=True, exist_ok=True)
+    say(f"Importing {source}")
+    started = time.monotonic()
+    result = subprocess.run([importer, "ct", source, "--out", case], stderr=subprocess.PIPE if not sys.stderr.isatty() else None,
+                            stdin=subprocess.DEVNULL, text=True, check=False)
+    if result.returncode != 0:
+        words = (result.stderr or "").strip().splitlines()
+        raise Failure(words[-1] if words else f"osteon-import could not read {source}")
+    say(f"Imported in {time.monotonic() - started:.0f} s; the next run finds the case in build/cases.")
+    return case
+
+
+def run_on_some_side(programs, case, directions, out):
+    """The session; a bone that does not lie along one direction is tried from the next."""
+    for direction in directions:
+        try:
+            return Session(programs, case, plans.drill_and_window(direction), out, say).run()
+        except Failure as failure:
+            if direction == directions[-1] or "toward" not in failure.detail:
+                raise
+            say(f"No bone to drill along {direction}; trying from another side.")
+    return None
+
+
+def end_politely(*_):
+    raise KeyboardInterrupt
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="deploy/demo")
+    parser.add_argument("--case", type=Path)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--build", type=Path, required=True)
+    options = parser.parse_args()
+    signal.signal(signal.SIGTERM, end_politely)
+    programs = options.build / "bin"
+    out = options.out.resolve()
+    started = time.monotonic()
+    try:
+        source = options.case or example_skull()
+        case = prepare_case(source.resolve(), programs)
+        if out.exists():
+            shutil.rmtree(out)
+        out.mkdir(parents=True)
+        (out / ".osteon-session").touch()
+        directions = plans.ANY_SIDE if options.case else [plans.LEFT_PARIETAL]
+        numbers = run_on_some_side(programs, case, directions, out)
+        say("Writing the report")
+        session = record.read_table(out / "session.csv")
+        plots.force_and_depth(session, record.sites(session), out / "force_depth.png")
+        numbers["sound"] = plots.spectrogram(out / "sound.wav", out / "spectrogram.png")
+        report.write(out, numbers, numbers["case"].get("title") or case.name)
+    except Failure as failure:
+        print(f"deploy/demo: {failure}", *([failure.detail] if failure.detail else []), sep="\n", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("deploy/demo: stopped; every program has been ended", file=sys.stderr)
+        return 130
+    summarise(numbers, out, time.monotonic() - started)
+    return 0 if numbers["agreement"]["field_hash_equal"] else 1
+
+
+def summarise(numbers, out, seconds):
+    latency = numbers["latency_ms"]
+    for site in numbers["cut_sites"]:
+        say(f"{site['tool']}: {site['depth_mm']:.1f} mm deep, {site['force_mean_n']:.1f} N on average, "
+            f"{site['force_peak_n']:.1f} N at most (simulated device)")
+    for key, (name, _) in report.LATENCIES.items():
+        if latency.get(key, {}).get("count"):
+            say(f"{name}: median {latency[key]['p50']:.1f} ms, 99 % {latency[key]['p99']:.1f} ms")
+    equal = numbers["agreement"]["field_hash_equal"]
+    say(f"The bone in server and haptic client is {'the same' if equal else 'NOT the same'} at the end.")
+    say(f"Session of {seconds:.0f} s. Report: {out / 'report.html'}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

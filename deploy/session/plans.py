@@ -1,0 +1,24 @@
+"""What the simulated surgeon does."""
+
+# Towards the left parietal bone of a skull in the patient's frame: x left, y back, z up.
+LEFT_PARIETAL = [0.75, 0.25, 0.65]
+# Where the bone is not known: from above, then from each side, until one meets bone.
+ANY_SIDE = [[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1]]
+
+
+def drill_and_window(toward):
+    """A 3.2 mm hole, and a small window burred beside it."""
+    return {"steps": [
+        {"action": "drill", "tool": "drill-3.2", "spindle_rpm": 1000, "hand": "expert", "entry": {"toward": toward}},
+        {"action": "wait", "seconds": 0.5},
+        {"action": "burr", "tool": "burr-round-5", "spindle_rpm": 20000, "hand": "expert",
+         "entry": {"beside_last_mm": [14, 0]}, "window_mm": [10, 7], "depth_mm": 2.0, "sweep_mm_per_s": 15},
+        {"action": "wait", "seconds": 0.5},
+    ]}
+
+
+def drill(hand, toward=(0, 0, 1), **more):
+    """One hole through whatever lies along the way, by the rig or by a hand."""
+    step = {"action": "drill", "tool": "drill-3.2", "spindle_rpm": 1000, "hand": hand,
+            "entry": {"toward": list(toward)}}
+    return {"steps": [{**step, **more}, {"action": "wait", "seconds": 0.5}]}

@@ -1,0 +1,163 @@
+"""The programs of a session as children: started, watched, and ended by their own ids; their last words are kept."""
+import collections
+import os
+import queue
+import signal
+import subprocess
+import threading
+import time
+from pathlib import Path
+
+
+class Failure(Exception):
+    """What ends a session early, as one sentence for a person; `detail` may hold the last lines of a log."""
+
+    def __init__(self, sentence, detail=""):
+        super().__init__(sentence)
+        self.detail = detail
+
+
+class Child:
+    """One program. Its standard error goes to a log file; its standard output comes line by line."""
+
+    def __init__(self, name, command, logs: Path, environment, takes_input=False):
+        self.name = name
+        self.may_end = False  # set when its end is expected
+        self.log = logs / f"{name}.log"
+        self._lines = queue.Queue()
+        self._recent = collections.deque(maxlen=20)
+        with open(self.log, "wb") as log:
+            # The kernel ends the child if this process is killed; a terminal's Ctrl-C reaches only this process,
+            # which then ends the children in order.
+            self._process = subprocess.Popen(
+                ["setpriv", "--pdeathsig", "TERM", *map(str, command)],
+                stdin=subprocess.PIPE if takes_input else subprocess.DEVNULL,
+                stdout=subprocess.PIPE, stderr=log, env=environment, start_new_session=True,
+                text=True, encoding="utf-8", errors="replace")
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self):
+        for line in self._process.stdout:
+            self._recent.append(line.rstrip("\n"))
+            self._lines.put(line.rstrip("\n"))
+
+    @property
+    def exit_code(self):
+        """None while it runs; minus the signal's number where one ended it."""
+        return self._process.poll()
+
+    def new_lines(self):
+        """What it printed since the last call."""
+        lines = []
+        while not self._lines.empty():
+            lines.append(self._lines.get())
+        return lines
+
+    def next_line(self, patience_s):
+        """The next printed line; None when it ended first or said nothing for so long."""
+        deadline = time.monotonic() + patience_s
+        while time.monotonic() < deadline:
+            try:
+                return self._lines.get(timeout=0.1)
+            except queue.Empty:
+                if self.exit_code is not None and not self._reader.is_alive() and self._lines.empty():
+                    return None
+        return None
+
+    def say(self, line):
+        try:
+            self._process.stdin.write(line + "\n")
+            self._process.stdin.flush()
+        except (OSError, ValueError):
+            pass  # it has ended; whoever waits for the answer says so
+
+    def last_words(self, count=6):
+        """The end of its log, or of what it printed where the log is empty."""
+        text = self.log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+        return "\n".join(f"  {line}" for line in (text or list(self._recent))[-count:])
+
+    def wait(self, patience_s):
+        try:
+            return self._process.wait(timeout=patience_s)
+        except subprocess.TimeoutExpired:
+            return None
+
+    def end(self, patience_s=10.0):
+        """SIGTERM, and SIGKILL to one that does not listen; returns the exit code."""
+        if self.exit_code is None:
+            self._process.send_signal(signal.SIGTERM)
+            if self.wait(patience_s) is None:
+                self._process.kill()
+                self._process.wait()
+        self._reader.join(timeout=1.0)
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None and not self._reader.is_alive():
+                pipe.close()
+        return self.exit_code
+
+
+class Household:
+    """All children of a session. Leaving the block ends what still runs, the newest first."""
+
+    def __init__(self, logs: Path):
+        self.logs = logs
+        self.children = []
+        logs.mkdir(parents=True, exist_ok=True)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        for child in reversed(self.children):
+            child.end(patience_s=5.0)
+
+    def start(self, name, command, environment=None, takes_input=False):
+        child = Child(name, command, self.logs, environment or dict(os.environ), takes_input)
+        self.children.append(child)
+        return child
+
+    def check(self):
+        """Failure when a child has died that nobody asked to end."""
+        for child in self.children:
+            if child.exit_code is not None and not child.may_end:
+                raise self.died(child)
+
+    def died(self, child):
+        how = f"ended with {child.exit_code}" if child.exit_code is None or child.exit_code >= 0 else \
+            f"was ended by {signal.Signals(-child.exit_code).name}"
+        return Failure(f"{child.name} {how}; its last lines (all of them in {child.log}):", child.last_words())
+
+    def wait_for_file(self, file: Path, what, patience_s=30.0):
+        deadline = time.monotonic() + patience_s
+        while not (file.exists() and file.read_text().endswith("\n")):
+            self.check()
+            if time.monotonic() > deadline:
+                raise Failure(f"{what} was not ready within {patience_s:.0f} s")
+            time.sleep(0.02)
+        return file.read_text().strip()
+
+
+def start_screen(household: Household, size="1280x720"):
+    """The environment to draw in: the caller's display, or a virtual one of this session. Says which."""
+    environment = dict(os.environ)
+    if environment.get("DISPLAY"):
+        return environment, "a window on your display"
+    xvfb = household.start("Xvfb", ["Xvfb", "-displayfd", "1", "-screen", "0", f"{size}x24", "-nolisten", "tcp",
+                                    "-noreset"])
+    number = xvfb.next_line(20.0)
+    if not number:
+        raise Failure("Xvfb, the virtual screen, did not start; its last lines:", xvfb.last_words())
+    for name in ("WAYLAND_DISPLAY", "XAUTHORITY"):
+        environment.pop(name, None)
+    environment.update(DISPLAY=f":{number.strip()}", LIBGL_ALWAYS_SOFTWARE="1")
+    return environment, "a virtual screen, since there is no display"
+
+
+def has_sound_card():
+    """Whether sound can be heard here: a running sound server, or a card that one could open."""
+    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
+    if os.environ.get("PULSE_SERVER") or (runtime and Path(runtime, "pulse/native").exists()):
+        return True
+    cards = Path("/proc/asound/cards")
+    return cards.exists() and "no soundcards" not in cards.read_text()

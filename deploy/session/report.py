@@ -1,0 +1,162 @@
+"""The page that shows a session: pictures, force, sound and numbers, with an explanation in plain language."""
+import base64
+import html
+import json
+from pathlib import Path
+
+STYLE = """
+:root { color-scheme: light; --ink: #24272b; --soft: #6a6f76; --line: #e3e0da; --paper: #faf8f4; --accent: #c8553d; }
+* { box-sizing: border-box; }
+body { margin: 0; background: var(--paper); color: var(--ink); font: 16px/1.55 system-ui, "DejaVu Sans", sans-serif; }
+main { max-width: 1080px; margin: 0 auto; padding: 40px 24px 80px; }
+h1 { font-size: 30px; line-height: 1.2; margin: 0 0 6px; }
+h2 { font-size: 20px; margin: 48px 0 10px; }
+p { max-width: 74ch; margin: 8px 0; }
+.lead { color: var(--soft); }
+.badge { display: inline-block; border: 1px solid var(--accent); color: var(--accent); border-radius: 99px;
+  padding: 1px 12px; font-size: 13px; margin: 10px 8px 0 0; }
+.facts { display: grid; grid-template-columns: repeat(auto-fit, minmax(200px, 1fr)); gap: 12px; margin: 26px 0 0; }
+.fact { background: white; border: 1px solid var(--line); border-radius: 10px; padding: 12px 16px; }
+.fact b { display: block; font-size: 23px; line-height: 1.3; }
+.fact span { color: var(--soft); font-size: 13px; }
+.pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(380px, 1fr)); gap: 14px; margin-top: 12px; }
+figure { margin: 0; background: white; border: 1px solid var(--line); border-radius: 10px; overflow: hidden; }
+figure img { display: block; width: 100%; }
+figcaption { padding: 8px 14px; color: var(--soft); font-size: 14px; }
+figure.wide { margin-top: 12px; padding: 10px 10px 0; }
+audio { width: 100%; margin: 12px 0 0; }
+table { border-collapse: collapse; width: 100%; background: white; border: 1px solid var(--line); margin-top: 10px; }
+th, td { text-align: left; padding: 6px 12px; border-bottom: 1px solid var(--line); font-size: 14px; vertical-align: top; }
+td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+details { margin-top: 14px; } pre { overflow: auto; font-size: 12.5px; background: white; border: 1px solid var(--line);
+  padding: 12px; border-radius: 8px; }
+"""
+
+
+def text(value):
+    return html.escape(str(value))
+
+
+def picture(folder: Path, name, caption, wide=False):
+    file = folder / name
+    if not file.exists():
+        return ""
+    data = base64.b64encode(file.read_bytes()).decode("ascii")
+    return (f'<figure{" class=wide" if wide else ""}><img alt="{text(caption)}" src="data:image/png;base64,{data}">'
+            f"<figcaption>{text(caption)}</figcaption></figure>")
+
+
+def fact(value, what):
+    return f"<div class=fact><b>{text(value)}</b><span>{text(what)}</span></div>"
+
+
+def ms(value):
+    return "–" if value is None else f"{value:.1f} ms"
+
+
+def site_rows(numbers):
+    rows = []
+    for site in numbers["cut_sites"]:
+        rows.append(f"<tr><td>{text(site['tool'])}</td><td class=n>{site['depth_mm']:.1f}</td>"
+                    f"<td class=n>{site['cutting_s']:.1f}</td><td class=n>{site['force_mean_n']:.1f}</td>"
+                    f"<td class=n>{site['force_peak_n']:.1f}</td><td class=n>{site['rendered_peak_n']:.2f}</td></tr>")
+    return "".join(rows)
+
+
+LATENCIES = {
+    "cut_to_commit": ("cut to confirmation", "from the end of a cut in the haptic client until the server has ordered and applied it, and said so"),
+    "cut_to_mesh": ("cut to mesh", "from the end of a cut until the viewer has received the new surface"),
+    "cut_to_picture": ("cut to picture", "from the end of a cut until the viewer has drawn it"),
+    "cut_to_sound": ("cut to sound", "from a cutting state of the haptic loop until the audio client has put it into its sound"),
+}
+
+
+def latency_rows(numbers):
+    rows = []
+    for key, (name, meaning) in LATENCIES.items():
+        value = numbers["latency_ms"].get(key)
+        if value:
+            rows.append(f"<tr><td><b>{name}</b><br>{meaning}</td><td class=n>{ms(value['p50'])}</td>"
+                        f"<td class=n>{ms(value['p99'])}</td><td class=n>{value['count']}</td></tr>")
+    return "".join(rows)
+
+
+def flattened(tree, prefix=""):
+    """Leaves of nested objects as (dotted name, value)."""
+    if isinstance(tree, dict):
+        for key, value in tree.items():
+            yield from flattened(value, f"{prefix}{key}.")
+    elif isinstance(tree, list) and len(tree) > 4:
+        yield prefix.rstrip("."), f"{len(tree)} entries"
+    else:
+        yield prefix.rstrip("."), tree
+
+
+def program_tables(numbers):
+    parts = []
+    for name, summary in numbers["programs"].items():
+        rows = "".join(f"<tr><td>{text(key)}</td><td class=n>{text(value)}</td></tr>" for key, value in flattened(summary))
+        parts.append(f"<details><summary>osteon-{name}</summary><table>{rows}</table></details>")
+    return "".join(parts)
+
+
+def write(folder: Path, numbers, title):
+    """Writes report.html into the session's folder; pictures are inside the page, the sound lies beside it."""
+    latency, agreement, sites = numbers["latency_ms"], numbers["agreement"], numbers["cut_sites"]
+    removed = numbers["programs"]["server"].get("removed_mm3")
+    same = "identical" if agreement["field_hash_equal"] else "NOT identical"
+    facts = [
+        fact(f"{removed:.0f} mm³" if isinstance(removed, (int, float)) else "–", "bone removed"),
+        fact(f"{max((s['force_peak_n'] for s in sites), default=0):.1f} N", "largest force of the bone on a tool"),
+        fact(ms(latency.get("cut_to_picture", {}).get("p50")), "from a cut to its picture (median)"),
+        fact(ms(latency.get("cut_to_sound", {}).get("p50")), "from the cutting to its sound (median)"),
+        fact(same, "bone in server and haptic client at the end (hash)"),
+    ]
+    machine = numbers["machine"]
+    page = f"""<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
+<title>{text(title)} – Osteon session</title><style>{STYLE}</style></head><body><main>
+<h1>{text(title)}</h1>
+<p class=lead>One session of Osteon, a distributed simulator of bone surgery: four programs on one machine shared one
+bone, and a simulated surgeon worked on it for {numbers['seconds_of_work']:.0f} seconds.</p>
+<span class=badge>simulated device: no person and no haptic hardware took part</span>
+<div class=facts>{''.join(facts)}</div>
+
+<h2>Before and after</h2>
+<p>The bone comes from computed tomography. The server keeps it together with everything that was cut away; the viewer
+receives only the blocks of surface that changed. Cut faces have a colour of their own.</p>
+<div class=pair>{picture(folder, 'before.png', 'Before')}{picture(folder, 'after.png', 'After')}</div>
+
+<h2>The cuts from near</h2>
+<div class=pair>{picture(folder, 'hole.png', 'The drilled hole')}{picture(folder, 'window.png', 'The window made with a round burr')}</div>
+{picture(folder, 'during.png', 'At work: the tool where the bone lets it be, as the viewer showed it', wide=True)}
+
+<h2>Force, feed and depth</h2>
+<p>Pushing harder drills faster, and denser bone takes more force: when the tool meets the outer table of the skull the
+force rises, in the spongy layer below it falls, at the inner table it rises again, and when that gives way the tool
+plunges until the hand reacts. <b>Physical</b> force is what the bone does to the tool; <b>rendered</b> force is what a
+device would put on the hand, scaled to what the device can do. Shaded: the tool was cutting.</p>
+{picture(folder, 'force_depth.png', 'Force, feed and depth over time; force over depth for each tool', wide=True)}
+<table><tr><th>tool</th><th class=n>deepest, mm</th><th class=n>cutting, s</th><th class=n>mean force, N</th>
+<th class=n>peak force, N</th><th class=n>peak rendered, N</th></tr>{site_rows(numbers)}</table>
+
+<h2>Sound</h2>
+<p>The sound is made from the same cutting states: its pitch follows the spindle and drops under load, its level and
+colour follow how much bone of what density is being cut.</p>
+<audio controls preload="none" src="sound.wav"></audio>
+{picture(folder, 'spectrogram.png', 'Level and spectrogram of the sound', wide=True)}
+
+<h2>How quickly everyone learns of a cut</h2>
+<table><tr><th>latency</th><th class=n>median</th><th class=n>99 %</th><th class=n>events</th></tr>{latency_rows(numbers)}</table>
+<p class=lead>Measured on {text(machine['processor'])}, {machine['cores']} cores, with all programs{
+', the software renderer' if numbers.get('virtual_screen') else ''} and this report's recording on the same machine.</p>
+
+<h2>Everything else</h2>
+<p>Field hash of the server: <code>{text((agreement['field_hash_server'] or '–')[:16])}…</code>, of the haptic client:
+<code>{text((agreement['field_hash_haptic'] or '–')[:16])}…</code>. The complete numbers are in
+<a href="session.json">session.json</a>; the 1 kHz record is <a href="session.csv">session.csv</a>.</p>
+{program_tables(numbers)}
+<details><summary>What the surgeon was told to do</summary><pre>{text(json.dumps(numbers['plan'], indent=2))}</pre></details>
+</main></body></html>
+"""
+    (folder / "report.html").write_text(page, encoding="utf-8")

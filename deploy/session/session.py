@@ -1,0 +1,249 @@
+"""One session of all programs on this machine: starts them, lets the simulated surgeon work, ends them in order."""
+import json
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+
+import record
+from processes import Failure, Household, has_sound_card, start_screen
+
+ROOT = Path(__file__).resolve().parents[2]
+SURFACE_PATIENCE_S = 120.0
+QUIET_PATIENCE_S = 60.0
+
+
+class Viewer:
+    """osteon-viewer, driven line by line over its standard input."""
+
+    def __init__(self, household, child):
+        self._household, self._child = household, child
+
+    def do(self, command, patience_s=30.0):
+        self._child.say(command)
+        deadline = time.monotonic() + patience_s
+        answer = None
+        while answer is None:
+            answer = self._child.next_line(0.2)
+            if answer is None:
+                self._household.check()
+                if time.monotonic() > deadline:
+                    raise Failure(f"osteon-viewer did not answer '{command}' within {patience_s:.0f} s; its last lines:",
+                                  self._child.last_words())
+        if not answer.startswith("ok"):
+            raise Failure(f"osteon-viewer could not '{command}': {answer}")
+        return answer
+
+    def wait_for_surface(self):
+        self.do("wait surface", SURFACE_PATIENCE_S)
+
+    def finish(self, status_file):
+        self.do(f"status {status_file}")
+        self._child.may_end = True
+        self.do("quit")
+
+
+class Session:
+    """What one session needs; `say` gets its live status. Results lie in `out`."""
+
+    def __init__(self, programs: Path, case: Path, plan, out: Path, say=print, pictures=True, late_viewer=False,
+                 size="1280x720"):
+        self.programs, self.case, self.plan, self.out, self.say = programs, case, plan, out, say
+        self.pictures, self.late_viewer, self.size = pictures, late_viewer, size
+        self.started = time.monotonic()
+        self.info = case_info(programs, case)
+
+    def run(self):
+        """Runs it and returns its numbers; raises Failure."""
+        self.out.mkdir(parents=True, exist_ok=True)
+        plan_file = self.out / "plan.json"
+        plan_file.write_text(json.dumps(self.plan, indent=2) + "\n", encoding="utf-8")
+        with Household(self.out / "logs") as household:
+            self.household = household
+            self.screen, where = start_screen(household, self.size)
+            self.say(f"Picture: {where}.")
+            address = self._start_server()
+            viewer = self._start_viewer(address, "osteon-viewer", "--frame-log", self.out / "frames.csv",
+                                        "--summary", self.out / "viewer.json")
+            self._start_audio(address)
+            viewer.wait_for_surface()
+            if self.pictures:
+                viewer.do(self._overview())
+                viewer.do(f"screenshot {self.out / 'before.png'}")
+            self._work(viewer, address, plan_file)
+            self._last_pictures(viewer)
+            if self.late_viewer:
+                late = self._start_viewer(address, "late viewer")
+                late.wait_for_surface()
+                late.finish(self.out / "late_viewer_status.json")
+            viewer.finish(self.out / "viewer_status.json")
+            codes = self._end_all()
+        return self._numbers(codes)
+
+    def _start_server(self):
+        address_file = self.out / "logs" / "address"
+        address_file.parent.mkdir(exist_ok=True)
+        address_file.unlink(missing_ok=True)
+        self.household.start("osteon-server", [
+            self.programs / "osteon-server", "--case", self.case, "--listen", "127.0.0.1:0",
+            "--address-file", address_file, "--summary", self.out / "server.json"])
+        address = self.household.wait_for_file(address_file, "osteon-server", patience_s=60.0)
+        self.say(f"Server: {self.case.name} at {address}.")
+        return address
+
+    def _start_viewer(self, address, name, *options):
+        child = self.household.start(name, [self.programs / "osteon-viewer", "--server", address, "--size", self.size,
+                                            "--script", "-", *options], self.screen, takes_input=True)
+        return Viewer(self.household, child)
+
+    def _overview(self):
+        """The camera command for the whole bone, from the side where the work will be."""
+        box = self.info["bounds_mm"]
+        low, high = np.array(box["min"]), np.array(box["max"])
+        entry = next((step["entry"] for step in self.plan["steps"] if "toward" in step.get("entry", {})), None)
+        if entry is None:
+            return "look overview"
+        # A little from the front, so that one sees what one looks at.
+        eye_side = unit(unit(np.array(entry["toward"], dtype=float)) + np.array([0.0, -0.5, 0.0]))
+        up = np.array([0.0, 0.0, 1.0]) if abs(eye_side[2]) < 0.95 else np.array([0.0, -1.0, 0.0])
+        centre = 0.5 * (low + high)
+        return look(centre, centre + 1.55 * float(np.linalg.norm(high - low)) * eye_side, up)
+
+    def _start_audio(self, address):
+        command = [self.programs / "osteon-audio", "--server", address, "--wav", self.out / "sound.wav",
+                   "--state-log", self.out / "states.csv", "--summary", self.out / "audio.json", "--output", "pulse"]
+        if has_sound_card():
+            self.say("Sound: your sound card.")
+        else:
+            command = [ROOT / "deploy/with-null-sink", *command]
+            self.say("Sound: a PulseAudio sink without a card, since there is no sound card; it is recorded.")
+        self.household.start("osteon-audio", command)
+
+    def _work(self, viewer, address, plan_file):
+        """The surgeon's work: a status line every second, the camera follows the tool."""
+        cache = ROOT / "build" / "case-cache"
+        cache.mkdir(parents=True, exist_ok=True)
+        haptic = self.household.start("osteon-haptic", [
+            self.programs / "osteon-haptic", "--server", address, "--plan", plan_file, "--device", "simulated",
+            "--session-log", self.out / "session.csv", "--cut-log", self.out / "cuts.csv",
+            "--summary", self.out / "haptic.json", "--cache", cache, "--status", *self.haptic_options])
+        haptic.may_end = True
+        began = time.monotonic()
+        cutting_lines, photographed = 0, False
+        while haptic.exit_code is None:
+            self.household.check()
+            for line in haptic.new_lines():
+                self.say(f"{time.monotonic() - self.started:5.0f} s  {line}")
+                cutting_lines += "cutting" in line
+            if self.pictures and cutting_lines >= 2 and not photographed:
+                viewer.do("look tool 70")
+                viewer.do(f"screenshot {self.out / 'during.png'}")
+                photographed = True
+            elif self.pictures and photographed:
+                viewer.do("look tool 70")
+            time.sleep(0.2)
+        for line in haptic.new_lines():
+            self.say(f"{time.monotonic() - self.started:5.0f} s  {line}")
+        if haptic.exit_code != 0:
+            raise self.household.died(haptic)
+        self.worked_s = time.monotonic() - began
+        if self.pictures and not photographed:
+            viewer.do(f"screenshot {self.out / 'during.png'}")
+
+    def _last_pictures(self, viewer):
+        cuts = record.read_table(self.out / "cuts.csv")
+        if len(cuts["room_seq"]) > 0:
+            viewer.do(f"wait seq {int(cuts['room_seq'].max())}", QUIET_PATIENCE_S)
+        if not self.pictures:
+            return
+        viewer.do("tool off")
+        sites = record.sites(record.read_table(self.out / "session.csv"))
+        for site, name in zip(sites, ("hole.png", "window.png")):
+            viewer.do(close_up(site, sites[0]))
+            viewer.do(f"screenshot {self.out / name}")
+        viewer.do(self._overview())
+        viewer.do(f"screenshot {self.out / 'after.png'}")
+
+    def _end_all(self):
+        """Ends the programs, clients first; every one must have ended cleanly."""
+        codes = {}
+        order = ("osteon-haptic", "late viewer", "osteon-viewer", "osteon-audio", "osteon-server")
+        children = {child.name: child for child in self.household.children}
+        for name in (name for name in order if name in children):
+            child = children[name]
+            codes[name] = child.wait(20.0) if child.may_end else None
+            if codes[name] is None:
+                codes[name] = child.end()
+            child.may_end = True
+            if codes[name] != 0:
+                raise self.household.died(child)
+        return codes
+
+    def _numbers(self, codes):
+        summaries = {name: record.read_json(self.out / f"{name}.json") for name in ("server", "haptic", "viewer", "audio")}
+        session = record.read_table(self.out / "session.csv")
+        sites = record.sites(session)
+        statuses = [record.read_json(file) for file in sorted(self.out.glob("*viewer_status.json"))]
+        numbers = {
+            "device": "simulated",
+            "machine": record.machine(),
+            "case": self.info,
+            "seconds_of_work": round(self.worked_s, 1),
+            "latency_ms": record.latencies(self.out),
+            "cut_sites": [{key: rounded(value) for key, value in site.items() if key not in ("first", "last")}
+                          for site in sites],
+            "exit_codes": codes,
+            "mesh_hashes": [status.get("scene_mesh_hash") for status in statuses],
+            "programs": summaries,
+            "plan": self.plan,
+        }
+        numbers["agreement"] = agreement(numbers)
+        (self.out / "session.json").write_text(json.dumps(numbers, indent=2) + "\n", encoding="utf-8")
+        return numbers
+
+
+def rounded(value):
+    if isinstance(value, np.ndarray):
+        return [round(float(x), 3) for x in value]
+    return round(value, 4) if isinstance(value, float) else value
+
+
+def unit(vector):
+    return vector / max(1e-9, float(np.linalg.norm(vector)))
+
+
+def look(target, eye, up):
+    return "look at {} from {} up {}".format(*(" ".join(f"{v:.3f}" for v in point) for point in (target, eye, up)))
+
+
+def close_up(site, hole):
+    """The camera command for a look at a site from outside, along the first hole's axis and a little from the side, so
+    that walls can be seen."""
+    axis = unit(hole["deepest_mm"] - hole["entry_mm"])
+    target = hole["entry_mm"] if site is hole else site["centre_mm"]
+    aside = np.cross(axis, [0.0, 0.0, 1.0])
+    aside = unit(aside) if np.linalg.norm(aside) > 0.1 else np.array([1.0, 0.0, 0.0])
+    return look(target, target - 42.0 * axis + 14.0 * aside, np.cross(aside, axis))
+
+
+def case_info(programs, case):
+    """What the case says of itself; Failure with the importer's sentence for one that cannot be read."""
+    result = subprocess.run([programs / "osteon-import", "info", case, "--json"], capture_output=True, text=True,
+                            check=False)
+    if result.returncode != 0:
+        raise Failure(result.stderr.strip().splitlines()[-1] if result.stderr.strip() else f"cannot read {case}")
+    return json.loads(result.stdout)
+
+
+def agreement(numbers):
+    """Whether everyone held the same bone at the end, from what each program says of itself."""
+    programs, meshes = numbers["programs"], numbers["mesh_hashes"]
+    server, haptic = programs["server"].get("field_hash"), programs["haptic"].get("field_hash")
+    return {
+        "field_hash_server": server,
+        "field_hash_haptic": haptic,
+        "field_hash_equal": bool(server) and server == haptic,
+        # A viewer that saw every change, against one that came late.
+        "mesh_differences": sum(mesh != meshes[0] for mesh in meshes),
+    }

@@ -1,0 +1,148 @@
+"""The session's own reckoning and housekeeping: what the demo's report and the figures rest on."""
+import os
+import struct
+import sys
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "deploy/session"))
+
+import numpy as np  # noqa: E402  (the path above comes first)
+
+import record  # noqa: E402
+import session  # noqa: E402
+from processes import Failure, Household  # noqa: E402
+
+MS = 1_000_000
+
+
+class Latencies(unittest.TestCase):
+    def test_a_cut_is_seen_with_the_first_frame_that_contains_it(self):
+        cuts = {"room_seq": np.array([1, 2, 3]), "closed_mono_ns": np.array([0, 10, 20]) * MS}
+        frames = {"room_seq": np.array([0, 2, 3]), "rendered_mono_ns": np.array([5, 40, 70]) * MS}
+        np.testing.assert_allclose(record.after_cut_ms(cuts, frames, "rendered_mono_ns"), [40, 30, 50])
+
+    def test_a_cut_that_no_frame_contains_is_not_counted(self):
+        cuts = {"room_seq": np.array([1, 9]), "closed_mono_ns": np.array([0, 10]) * MS}
+        frames = {"room_seq": np.array([1]), "rendered_mono_ns": np.array([7]) * MS}
+        np.testing.assert_allclose(record.after_cut_ms(cuts, frames, "rendered_mono_ns"), [7])
+
+    def test_a_state_is_timed_from_its_first_row(self):
+        rows = {"state_seq": np.array([4, 4, 5]), "mono_ns": np.array([1, 2, 3]) * MS}
+        states = {"state_seq": np.array([4, 5, 6]), "sounded_mono_ns": np.array([11, 23, 30]) * MS}
+        np.testing.assert_allclose(record.after_state_ms(rows, states, "sounded_mono_ns"), [10, 20])
+
+    def test_nothing_measured_is_not_zero(self):
+        self.assertIsNone(record.spread([])["p50"])
+
+
+class Tables(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+
+    def file(self, name, content):
+        path = Path(self.folder.name, name)
+        path.write_bytes(content)
+        return path
+
+    def test_a_line_cut_short_is_left_out(self):
+        table = record.read_table(self.file("a.csv", b"n,x_mm,tool\n1,0.5,drill\n2,1.5,burr\n3,2"))
+        self.assertEqual(table["n"].tolist(), [1, 2])
+        self.assertEqual(table["x_mm"].tolist(), [0.5, 1.5])
+        self.assertEqual(table["tool"].tolist(), ["drill", "burr"])
+
+    def test_missing_and_empty_files_are_named(self):
+        with self.assertRaisesRegex(Failure, "cuts.csv"):
+            record.read_table(Path(self.folder.name, "cuts.csv"))
+        with self.assertRaisesRegex(Failure, "b.json is not JSON"):
+            record.read_json(self.file("b.json", b"{"))
+
+    def test_sound_of_every_width_reads_the_same(self):
+        wave = np.array([0.0, 0.5, -0.5, 0.25])
+        whole = {16: (wave * 2 ** 15).astype("<i2").tobytes(), 32: (wave * 2 ** 31).astype("<i4").tobytes(),
+                 24: b"".join(int(x * 2 ** 23).to_bytes(3, "little", signed=True) for x in wave)}
+        kinds = [(1, bits, data) for bits, data in whole.items()] + [(3, 32, wave.astype("<f4").tobytes())]
+        for kind, bits, data in kinds:
+            head = struct.pack("<HHIIHH", kind, 1, 48000, 48000 * bits // 8, bits // 8, bits)
+            content = (b"RIFF" + struct.pack("<I", 36 + len(data)) + b"WAVEfmt " + struct.pack("<I", 16) + head +
+                       b"data" + struct.pack("<I", len(data)) + data)
+            rate, samples = record.read_wav(self.file("s.wav", content))
+            self.assertEqual(rate, 48000)
+            np.testing.assert_allclose(samples, wave, atol=1e-6)
+
+
+class Agreement(unittest.TestCase):
+    @staticmethod
+    def of(server, haptic, meshes):
+        return session.agreement({"programs": {"server": {"field_hash": server}, "haptic": {"field_hash": haptic}},
+                                  "mesh_hashes": meshes})
+
+    def test_differences_are_seen(self):
+        self.assertTrue(self.of("a", "a", ["m", "m"])["field_hash_equal"])
+        self.assertFalse(self.of("a", "b", [])["field_hash_equal"])
+        self.assertFalse(self.of(None, None, [])["field_hash_equal"])
+        self.assertEqual(self.of("a", "a", ["m", "n"])["mesh_differences"], 1)
+
+
+class Housekeeping(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+
+    def test_leaving_ends_every_child(self):
+        with Household(Path(self.folder.name)) as household:
+            children = [household.start(f"sleeper-{i}", ["sleep", "60"]) for i in range(3)]
+            household.check()
+        self.assertTrue(all(child.exit_code is not None for child in children))
+
+    def test_a_dead_child_is_reported_with_its_last_words(self):
+        with Household(Path(self.folder.name)) as household:
+            other = household.start("other", ["sleep", "60"])
+            child = household.start("teller", ["sh", "-c", "echo it broke >&2; exit 3"])
+            child.wait(10.0)
+            with self.assertRaisesRegex(Failure, "teller ended with 3") as caught:
+                household.check()
+            self.assertIn("it broke", caught.exception.detail)
+        self.assertIsNotNone(other.exit_code)
+
+    def test_a_child_that_ignores_sigterm_is_killed(self):
+        with Household(Path(self.folder.name)) as household:
+            child = household.start("deaf", ["sh", "-c", "trap '' TERM; echo ready; while :; do sleep 0.1; done"])
+            self.assertEqual(child.next_line(10.0), "ready")
+            began = time.monotonic()
+            self.assertEqual(child.end(patience_s=0.3), -9)
+            self.assertLess(time.monotonic() - began, 10.0)
+
+    def test_children_do_not_outlive_their_starter(self):
+        code = ("import sys, time; from pathlib import Path; from processes import Household\n"
+                f"child = Household(Path({self.folder.name!r})).start('sleeper', ['sleep', '60'])\n"
+                "print(child._process.pid, flush=True); time.sleep(60)")
+        with Household(Path(self.folder.name)) as household:
+            environment = {**os.environ, "PYTHONPATH": str(ROOT / "deploy/session")}
+            starter = household.start("starter", [sys.executable, "-B", "-c", code], environment)
+            grandchild = int(starter.next_line(20.0))
+            self.wait_until(lambda: Path(f"/proc/{grandchild}/comm").read_text() == "sleep\n")
+            starter._process.kill()
+            starter.wait(10.0)
+        self.wait_until(lambda: self.has_ended(grandchild))
+
+    @staticmethod
+    def has_ended(pid):
+        try:
+            return " Z " in Path(f"/proc/{pid}/stat").read_text()  # a zombie has ended, whoever its parent is now
+        except OSError:
+            return True
+
+    def wait_until(self, condition):
+        deadline = time.monotonic() + 10.0
+        while not condition():
+            self.assertLess(time.monotonic(), deadline)
+            time.sleep(0.01)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
