@@ -285,8 +285,7 @@ std::vector<Coord> SweptTool::leaves() const {
         }
   }
   std::ranges::sort(found);
-  const auto [first, last] = std::ranges::unique(found);
-  found.erase(first, last);
+  found.erase(std::unique(found.begin(), found.end()), found.end());
   return found;
 }
 

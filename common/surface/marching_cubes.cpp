@@ -19,7 +19,7 @@ int edge_between(const MarchingCubesTable& table, int a, int b) {
 constexpr int kFaces[6][4] = {{0, 1, 3, 2}, {4, 6, 7, 5}, {0, 4, 5, 1}, {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 5, 7, 3}};
 
 // The surface cuts each face along segments. Around every run of solid corners one goes from the edge where the run
-// ends to the edge where it begins; each crossed edge ends a segment on one of its faces and begins one on the other.
+// begins to the edge where it ends; each crossed edge ends a segment on one of its faces and begins one on the other.
 std::array<int, kCellEdges> next_edges(const MarchingCubesTable& table, int solid) {
   std::array<int, kCellEdges> next;
   next.fill(-1);
@@ -31,7 +31,7 @@ std::array<int, kCellEdges> next_edges(const MarchingCubesTable& table, int soli
       while (is_solid(face[(end + 1) % 4])) end = (end + 1) % 4;
       const int begins = edge_between(table, face[i], face[(i + 1) % 4]);
       const int ends = edge_between(table, face[end], face[(end + 1) % 4]);
-      next[static_cast<std::size_t>(ends)] = begins;
+      next[static_cast<std::size_t>(begins)] = ends;
     }
   return next;
 }

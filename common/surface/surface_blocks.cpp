@@ -29,7 +29,7 @@ std::vector<BlockKey> SurfaceBlocks::touch(int level, const std::vector<Coord>& 
   std::set<BlockKey> stale;
   for (const Coord origin : changed_leaves) {
     const CoordBox leaf{origin, origin + Coord{kLeafSize - 1, kLeafSize - 1, kLeafSize - 1}};
-    for (int l = level; l < kLevels; ++l) {
+    for (int l = 0; l < kLevels; ++l) {
       const CoordBox blocks = blocks_around(at_level(leaf, level, l));
       for (std::int32_t x = blocks.min.x; x <= blocks.max.x; ++x)
         for (std::int32_t y = blocks.min.y; y <= blocks.max.y; ++y)
@@ -37,8 +37,8 @@ std::vector<BlockKey> SurfaceBlocks::touch(int level, const std::vector<Coord>& 
             const BlockKey key{body_, l, {x, y, z}};
             if (l == 0) {
               stale.insert(key);
-            } else if (l > level) {
-              if (fine_.contains(key)) stale.insert(key);  // drawn finer, and its bone changed
+            } else if (l != level) {
+              if (fine_.contains(key)) stale.insert(key);  // drawn finer or coarser, and its samples changed
             } else {
               stale.insert(key);
               // A block that is drawn from now on takes its cells away from the coarser ones.

@@ -1,0 +1,64 @@
+#include "tests/support/scenes/bones.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/core/check.hpp"
+#include "common/field/kernel.hpp"
+
+namespace osteon::test {
+
+Case make_bone(const Box& extent, double pitch_mm, const std::function<double(const Vec3&)>& distance_mm,
+               const std::function<double(const Vec3&)>& density_g_cm3) {
+  const CoordBox box = covering_samples(extent.grown((kBandVoxels + 1) * pitch_mm), pitch_mm);
+  DenseVolume<float> surface(box, 0.0f), density(box, 0.0f);
+  for (std::int32_t x = box.min.x; x <= box.max.x; ++x)
+    for (std::int32_t y = box.min.y; y <= box.max.y; ++y)
+      for (std::int32_t z = box.min.z; z <= box.max.z; ++z) {
+        const Vec3 p = position_mm({x, y, z}, pitch_mm);
+        surface.at({x, y, z}) = static_cast<float>(distance_mm(p));
+        density.at({x, y, z}) = static_cast<float>(density_g_cm3(p));
+      }
+  CaseInfo info{.title = "Test bone", .source = "closed form", .pitch_mm = pitch_mm, .calibration = {}, .threshold_hu = 0.0};
+  auto built = Case::build(info, surface, density);
+  OSTEON_CHECK(built.has_value());
+  return *built;
+}
+
+Case layered_block(const std::vector<Layer>& layers, double width_mm, double pitch_mm) {
+  double thickness = 0.0;
+  for (const Layer& layer : layers) thickness += layer.thickness_mm;
+  const Vec3 half{0.5 * width_mm, 0.5 * width_mm, 0.5 * thickness};
+  const Vec3 centre{0.0, 0.0, -0.5 * thickness};
+  const auto distance = [=](const Vec3& p) {
+    const Vec3 q = (p - centre).cwiseAbs() - half;
+    return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0);
+  };
+  const auto density = [=](const Vec3& p) {
+    double depth = -p.z();
+    for (const Layer& layer : layers) {
+      depth -= layer.thickness_mm;
+      if (depth < 0.0) return layer.density_g_cm3;
+    }
+    return layers.back().density_g_cm3;
+  };
+  return make_bone({centre - half, centre + half}, pitch_mm, distance, density);
+}
+
+Case plain_block(double width_mm, double thickness_mm, double pitch_mm, double density_g_cm3) {
+  return layered_block({{thickness_mm, density_g_cm3}}, width_mm, pitch_mm);
+}
+
+Cut straight_cut(const Tool& tool, const Vec3& from_tip_mm, const Vec3& to_tip_mm, const Vec3& axis, std::uint64_t author_seq) {
+  return {.author = {1},
+          .author_seq = author_seq,
+          .lease_epoch = 1,
+          .body = {},
+          .tool = tool.hash(),
+          .shape = tool.cut_shape(),
+          .level = tool.cut_level,
+          .path = {quantise(pose_along(from_tip_mm, axis)), quantise(pose_along(to_tip_mm, axis))},
+          .spindle_rpm = static_cast<std::uint32_t>(tool.spindle_rpm)};
+}
+
+}  // namespace osteon::test

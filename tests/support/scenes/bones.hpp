@@ -1,0 +1,31 @@
+// Bones with a closed form, for tests, benchmarks and figures: built from their exact distance and density.
+#pragma once
+#include <functional>
+#include <vector>
+
+#include "common/field/cut.hpp"
+#include "common/volume/case.hpp"
+
+namespace osteon::test {
+
+// Any bone from its signed distance (mm, negative inside) and density (g/cm³) over a box.
+[[nodiscard]] Case make_bone(const Box& extent, double pitch_mm, const std::function<double(const Vec3&)>& distance_mm,
+                             const std::function<double(const Vec3&)>& density_g_cm3);
+
+struct Layer {
+  double thickness_mm;
+  double density_g_cm3;
+};
+
+// Layers stacked along z below z = 0, each `width_mm` square about the z axis. A density sample on the face between two
+// layers belongs to the lower one.
+[[nodiscard]] Case layered_block(const std::vector<Layer>& layers, double width_mm, double pitch_mm);
+
+// One density throughout, z from -thickness to 0.
+[[nodiscard]] Case plain_block(double width_mm, double thickness_mm, double pitch_mm, double density_g_cm3 = 1.9);
+
+// A drill or burr path as one cut, poses with the tool's axis along `axis`.
+[[nodiscard]] Cut straight_cut(const Tool& tool, const Vec3& from_tip_mm, const Vec3& to_tip_mm, const Vec3& axis,
+                               std::uint64_t author_seq = 1);
+
+}  // namespace osteon::test

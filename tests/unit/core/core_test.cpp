@@ -1,0 +1,56 @@
+#include <gtest/gtest.h>
+
+#include "common/core/check.hpp"
+#include "common/core/digest.hpp"
+#include "common/core/id.hpp"
+#include "common/core/units.hpp"
+
+namespace osteon {
+namespace {
+
+std::string sha256(std::string_view text) {
+  Hasher hasher;
+  hasher.bytes(std::as_bytes(std::span(text)));
+  return to_hex(hasher.finish());
+}
+
+// FIPS 180-2, appendix B.
+TEST(Digest, IsSha256) {
+  EXPECT_EQ(sha256("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(sha256(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+}
+
+TEST(Digest, ComesBackFromHexadecimal) {
+  const std::string hex = sha256("bone");
+  ASSERT_TRUE(digest_from_hex(hex));
+  EXPECT_EQ(to_hex(*digest_from_hex(hex)), hex);
+  EXPECT_FALSE(digest_from_hex(hex.substr(1)));
+  EXPECT_FALSE(digest_from_hex("x" + hex.substr(1)));
+}
+
+TEST(Digest, TextsDoNotRunIntoEachOther) {
+  const auto of = [](std::string_view a, std::string_view b) {
+    Hasher hasher;
+    hasher.text(a);
+    hasher.text(b);
+    return hasher.finish();
+  };
+  EXPECT_NE(of("ab", "c"), of("a", "bc"));
+}
+
+TEST(Id, IsNullWhenZero) {
+  EXPECT_FALSE(AuthorId{});
+  EXPECT_TRUE(AuthorId{3});
+  EXPECT_LT(AuthorId{3}, AuthorId{4});
+}
+
+TEST(Units, AddAndCompareWithinTheirKind) {
+  EXPECT_EQ(1.5_mm + 0.5_mm, 2.0_mm);
+  EXPECT_LT(1.0_N, 2.0_N);
+  static_assert(!std::is_convertible_v<double, Newtons> && !std::is_convertible_v<Millimetres, Newtons>);
+}
+
+TEST(CheckDeathTest, SaysWhichPromiseWasBroken) { EXPECT_DEATH(OSTEON_CHECK(1 + 1 == 3), "broken promise: 1 \\+ 1 == 3"); }
+
+}  // namespace
+}  // namespace osteon

@@ -1,0 +1,124 @@
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <thread>
+
+#include "common/runtime/event_queue.hpp"
+#include "common/runtime/files.hpp"
+#include "common/runtime/latest_value.hpp"
+#include "common/runtime/log.hpp"
+#include "common/runtime/periodic.hpp"
+#include "common/runtime/stop_signal.hpp"
+#include "tests/support/temp_dir.hpp"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct Pair {
+  std::uint64_t a = 0, b = 0;
+};
+
+TEST(LatestValue, TheReaderSeesOnlyWholeValuesAndAtLastTheNewest) {
+  LatestValue<Pair> latest;
+  constexpr std::uint64_t kLast = 200'000;
+  std::jthread writer([&] {
+    for (std::uint64_t i = 1; i <= kLast; ++i) latest.store({i, ~i});
+  });
+  std::uint64_t previous = 0;
+  while (previous < kLast) {
+    if (!latest.refresh()) continue;
+    const Pair seen = latest.value();
+    ASSERT_EQ(seen.b, ~seen.a);
+    ASSERT_GT(seen.a, previous);
+    previous = seen.a;
+  }
+  EXPECT_FALSE(latest.refresh());
+}
+
+TEST(EventQueue, KeepsOrderAndLosesNothingWhenPushIsTriedAgain) {
+  EventQueue<int, 64> queue;
+  constexpr int kLast = 200'000;
+  std::jthread producer([&] {
+    for (int i = 0; i < kLast;)
+      if (queue.try_push(i)) ++i;
+  });
+  int value = 0;
+  for (int expected = 0; expected < kLast;) {
+    if (!queue.try_pop(value)) continue;
+    ASSERT_EQ(value, expected++);
+  }
+  EXPECT_FALSE(queue.try_pop(value));
+}
+
+TEST(EventQueue, RefusesWhenFull) {
+  EventQueue<int, 4> queue;
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(queue.try_push(i));
+  EXPECT_FALSE(queue.try_push(9));
+  EXPECT_EQ(queue.size(), 4u);
+}
+
+TEST(DurationHistogram, PercentilesAreRightToThreePerCent) {
+  DurationHistogram histogram;
+  for (int us = 1; us <= 10'000; ++us) histogram.record(std::chrono::microseconds(us));
+  for (const double percent : {1.0, 50.0, 99.0, 99.9}) EXPECT_NEAR(histogram.percentile_us(percent), 100.0 * percent, 3.0 * percent);
+  EXPECT_DOUBLE_EQ(histogram.max_us(), 10'000.0);
+  histogram.record(-5ns);
+  EXPECT_EQ(histogram.count(), 10'001u);
+  EXPECT_EQ(DurationHistogram{}.percentile_us(50), 0.0);
+}
+
+TEST(PeriodicTimer, NeverTicksEarlyAndCountsWhatItMissed) {
+  TickStats stats;
+  PeriodicTimer timer(2ms);
+  const auto start = std::chrono::steady_clock::now();
+  int periods = 0;
+  for (int i = 0; i < 20; ++i) {
+    periods += timer.wait(stats);
+    if (i == 10) std::this_thread::sleep_for(9ms);  // a stall longer than four periods
+    timer.done(stats);
+  }
+  EXPECT_GE(std::chrono::steady_clock::now() - start, 2ms * periods);
+  EXPECT_GE(stats.missed, 3u);
+  EXPECT_EQ(stats.lateness.count(), 20u);
+  EXPECT_EQ(stats.work.count(), 20u);
+}
+
+TEST(StopSignal, IsRaisedBySigterm) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    StopSignal stop;
+    if (stop.requested()) ::_exit(2);
+    ::kill(::getpid(), SIGTERM);
+    ::_exit(stop.wait_for(10s) ? 0 : 3);
+  }
+  int status = -1;
+  ::waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+}
+
+TEST(Files, AreWrittenWholeAndReadBack) {
+  const test::TempDir temp;
+  ASSERT_TRUE(write_file(temp / "a", "first"));
+  ASSERT_TRUE(write_file(temp / "a", "second"));
+  EXPECT_EQ(*read_file(temp / "a"), "second");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp.path()), {}), 1);
+  const auto missing = read_file(temp / "b");
+  ASSERT_FALSE(missing);
+  EXPECT_NE(missing.error().message.find("b"), std::string::npos);
+  EXPECT_FALSE(write_file(temp / "no-folder" / "c", "x"));
+}
+
+TEST(Log, LinesHaveKeysAndQuotesWhereNeeded) {
+  log::open("runtime-test");
+  testing::internal::CaptureStderr();
+  log::warn("case_loaded", {{"path", "a b"}, {"voxels", 12}, {"pitch_mm", 0.5}, {"ok", true}});
+  const std::string line = testing::internal::GetCapturedStderr();
+  EXPECT_NE(line.find("warning runtime-test case_loaded path=\"a b\" voxels=12 pitch_mm=0.5 ok=true"), std::string::npos) << line;
+}
+
+}  // namespace
+}  // namespace osteon

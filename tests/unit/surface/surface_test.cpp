@@ -1,0 +1,258 @@
+#include <gtest/gtest.h>
+#include <vtkFlyingEdges3D.h>
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkPolyData.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <random>
+#include <set>
+
+#include "common/surface/surface_blocks.hpp"
+#include "common/volume/cut_field.hpp"
+#include "tests/support/scenes/bones.hpp"
+
+namespace osteon {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+using Point = std::array<float, 3>;
+
+// Blocks of one level that cover a box of ±`reach` blocks, from a distance in mm.
+template <class Distance>
+std::map<BlockKey, BlockPayload> blocks_of(Distance distance, double pitch, int reach) {
+  std::map<BlockKey, BlockPayload> blocks;
+  for (int x = -reach; x < reach; ++x)
+    for (int y = -reach; y < reach; ++y)
+      for (int z = -reach; z < reach; ++z) {
+        const BlockKey key{{}, 0, {x, y, z}};
+        const CoordBox box = block_samples(key);
+        std::vector<float> f;
+        for (std::int32_t i = box.min.x; i <= box.max.x; ++i)
+          for (std::int32_t j = box.min.y; j <= box.max.y; ++j)
+            for (std::int32_t k = box.min.z; k <= box.max.z; ++k) f.push_back(static_cast<float>(distance(position_mm({i, j, k}, pitch))));
+        blocks[key] = encode_block(f, f, 0, pitch);
+      }
+  return blocks;
+}
+
+double sphere(const Vec3& p) { return (p - Vec3{0.21, -0.13, 0.07}).norm() - 5.0; }
+
+struct Welded {
+  std::map<Point, int> points;
+  std::map<std::pair<int, int>, int> edges;  // directed
+  int triangles = 0;
+  double area = 0.0, volume = 0.0;
+};
+
+// Joins vertices only where their bits are equal: what makes the surface closed must be exact.
+Welded weld(const std::map<BlockKey, BlockPayload>& blocks, double pitch) {
+  Welded all;
+  for (const auto& [key, payload] : blocks) {
+    const auto mesh = decode_block(key, payload, level_pitch_mm(pitch, key.level));
+    EXPECT_TRUE(mesh);
+    for (const auto& t : mesh->triangles) {
+      int id[3];
+      Vec3 p[3];
+      for (int i = 0; i < 3; ++i) {
+        const Point& q = mesh->positions_mm[t[static_cast<std::size_t>(i)]];
+        id[i] = all.points.try_emplace(q, static_cast<int>(all.points.size())).first->second;
+        p[i] = {static_cast<double>(q[0]), static_cast<double>(q[1]), static_cast<double>(q[2])};
+      }
+      ++all.triangles;
+      all.area += 0.5 * (p[1] - p[0]).cross(p[2] - p[0]).norm();
+      all.volume += p[0].dot(p[1].cross(p[2])) / 6.0;
+      if (id[0] == id[1] || id[1] == id[2] || id[0] == id[2]) {
+        --all.triangles;  // shrunk to a line by quantisation; its edges cancel
+        continue;
+      }
+      for (int i = 0; i < 3; ++i) ++all.edges[{id[i], id[(i + 1) % 3]}];
+    }
+  }
+  return all;
+}
+
+TEST(MarchingCubes, ASphereAcrossBlocksIsOneClosedSurface) {
+  const double pitch = 0.4;
+  const Welded mesh = weld(blocks_of(sphere, pitch, 1), pitch);
+  for (const auto& [edge, times] : mesh.edges) {
+    const auto back = mesh.edges.find({edge.second, edge.first});
+    ASSERT_TRUE(back != mesh.edges.end() && back->second == times);
+  }
+  const int edges = static_cast<int>(mesh.edges.size()) / 2;
+  EXPECT_EQ(static_cast<int>(mesh.points.size()) - edges + mesh.triangles, 2);  // Euler characteristic of a sphere
+  EXPECT_NEAR(mesh.area, 4.0 * kPi * 25.0, 0.01 * 4.0 * kPi * 25.0);
+  // Positive: triangles are counter-clockwise seen from outside.
+  EXPECT_NEAR(mesh.volume, 4.0 / 3.0 * kPi * 125.0, 0.01 * 4.0 / 3.0 * kPi * 125.0);
+}
+
+TEST(MarchingCubes, NormalsPointOutOfTheBone) {
+  for (const auto& [key, payload] : blocks_of(sphere, 0.4, 1)) {
+    const Mesh mesh = *decode_block(key, payload, 0.4);
+    for (std::size_t v = 0; v < mesh.positions_mm.size(); ++v) {
+      const Point& p = mesh.positions_mm[v];
+      const Vec3 out = Vec3(p[0] - 0.21, p[1] + 0.13, p[2] - 0.07).normalized();
+      ASSERT_GT(out.dot(Vec3(mesh.normals[v][0], mesh.normals[v][1], mesh.normals[v][2])), 0.99);
+      ASSERT_EQ(mesh.cut_face[v], 0);
+    }
+  }
+}
+
+vtkIdType flying_edges_triangles(const std::vector<float>& values, int n) {
+  vtkNew<vtkImageData> image;
+  image->SetDimensions(n, n, n);
+  image->AllocateScalars(VTK_FLOAT, 1);
+  // VTK's x is fastest; which axis is called x does not change the count.
+  std::ranges::copy(values, static_cast<float*>(image->GetScalarPointer()));
+  vtkNew<vtkFlyingEdges3D> contour;
+  contour->SetInputData(image);
+  contour->SetValue(0, 0.0);
+  contour->Update();
+  return contour->GetOutput()->GetNumberOfPolys();
+}
+
+std::vector<float> inner_samples(const std::vector<float>& gathered) {
+  std::vector<float> inner;
+  for (int x = 1; x <= kBlockSamples; ++x)
+    for (int y = 1; y <= kBlockSamples; ++y)
+      for (int z = 1; z <= kBlockSamples; ++z)
+        inner.push_back(gathered[static_cast<std::size_t>((x * kBlockApron + y) * kBlockApron + z)]);
+  return inner;
+}
+
+TEST(MarchingCubes, HasAsManyTrianglesAsFlyingEdgesOnSmoothSurfaces) {
+  for (const double radius : {2.0, 3.3, 5.0}) {
+    std::vector<float> gathered;
+    for (int x = 0; x < kBlockApron; ++x)
+      for (int y = 0; y < kBlockApron; ++y)
+        for (int z = 0; z < kBlockApron; ++z)
+          gathered.push_back(static_cast<float>(std::hypot(x - 9.1, y - 8.7, z - 9.4) - radius));
+    const Mesh mesh = *decode_block({}, encode_block(gathered, gathered, 0, 1.0), 1.0);
+    EXPECT_EQ(static_cast<vtkIdType>(mesh.triangles.size()), flying_edges_triangles(inner_samples(gathered), kBlockSamples));
+  }
+}
+
+TEST(MarchingCubes, NoiseToo) {
+  std::mt19937 random(3);
+  std::normal_distribution<float> noise;
+  std::vector<float> gathered(static_cast<std::size_t>(kBlockApron * kBlockApron * kBlockApron));
+  for (float& v : gathered) v = noise(random);
+  const Mesh mesh = *decode_block({}, encode_block(gathered, gathered, 0, 1.0), 1.0);
+  // Every crossed edge has its vertex, however wild the field is.
+  std::size_t crossings = 0;
+  const std::vector<float> f = inner_samples(gathered);
+  const auto at = [&](int x, int y, int z) { return f[static_cast<std::size_t>((x * kBlockSamples + y) * kBlockSamples + z)] < 0.0f; };
+  for (int x = 0; x < kBlockSamples; ++x)
+    for (int y = 0; y < kBlockSamples; ++y)
+      for (int z = 0; z < kBlockSamples; ++z) {
+        crossings += x + 1 < kBlockSamples && at(x, y, z) != at(x + 1, y, z);
+        crossings += y + 1 < kBlockSamples && at(x, y, z) != at(x, y + 1, z);
+        crossings += z + 1 < kBlockSamples && at(x, y, z) != at(x, y, z + 1);
+      }
+  EXPECT_EQ(mesh.positions_mm.size(), crossings);
+}
+
+TEST(BlockCodec, RefusesBytesThatNoEncoderWrote) {
+  auto payload = blocks_of(sphere, 0.4, 1).begin()->second;
+  ASSERT_FALSE(payload.bytes.empty());
+  payload.bytes.pop_back();
+  EXPECT_FALSE(decode_block({}, payload, 0.4));
+  payload.bytes.resize(10);
+  EXPECT_FALSE(decode_block({}, payload, 0.4));
+}
+
+TEST(BlockCodec, LeavesOutCoveredCells) {
+  std::vector<float> plane;
+  for (int x = 0; x < kBlockApron; ++x)
+    for (int y = 0; y < kBlockApron; ++y)
+      for (int z = 0; z < kBlockApron; ++z) plane.push_back(static_cast<float>(z) - 7.5f);
+  const auto triangles = [&](CoveredGroups covered) { return decode_block({}, encode_block(plane, plane, covered, 1.0), 1.0)->triangles.size(); };
+  EXPECT_EQ(triangles(0), 512u);                                 // 16 · 16 cells, two triangles each
+  EXPECT_EQ(triangles(CoveredGroups{1} << 1), 512u - 2u * 16u);  // the group with cells z = 4 to 7 at x = y = 0
+  EXPECT_EQ(triangles(CoveredGroups{1} << 0), 512u);             // nothing crosses z = 0 to 3
+  EXPECT_EQ(triangles(~CoveredGroups{0}), 0u);
+}
+
+struct DrawnSurface {
+  CutField field;
+  SurfaceBlocks blocks{BodyId{}};
+
+  BlockPayload make(const BlockKey& key) const {
+    const CoordBox box = block_samples(key);
+    std::vector<float> solid(static_cast<std::size_t>(kBlockApron * kBlockApron * kBlockApron)), surface(solid.size());
+    field.gather_solid(key.level, box, solid);
+    field.gather_surface(key.level, box, surface);
+    return encode_block(solid, surface, blocks.covered(key), level_pitch_mm(field.bone().pitch_mm(), key.level));
+  }
+  std::map<BlockKey, BlockPayload> all() const {
+    std::map<BlockKey, BlockPayload> made;
+    const CoordBox b = field.bone().bounds_samples();
+    for (int x = (b.min.x >> 4) - 1; x <= (b.max.x >> 4) + 1; ++x)
+      for (int y = (b.min.y >> 4) - 1; y <= (b.max.y >> 4) + 1; ++y)
+        for (int z = (b.min.z >> 4) - 1; z <= (b.max.z >> 4) + 1; ++z) made[{{}, 0, {x, y, z}}] = make({{}, 0, {x, y, z}});
+    for (const BlockKey& key : blocks.fine_blocks()) made[key] = make(key);
+    return made;
+  }
+};
+
+TEST(SurfaceBlocks, NameEveryBlockThatACutChanges) {
+  DrawnSurface surface{CutField(test::plain_block(20.0, 10.0, 0.5), {})};
+  const Tool drill = *find_tool("drill-3.2"), burr = *find_tool("burr-round-5");
+  std::vector<Cut> cuts{test::straight_cut(drill, {1, 1, 1}, {1, 1, -4}, {0, 0, -1}),
+                        test::straight_cut(burr, {-6, 0, -1}, {4, 2, -1.5}, {0, 0, -1}),
+                        test::straight_cut(drill, {4, 4, 1}, {4, 4, -12}, {0, 0, -1}),
+                        test::straight_cut(burr, {3, 3, -1}, {5, 5, -1}, {0, 0, -1})};
+  cuts[2].level = 1;
+  cuts[3].level = 0;
+  for (const Cut& cut : cuts) {
+    const auto before = surface.all();
+    const CutReport report = surface.field.apply(cut);
+    const auto named = surface.blocks.touch(report.level, report.changed_leaves);
+    const std::set<BlockKey> stale(named.begin(), named.end());
+    EXPECT_EQ(stale.size(), named.size());
+    for (const auto& [key, payload] : surface.all()) {
+      const auto old = before.find(key);
+      if (old == before.end() ? !payload.bytes.empty() : old->second != payload) {
+        EXPECT_TRUE(stale.contains(key)) << key.level << ": " << key.index.x << ' ' << key.index.y << ' ' << key.index.z;
+      }
+    }
+  }
+}
+
+TEST(SurfaceBlocks, FineAndCoarseTogetherDrawEveryFaceOnce) {
+  DrawnSurface surface{CutField(test::plain_block(20.0, 10.0, 0.5), {})};
+  const Welded before = weld(surface.all(), 0.5);
+  const CutReport report = surface.field.apply(test::straight_cut(*find_tool("drill-3.2"), {1, 1, 1}, {1, 1, -14}, {0, 0, -1}));
+  (void)surface.blocks.touch(report.level, report.changed_leaves);
+  const Welded after = weld(surface.all(), 0.5);
+  // The hole's wall is won and its two mouths are lost. A fine block drawn twice or not at all would be off by its
+  // 2 mm by 2 mm of face; the rims, rounded by the pitch, by less than half of that.
+  const double wall = 2.0 * kPi * 1.6 * 10.0, mouths = 2.0 * kPi * 1.6 * 1.6;
+  EXPECT_NEAR(after.area - before.area, wall - mouths, 2.0);
+}
+
+TEST(SurfaceBlocks, CutFacesAreMarked) {
+  DrawnSurface surface{CutField(test::plain_block(20.0, 10.0, 0.5), {})};
+  const CutReport report = surface.field.apply(test::straight_cut(*find_tool("drill-3.2"), {1, 1, 1}, {1, 1, -14}, {0, 0, -1}));
+  (void)surface.blocks.touch(report.level, report.changed_leaves);
+  for (const auto& [key, payload] : surface.all()) {
+    const Mesh mesh = *decode_block(key, payload, level_pitch_mm(0.5, key.level));
+    for (std::size_t v = 0; v < mesh.positions_mm.size(); ++v) {
+      const Point& p = mesh.positions_mm[v];
+      const double from_axis = std::hypot(p[0] - 1.0f, p[1] - 1.0f);
+      if (p[2] < -1.0f && p[2] > -9.0f && from_axis < 3.0) {
+        ASSERT_EQ(mesh.cut_face[v], 1) << from_axis << ' ' << p[2];
+      }
+      if (from_axis > 3.0) {
+        ASSERT_EQ(mesh.cut_face[v], 0);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace osteon

@@ -1,0 +1,87 @@
+#include "common/wire/convert.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+
+namespace osteon {
+namespace {
+
+Cut sample_cut() {
+  const Tool drill = *find_tool("drill-3.2");
+  return {.author = {7}, .author_seq = 12, .lease_epoch = 3, .body = {2}, .tool = drill.hash(), .shape = drill.cut_shape(), .level = 2,
+          .path = {quantise(pose_along({1, 2, 3}, {0, 0.3, -1})), quantise(pose_along({-100.5, 2, 3}, {0, 0.3, -1}))},
+          .spindle_rpm = 1000};
+}
+
+TEST(Wire, ACutComesBackByteForByte) {
+  v1::Cut parsed;
+  ASSERT_TRUE(parsed.ParseFromString(wire::to_wire(sample_cut()).SerializeAsString()));
+  const auto back = wire::from_wire(parsed);
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(*back, sample_cut());
+}
+
+TEST(Wire, ALeafComesBackByteForByte) {
+  FieldLeaf leaf{{1}, 2, {-8, 16, 24}, std::vector<std::int16_t>(kLeafVoxels)};
+  for (std::size_t i = 0; i < leaf.values.size(); ++i) leaf.values[i] = static_cast<std::int16_t>(static_cast<int>(i) * 17 - 4096);
+  const auto back = wire::from_wire(wire::to_wire(leaf));
+  ASSERT_TRUE(back);
+  EXPECT_EQ(*back, leaf);
+}
+
+TEST(Wire, AStateComesBack) {
+  CuttingState state;
+  state.author = {4};
+  state.state_seq = 99;
+  state.pose_bone_tool = pose_along({1, 2, 3}, {1, 0, 0});
+  state.tool_name = "burr-round-5";
+  state.spindle_rpm = 20000;
+  state.force_physical_N = {1, -2, 3};
+  state.phase = CuttingPhase::cutting;
+  const auto back = wire::from_wire(wire::to_wire(state));
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(back->state_seq, 99u);
+  EXPECT_EQ(back->tool_name, "burr-round-5");
+  EXPECT_EQ(back->phase, CuttingPhase::cutting);
+  EXPECT_EQ(back->force_physical_N, state.force_physical_N);
+  EXPECT_LT((back->pose_bone_tool.position_mm - state.pose_bone_tool.position_mm).norm(), 1e-9);
+}
+
+// Each change makes the cut one that no correct client sends; the message must name the field.
+TEST(Wire, RefusesBadCutsByTheNameOfTheField) {
+  const auto refused = [](const std::function<void(v1::Cut&)>& change, const std::string& field) {
+    v1::Cut cut = wire::to_wire(sample_cut());
+    change(cut);
+    const auto back = wire::from_wire(cut);
+    ASSERT_FALSE(back) << field;
+    EXPECT_NE(back.error().message.find(field), std::string::npos) << back.error().message;
+  };
+  refused([](v1::Cut& c) { c.set_tool_hash("short"); }, "tool_hash");
+  refused([](v1::Cut& c) { c.set_level(3); }, "level");
+  refused([](v1::Cut& c) { c.clear_path(); }, "path");
+  refused([](v1::Cut& c) { c.mutable_path(0)->add_position(4); }, "path");
+  refused([](v1::Cut& c) { c.mutable_path(0)->set_rotation(3, 0); }, "path");
+  refused([](v1::Cut& c) { c.mutable_path(1)->set_rotation(0, 40000); }, "path");
+  refused([](v1::Cut& c) { c.mutable_shape()->set_radius(0); }, "shape");
+  refused([](v1::Cut& c) { c.mutable_shape()->set_kind(v1::TOOL_KIND_UNSPECIFIED); }, "shape.kind");
+}
+
+TEST(Wire, RefusesPosesAndStatesThatAreNotNumbers) {
+  v1::CuttingState state = wire::to_wire(CuttingState{});
+  state.set_torque_n_mm(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_FALSE(wire::from_wire(state));
+  v1::Pose pose = wire::to_wire(Pose{});
+  pose.mutable_position_mm()->set_y(std::numeric_limits<double>::infinity());
+  EXPECT_FALSE(wire::from_wire(pose));
+  pose = wire::to_wire(Pose{});
+  pose.set_rotation(3, 0.5f);
+  EXPECT_FALSE(wire::from_wire(pose));
+  v1::FieldLeaf leaf = wire::to_wire(FieldLeaf{{}, 0, {8, 0, 0}, std::vector<std::int16_t>(kLeafVoxels)});
+  leaf.mutable_origin()->set_x(5);
+  EXPECT_FALSE(wire::from_wire(leaf));
+}
+
+}  // namespace
+}  // namespace osteon
