@@ -1,0 +1,430 @@
+// The gRPC services with real clients in this process, on the loopback device and ports that the system chooses.
+#include <grpcpp/grpcpp.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <mutex>
+#include <thread>
+
+#include "common/field/kernel.hpp"
+#include "common/wire/convert.hpp"
+#include "common/wire/room_client.hpp"
+#include "haptic_client/net/room_session.hpp"
+#include "osteon/v1/cutting.grpc.pb.h"
+#include "osteon/v1/room.grpc.pb.h"
+#include "osteon/v1/watch.grpc.pb.h"
+#include "server/net/room_server.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/support/wait.hpp"
+#include "tests/unit/room/cuts.hpp"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+using test::strokes;
+using test::wait_until;
+
+constexpr auto kPatience = 20s;
+
+wire::JoinedRoom join(const std::string& address, wire::ClientKind kind) {
+  auto room = wire::join_room(address, kind, "test", 5s, {});
+  EXPECT_TRUE(room.has_value()) << room.error().message;
+  return room.value();
+}
+
+// A haptic client that keeps a replica, as osteon-haptic does.
+class Surgeon {
+ public:
+  Surgeon(const std::string& address, const std::filesystem::path& cache) {
+    auto joined = RoomSession::join({.address = address, .cache = cache}, {});
+    EXPECT_TRUE(joined.has_value()) << joined.error().message;
+    session_.emplace(std::move(*joined));
+    replica_.emplace(session_->bone(), BodyId{0});
+    session_->open({.leaf = [this](const FieldLeaf& leaf) { on([&] { replica_->restore(leaf); }); },
+                    .complete = [this](RoomSeq seq) { on([&] { complete_ = true, seq_ = seq; }); },
+                    .committed =
+                        [this](RoomSeq seq, const Cut& cut) {
+                          on([&] {
+                            EXPECT_TRUE(complete_);
+                            EXPECT_GT(seq, seq_) << "committed cuts come in order";
+                            replica_->apply(cut);
+                            seq_ = seq;
+                            own_ += cut.author == session_->room().author;
+                          });
+                        },
+                    .rejected = [this](RoomSeq, std::uint64_t, const std::string& reason) { on([&] { rejected_ = reason; }); },
+                    .lost = [this](const Error& why) { on([&] { lost_ = why.message; }); }});
+  }
+  ~Surgeon() { session_->close(); }
+
+  RoomSession& session() { return *session_; }
+  AuthorId author() const { return session_->room().author; }
+  bool complete() { return read(complete_); }
+  RoomSeq seq() { return read(seq_); }
+  std::uint64_t own() { return read(own_); }
+  std::string rejected() { return read(rejected_); }
+  std::string lost() { return read(lost_); }
+  Digest hash() {
+    const std::lock_guard lock(mutex_);
+    return replica_->hash();
+  }
+
+ private:
+  template <class Call>
+  void on(Call call) {
+    const std::lock_guard lock(mutex_);
+    call();
+  }
+  template <class T>
+  T read(const T& value) {
+    const std::lock_guard lock(mutex_);
+    return value;
+  }
+
+  std::mutex mutex_;
+  std::optional<RoomSession> session_;
+  std::optional<CutField> replica_;
+  bool complete_ = false;
+  RoomSeq seq_;
+  std::uint64_t own_ = 0;
+  std::string rejected_, lost_;
+};
+
+// What a viewer holds of the surface.
+class MeshReader {
+ public:
+  explicit MeshReader(const std::string& address) : room_(join(address, wire::ClientKind::viewer)) {
+    v1::WatchMeshRequest request;
+    request.set_author(room_.author.value);
+    stream_ = v1::WatchService::NewStub(room_.channel)->WatchMesh(&context_, request);
+  }
+  ~MeshReader() {
+    context_.TryCancel();
+    status_ = stream_->Finish();
+  }
+  // Reads until the surface contains this place of the order.
+  bool read_to(RoomSeq seq) {
+    v1::WatchMeshResponse message;
+    while ((!complete_ || seq_ < seq) && stream_->Read(&message)) {
+      largest_ = std::max(largest_, message.ByteSizeLong());
+      for (const v1::MeshBlock& b : message.blocks()) {
+        const BlockKey key{BodyId{b.body()}, static_cast<int>(b.level()), wire::from_wire(b.index())};
+        const BlockPayload payload{{b.payload().begin(), b.payload().end()}};
+        EXPECT_EQ(b.mesh_hash(), wire::to_wire(mesh_hash(payload)));
+        if (payload.bytes.empty())
+          hashes_.erase(key);
+        else
+          hashes_[key] = b.mesh_hash();
+      }
+      complete_ = message.snapshot_complete();
+      seq_ = RoomSeq{message.room_seq()};
+    }
+    return complete_ && seq_ >= seq;
+  }
+  const std::map<BlockKey, std::string>& hashes() const { return hashes_; }
+  std::size_t largest_message() const { return largest_; }
+
+ private:
+  wire::JoinedRoom room_;
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReader<v1::WatchMeshResponse>> stream_;
+  std::map<BlockKey, std::string> hashes_;
+  bool complete_ = false;
+  RoomSeq seq_;
+  std::size_t largest_ = 0;
+  grpc::Status status_;
+};
+
+class RoomServerTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const Case bone = test::test_block();
+    ASSERT_TRUE(bone.save(dir_ / "case"));
+    auto started = RoomServer::start(Room(bone), {.listen = "127.0.0.1:0", .case_folder = dir_ / "case", .rates = {}}, {});
+    ASSERT_TRUE(started.has_value()) << started.error().message;
+    server_ = std::move(*started);
+  }
+  const std::string& address() { return server_->address(); }
+  std::unique_ptr<Surgeon> surgeon() { return std::make_unique<Surgeon>(address(), dir_ / "cache"); }
+  void send(Surgeon& from, const std::vector<Cut>& cuts) {
+    for (const Cut& cut : cuts) ASSERT_TRUE(wait_until([&] { return from.session().send(cut); }, kPatience));
+  }
+
+  test::TempDir dir_;
+  std::unique_ptr<RoomServer> server_;
+};
+
+TEST_F(RoomServerTest, EveryHolderHasTheServersHashHoweverLateItJoins) {
+  const auto first = surgeon(), second = surgeon();
+  ASSERT_NE(first->author(), second->author());
+  send(*first, strokes(first->author(), 30, 1));
+  send(*second, strokes(second->author(), 30, 2));
+  const auto late = surgeon();  // while cuts are on their way
+  ASSERT_TRUE(wait_until([&] { return first->own() == 30 && second->own() == 30; }, kPatience));
+  const auto later = surgeon();
+  for (Surgeon* holder : {first.get(), second.get(), late.get(), later.get()})
+    ASSERT_TRUE(wait_until([&] { return holder->complete() && holder->seq().value == 60; }, kPatience));
+
+  const auto status = later->session().status();
+  ASSERT_TRUE(status.has_value()) << status.error().message;
+  EXPECT_EQ(status->room_seq.value, 60u);
+  for (Surgeon* holder : {first.get(), second.get(), late.get(), later.get()}) EXPECT_EQ(holder->hash(), status->field_hash);
+  EXPECT_GT(status->removed_mm3, 0.0);
+  EXPECT_EQ(status->rejected, 0u);
+}
+
+TEST_F(RoomServerTest, ACutBeyondTheLimitsIsRejectedToItsAuthorAndTheRoomGoesOn) {
+  const auto one = surgeon(), other = surgeon();
+  auto cuts = strokes(one->author(), 2, 3);
+  cuts[0].spindle_rpm = 1'000'000;
+  send(*one, cuts);
+  ASSERT_TRUE(wait_until([&] { return one->own() == 1 && other->seq().value == 2; }, kPatience));
+  EXPECT_EQ(one->rejected(), sentence(Rejection::spindle));
+  EXPECT_EQ(other->rejected(), "");
+  EXPECT_EQ(one->session().status().value().rejected, 1u);
+}
+
+TEST_F(RoomServerTest, ALateViewerSeesTheBlocksOfAnEarlyOne) {
+  MeshReader early(address());
+  ASSERT_TRUE(early.read_to(RoomSeq{0}));
+  const auto uncut = early.hashes();
+  const auto hand = surgeon();
+  send(*hand, strokes(hand->author(), 40, 4));
+  ASSERT_TRUE(early.read_to(RoomSeq{40}));
+  MeshReader late(address());
+  ASSERT_TRUE(late.read_to(RoomSeq{40}));
+  EXPECT_EQ(early.hashes(), late.hashes());
+  EXPECT_NE(early.hashes(), uncut);
+}
+
+TEST_F(RoomServerTest, ASlowReaderIsBoundedAndCatchesUp) {
+  MeshReader slow(address()), prompt(address());
+  const auto hand = surgeon();
+  std::size_t furthest = 0;
+  std::vector<Cut> cuts = strokes(hand->author(), 400, 5);
+  for (const Cut& cut : cuts) {
+    send(*hand, {cut});
+    furthest = std::max(furthest, server_->health().furthest_behind);
+  }
+  ASSERT_TRUE(prompt.read_to(RoomSeq{400}));
+  const HostHealth health = server_->health();
+  // A waiting set holds each block once: those with a surface and those that lost it.
+  EXPECT_LE(furthest, 2 * health.blocks);
+  EXPECT_EQ(health.mesh_streams, 2u);
+  ASSERT_TRUE(slow.read_to(RoomSeq{400}));
+  EXPECT_EQ(slow.hashes(), prompt.hashes());
+  EXPECT_LT(slow.largest_message(), 2 * MeshOutbox::kMessageBytes);
+}
+
+TEST_F(RoomServerTest, AKilledClientDisturbsNobody) {
+  const auto survivor = surgeon();
+  MeshReader watcher(address());
+  {
+    MeshReader killed(address());
+    Surgeon gone(address(), dir_ / "cache");
+    send(gone, strokes(gone.author(), 5, 6));
+    ASSERT_TRUE(wait_until([&] { return gone.own() == 5; }, kPatience));
+  }
+  send(*survivor, strokes(survivor->author(), 20, 7));
+  ASSERT_TRUE(wait_until([&] { return survivor->own() == 20; }, kPatience));
+  EXPECT_TRUE(watcher.read_to(RoomSeq{25}));
+  EXPECT_EQ(survivor->hash(), survivor->session().status().value().field_hash);
+  EXPECT_TRUE(wait_until([&] { return server_->health().mesh_streams == 1 && server_->health().sessions == 1; }, kPatience));
+}
+
+TEST_F(RoomServerTest, ShowsTheNewestStateAndAnIdleToolOnceItsHandIsGone) {
+  const wire::JoinedRoom room = join(address(), wire::ClientKind::audio);
+  grpc::ClientContext context;
+  v1::WatchCuttingRequest request;
+  request.set_author(room.author.value);
+  const auto stream = v1::WatchService::NewStub(room.channel)->WatchCutting(&context, request);
+  auto hand = surgeon();
+  ASSERT_TRUE(wait_until([&] { return hand->complete(); }, kPatience));
+  CuttingState state;
+  state.author = hand->author();
+  state.tool_name = "drill-3.2";
+  state.phase = CuttingPhase::cutting;
+  for (state.state_seq = 1; state.state_seq <= 50; ++state.state_seq) {
+    state.spindle_rpm = 1000.0 + static_cast<double>(state.state_seq);
+    hand->session().send(state);
+  }
+  v1::WatchCuttingResponse message;
+  std::uint64_t last_seq = 0;
+  const auto read_until = [&](const std::function<bool(const v1::CuttingState&)>& wanted) {
+    while (stream->Read(&message)) {
+      if (message.states_size() == 0) continue;
+      EXPECT_GT(message.states(0).state_seq(), last_seq) << "an older state after a newer one";
+      last_seq = message.states(0).state_seq();
+      if (wanted(message.states(0))) return true;
+    }
+    return false;
+  };
+  ASSERT_TRUE(read_until([](const v1::CuttingState& s) { return s.state_seq() == 50; }));
+  EXPECT_EQ(message.states(0).spindle_rpm(), 1050.0);
+  hand.reset();
+  ASSERT_TRUE(read_until([](const v1::CuttingState& s) { return s.phase() == v1::CUTTING_PHASE_IDLE; }));
+  EXPECT_EQ(message.states(0).spindle_rpm(), 0.0);
+  context.TryCancel();
+  stream->Finish();
+}
+
+TEST_F(RoomServerTest, VersionsMustAgree) {
+  const auto channel = grpc::CreateChannel(address(), grpc::InsecureChannelCredentials());
+  const auto stub = v1::RoomService::NewStub(channel);
+  const auto ask = [&](std::uint32_t protocol, std::uint32_t kernel, v1::ClientKind kind) {
+    v1::JoinRequest request;
+    request.set_protocol_version(protocol);
+    request.set_kernel_version(kernel);
+    request.set_kind(kind);
+    v1::JoinResponse response;
+    grpc::ClientContext context;
+    return stub->Join(&context, request, &response);
+  };
+  EXPECT_TRUE(ask(wire::kProtocolVersion, kKernelVersion, v1::CLIENT_KIND_HAPTIC).ok());
+  EXPECT_TRUE(ask(wire::kProtocolVersion, 0, v1::CLIENT_KIND_VIEWER).ok()) << "a viewer has no kernel";
+  for (const grpc::Status& status : {ask(77, kKernelVersion, v1::CLIENT_KIND_HAPTIC), ask(wire::kProtocolVersion, 77, v1::CLIENT_KIND_HAPTIC)}) {
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
+    EXPECT_NE(status.error_message().find("77"), std::string::npos) << status.error_message();
+    EXPECT_NE(status.error_message().find("version 1"), std::string::npos) << status.error_message();
+  }
+  EXPECT_EQ(ask(wire::kProtocolVersion, 0, v1::CLIENT_KIND_HAPTIC).error_code(), grpc::StatusCode::FAILED_PRECONDITION);
+  EXPECT_EQ(ask(wire::kProtocolVersion, 0, v1::CLIENT_KIND_UNSPECIFIED).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+}
+
+// One session whose requests are made by hand; what the server says of them.
+class RawSession {
+ public:
+  explicit RawSession(const std::string& address) : room(join(address, wire::ClientKind::haptic)) {
+    stream_ = v1::CuttingService::NewStub(room.channel)->Session(&context_);
+  }
+  void open() {
+    v1::SessionRequest request;
+    request.mutable_open()->set_author(room.author.value);
+    request.mutable_open()->set_server_epoch(room.server_epoch);
+    write(request);
+  }
+  void write(const v1::SessionRequest& request) { stream_->Write(request); }
+  grpc::Status status() {
+    v1::SessionResponse ignored;
+    while (stream_->Read(&ignored)) {
+    }
+    return stream_->Finish();
+  }
+  wire::JoinedRoom room;
+
+ private:
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReaderWriter<v1::SessionRequest, v1::SessionResponse>> stream_;
+};
+
+TEST_F(RoomServerTest, MalformedRequestsAreRefusedByTheNameOfTheirField) {
+  const auto expect_refused = [&](const char* named, const std::function<void(RawSession&)>& talk) {
+    RawSession session(address());
+    talk(session);
+    const grpc::Status status = session.status();
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT) << named;
+    EXPECT_NE(status.error_message().find(named), std::string::npos) << status.error_message();
+  };
+  expect_refused("open", [](RawSession& s) { s.write({}); });
+  expect_refused("server_epoch", [](RawSession& s) {
+    ++s.room.server_epoch;
+    s.open();
+  });
+  expect_refused("author", [](RawSession& s) {
+    s.room.author = AuthorId{9999};
+    s.open();
+  });
+  const auto with_cut = [](const std::function<void(v1::Cut&)>& spoil) {
+    return [spoil](RawSession& s) {
+      s.open();
+      v1::SessionRequest request;
+      *request.mutable_cut() = wire::to_wire(strokes(s.room.author, 1, 8).front());
+      spoil(*request.mutable_cut());
+      s.write(request);
+    };
+  };
+  expect_refused("tool_hash", with_cut([](v1::Cut& cut) { cut.set_tool_hash("short"); }));
+  expect_refused("author", with_cut([](v1::Cut& cut) { cut.set_author(9999); }));
+  expect_refused("author_seq", with_cut([](v1::Cut& cut) { cut.set_author_seq(5); }));
+  expect_refused("position", with_cut([](v1::Cut& cut) { cut.mutable_path(0)->clear_position(); }));
+  expect_refused("message", [](RawSession& s) {
+    s.open();
+    s.write({});
+  });
+  EXPECT_EQ(server_->health().room_seq.value, 0u);
+  const auto hand = surgeon();
+  send(*hand, strokes(hand->author(), 1, 9));
+  EXPECT_TRUE(wait_until([&] { return hand->own() == 1; }, kPatience)) << "the server goes on";
+}
+
+TEST_F(RoomServerTest, ACutSentAgainIsAnsweredWithItsFirstPlace) {
+  RawSession session(address());
+  session.open();
+  const Cut cut = strokes(session.room.author, 1, 10).front();
+  v1::SessionRequest request;
+  *request.mutable_cut() = wire::to_wire(cut);
+  session.write(request);
+  session.write(request);
+  EXPECT_TRUE(wait_until([&] { return server_->health().counts.repeated == 1; }, kPatience));
+  EXPECT_EQ(server_->health().room_seq.value, 1u);
+  server_->stop();
+  EXPECT_EQ(session.status().error_code(), grpc::StatusCode::UNAVAILABLE);
+  server_.reset();
+}
+
+TEST_F(RoomServerTest, TheCaseIsFetchedOnceAndABrokenCopyAgain) {
+  surgeon();
+  const auto kept = dir_ / "cache" / to_hex(test::test_block().hash());
+  ASSERT_TRUE(std::filesystem::exists(kept / "bone.vdb"));
+  const auto written = std::filesystem::last_write_time(kept / "bone.vdb");
+  surgeon();
+  EXPECT_EQ(std::filesystem::last_write_time(kept / "bone.vdb"), written);
+  std::filesystem::resize_file(kept / "bone.vdb", 100);
+  const auto hand = surgeon();
+  EXPECT_EQ(hand->session().bone().hash(), test::test_block().hash());
+  EXPECT_TRUE(Case::load(kept).has_value());
+  const std::filesystem::directory_iterator entries(dir_ / "cache");
+  EXPECT_EQ(std::distance(begin(entries), end(entries)), 1) << "nothing half-written is left";
+}
+
+TEST_F(RoomServerTest, StoppingEndsEveryStreamWithAReason) {
+  const auto hand = surgeon();
+  send(*hand, strokes(hand->author(), 10, 11));
+  ASSERT_TRUE(wait_until([&] { return hand->own() == 10; }, kPatience));
+  const Digest hash = hand->hash();
+  const RoomServerSummary summary = server_->stop();
+  server_.reset();
+  EXPECT_EQ(summary.bone.field_hash, hash);
+  EXPECT_EQ(summary.bone.room_seq.value, 10u);
+  EXPECT_EQ(summary.health.mesh_update.count(), 10u) << "every cut's blocks were made";
+  ASSERT_TRUE(wait_until([&] { return !hand->lost().empty(); }, kPatience));
+  EXPECT_NE(hand->lost().find("the server stops"), std::string::npos) << hand->lost();
+}
+
+TEST_F(RoomServerTest, RefusesAPortInUseAndAddressesOfOtherMachines) {
+  const auto start = [&](const std::string& listen) {
+    return RoomServer::start(Room(test::test_block()), {.listen = listen, .case_folder = dir_ / "case", .rates = {}}, {});
+  };
+  const auto second = start(address());
+  ASSERT_FALSE(second.has_value());
+  EXPECT_EQ(second.error().code, ErrorCode::exists);
+  EXPECT_NE(second.error().message.find(address()), std::string::npos);
+  for (const char* open_to_others : {"0.0.0.0:0", "[::]:0", "192.0.2.1:0", "127.0.0.1.example:0"})
+    EXPECT_FALSE(start(open_to_others).has_value()) << open_to_others;
+  for (const char* broken : {"", "127.0.0.1", "127.0.0.1:", ":5", "127.0.0.1:70000", "127.0.0.1:http"})
+    EXPECT_EQ(start(broken).error().code, ErrorCode::invalid_input) << broken;
+}
+
+TEST(RoomClient, SaysInOneSentenceThatNobodyAnswers) {
+  const auto nobody = wire::join_room("127.0.0.1:1", wire::ClientKind::viewer, "test", 200ms, {});
+  ASSERT_FALSE(nobody.has_value());
+  EXPECT_EQ(nobody.error().code, ErrorCode::unavailable);
+  EXPECT_NE(nobody.error().message.find("127.0.0.1:1"), std::string::npos);
+  EXPECT_EQ(wire::join_room("127.0.0.1:1", wire::ClientKind::viewer, "test", 10s, [] { return true; }).error().code,
+            ErrorCode::cancelled);
+  EXPECT_EQ(wire::join_room("nonsense", wire::ClientKind::viewer, "test", 1s, {}).error().code, ErrorCode::invalid_input);
+}
+
+}  // namespace
+}  // namespace osteon
