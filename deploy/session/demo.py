@@ -40,7 +40,7 @@ def fingerprint(source: Path, importer: Path):
     return digest.hexdigest()[:16]
 
 
-def prepare_case(source: Path, programs: Path):
+def prepare_case(source: Path, programs: Path, title):
     """The case to work on: a case as it is, anything else imported once and then found again."""
     if (source / "case.json").exists():
         return source
@@ -52,10 +52,17 @@ def prepare_case(source: Path, programs: Path):
     case.parent.mkdir(parents=True, exist_ok=True)
     say(f"Importing {source}")
     started = time.monotonic()
-    result = subprocess.run([importer, "ct", source, "--out", case], stderr=subprocess.PIPE if not sys.stderr.isatty() else None,
-                            stdin=subprocess.DEVNULL, text=True, check=False)
-    if result.returncode != 0:
-        words = (result.stderr or "").strip().splitlines()
+    # In a session of its own, so that Ctrl-C reaches it once, through this process.
+    process = subprocess.Popen([importer, "ct", source, "--out", case, *title], stdin=subprocess.DEVNULL, text=True,
+                               stderr=None if sys.stderr.isatty() else subprocess.PIPE, start_new_session=True)
+    try:
+        _, errors = process.communicate()
+    except KeyboardInterrupt:
+        process.send_signal(signal.SIGINT)
+        process.wait()
+        raise
+    if process.returncode != 0:
+        words = (errors or "").strip().splitlines()
         raise Failure(words[-1] if words else f"osteon-import could not read {source}")
     say(f"Imported in {time.monotonic() - started:.0f} s; the next run finds the case in build/cases.")
     return case
@@ -89,7 +96,8 @@ def main():
     started = time.monotonic()
     try:
         source = options.case or example_skull()
-        case = prepare_case(source.resolve(), programs)
+        title = [] if options.case else ["--title", "Human skull"]
+        case = prepare_case(source.resolve(), programs, title)
         if out.exists():
             shutil.rmtree(out)
         out.mkdir(parents=True)

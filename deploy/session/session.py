@@ -105,10 +105,10 @@ class Session:
         if entry is None:
             return "look overview"
         # A little from the front, so that one sees what one looks at.
-        eye_side = unit(unit(np.array(entry["toward"], dtype=float)) + np.array([0.0, -0.5, 0.0]))
+        eye_side = unit(unit(np.array(entry["toward"], dtype=float)) + np.array([0.0, -0.75, -0.15]))
         up = np.array([0.0, 0.0, 1.0]) if abs(eye_side[2]) < 0.95 else np.array([0.0, -1.0, 0.0])
         centre = 0.5 * (low + high)
-        return look(centre, centre + 1.55 * float(np.linalg.norm(high - low)) * eye_side, up)
+        return look(centre, centre + 1.42 * float(np.linalg.norm(high - low)) * eye_side, up)
 
     def _start_audio(self, address):
         command = [self.programs / "osteon-audio", "--server", address, "--wav", self.out / "sound.wav",

@@ -1,6 +1,7 @@
 """The session's own reckoning and housekeeping: what the demo's report and the figures rest on."""
 import os
 import struct
+import subprocess
 import sys
 import tempfile
 import time
@@ -142,6 +143,50 @@ class Housekeeping(unittest.TestCase):
         while not condition():
             self.assertLess(time.monotonic(), deadline)
             time.sleep(0.01)
+
+
+class Commands(unittest.TestCase):
+    """What deploy/'s commands say to wrong arguments: one sentence, at once, from any folder, without surroundings."""
+
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory(prefix="with space ")
+        self.addCleanup(self.folder.cleanup)
+
+    def command(self, *arguments):
+        return subprocess.run([ROOT / "deploy" / arguments[0], *arguments[1:]], cwd=self.folder.name, env={},
+                              stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=30, check=False)
+
+    def refused(self, *arguments):
+        result = self.command(*arguments)
+        self.assertNotEqual(result.returncode, 0)
+        self.assertEqual(result.stdout, "")
+        self.assertEqual(len(result.stderr.strip().splitlines()), 1, result.stderr)
+        self.assertIn(f"deploy/{arguments[0]}: ", result.stderr)
+        return result.stderr
+
+    def test_demo(self):
+        self.assertIn("no-such-ct", self.refused("demo", "--case", "no-such-ct"))
+        self.assertIn("--out", self.refused("demo", "--out"))
+        self.assertIn("--fast", self.refused("demo", "--fast"))
+        Path(self.folder.name, "mine").write_text("keep me")
+        self.assertIn("not empty", self.refused("demo", "--out", self.folder.name))
+        self.assertEqual(Path(self.folder.name, "mine").read_text(), "keep me")
+
+    def test_build_and_install(self):
+        self.assertIn("no preset 'fast'", self.refused("build", "fast"))
+        self.assertIn("arguments", self.refused("install", "everything"))
+
+    def test_figures(self):
+        self.assertIn("no_such_figure", self.refused("figures", "no_such_figure"))
+        listed = self.command("figures", "--list")
+        self.assertEqual(listed.returncode, 0, listed.stderr)
+        self.assertIn("haptic_work_p99", listed.stdout)
+
+    def test_help(self):
+        for name in ("demo", "test", "figures", "build", "install"):
+            result = self.command(name, "--help")
+            self.assertEqual((result.returncode, result.stderr), (0, ""), name)
+            self.assertTrue(result.stdout)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 import argparse
 import json
 import math
+import re
 import shutil
 import signal
 import subprocess
@@ -58,6 +59,12 @@ def results(figures, values, soak, machine):
     }
 
 
+def results_file(machine):
+    """One file for each kind of machine, named by processor and cores; no host names."""
+    words = re.sub(r"[^a-z0-9]+", "-", f"{machine['processor']} {machine['cores']} cores".lower()).strip("-")
+    return ROOT / "tests" / "perf" / "results" / f"{words}.json"
+
+
 def rounded(value):
     if value is None or isinstance(value, int):
         return value
@@ -84,9 +91,13 @@ def main():
     parser.add_argument("--list", action="store_true", help="show the figures and what they measure; run nothing")
     parser.add_argument("--json", action="store_true", help="print JSON instead of lines")
     parser.add_argument("--soak", action="store_true", help="longer runs and more repetitions")
-    parser.add_argument("--save", type=Path, metavar="FILE", help="write the results with commit and conditions")
+    parser.add_argument("--save", action="store_true",
+                        help="also write all results with commit and conditions into tests/perf/results")
     parser.add_argument("--build", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
+    if options.save and options.names:
+        print("deploy/figures: --save is for all figures at once; leave out the names", file=sys.stderr)
+        return 2
     try:
         figures = registry.by_name(options.names)
     except ValueError as error:
@@ -114,7 +125,7 @@ def main():
         return 130
     outcome = results(figures, values, options.soak, groups.record.machine())
     if options.save:
-        options.save.write_text(json.dumps(outcome, indent=2) + "\n", encoding="utf-8")
+        results_file(outcome["machine"]).write_text(json.dumps(outcome, indent=2) + "\n", encoding="utf-8")
     if options.json:
         print(json.dumps(outcome, indent=2))
     else:
