@@ -1,0 +1,86 @@
+#include "tests/integration/stage.hpp"
+
+#include <fstream>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+
+#include "tests/support/wait.hpp"
+
+namespace osteon::test {
+
+using namespace std::chrono_literals;
+
+Table read_table(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  Table table;
+  std::string line, cell;
+  std::vector<std::string> names;
+  if (std::getline(in, line))
+    for (std::istringstream header(line); std::getline(header, cell, ',');) names.push_back(cell);
+  while (std::getline(in, line)) {
+    std::istringstream row(line);
+    for (const std::string& name : names) {
+      cell.clear();
+      std::getline(row, cell, ',');
+      table.texts[name].push_back(cell);
+      char* end = nullptr;
+      const double value = std::strtod(cell.c_str(), &end);
+      table.columns[name].push_back(end != cell.c_str() ? value : std::numeric_limits<double>::quiet_NaN());
+    }
+  }
+  return table;
+}
+
+nlohmann::json read_json(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  return nlohmann::json::parse(in, nullptr, false);
+}
+
+namespace {
+
+std::vector<std::string> viewer_arguments(const std::string& address, std::vector<std::string> more) {
+  std::vector<std::string> arguments{"--server", address, "--size", "640x480", "--script", "-"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+}  // namespace
+
+ScriptedViewer::ScriptedViewer(const std::string& address, const Xvfb& screen, std::vector<std::string> more)
+    : process_(program("osteon-viewer"), viewer_arguments(address, std::move(more)), screen.options()) {}
+
+bool ScriptedViewer::tell(const std::string& command, std::chrono::milliseconds patience) {
+  process_.write(command + "\n");
+  const auto answer = process_.read_line(patience);
+  return answer && answer->starts_with("ok");
+}
+
+Stage::Stage(double width_mm) {
+  const RunResult imported = run(program("osteon-import"), {"phantom", "block", "--layers", "5:1.9,20:0.3,5:1.9", "--width",
+                                                            std::to_string(width_mm), "--pitch", "0.5", "--out", temp_ / "case"}, 120s);
+  if (imported.exit_code != 0) throw std::runtime_error("osteon-import failed: " + imported.err);
+  server_ = std::make_unique<Process>(start("osteon-server", {"--case", temp_ / "case", "--address-file", temp_ / "address",
+                                                              "--summary", temp_ / "server.json"}));
+  const auto address = wait_for_address(temp_ / "address", 60s);
+  if (!address) throw std::runtime_error("osteon-server did not come up: " + server_->err());
+  address_ = *address;
+}
+
+Process Stage::start(const std::string& name, std::vector<std::string> arguments, ProcessOptions options) const {
+  return {program(name), arguments, std::move(options)};
+}
+
+Process Stage::start_haptic(const std::string& name, const nlohmann::json& plan) const {
+  const auto plan_file = temp_ / (name + "-plan.json");
+  std::ofstream(plan_file) << plan.dump(2);
+  return start("osteon-haptic", {"--server", address_, "--plan", plan_file, "--session-log", temp_ / (name + ".csv"), "--cut-log",
+                                 temp_ / (name + "-cuts.csv"), "--summary", temp_ / (name + ".json"), "--cache", temp_ / "cache"});
+}
+
+nlohmann::json drill_at(double x_mm, double y_mm, const std::string& hand) {
+  return {{"action", "drill"}, {"tool", "drill-3.2"}, {"spindle_rpm", 1000}, {"hand", hand}, {"feed_mm_per_s", 1.0}, {"beyond_mm", 3.0},
+          {"entry", {{"point_mm", {x_mm, y_mm, 0.0}}, {"axis", {0.0, 0.0, -1.0}}}}};
+}
+
+}  // namespace osteon::test

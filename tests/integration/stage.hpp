@@ -1,0 +1,58 @@
+// All programs of a room as real processes on this machine, for tests that watch them from outside.
+#pragma once
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tests/support/process.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/support/xvfb.hpp"
+
+namespace osteon::test {
+
+// A CSV file with a header line: columns by name. Cells that are no numbers count as `not a number`.
+struct Table {
+  std::map<std::string, std::vector<double>> columns;
+  std::map<std::string, std::vector<std::string>> texts;
+  [[nodiscard]] std::size_t rows() const { return texts.empty() ? 0 : texts.begin()->second.size(); }
+  [[nodiscard]] const std::vector<double>& operator[](const std::string& name) const { return columns.at(name); }
+};
+[[nodiscard]] Table read_table(const std::filesystem::path& file);
+[[nodiscard]] nlohmann::json read_json(const std::filesystem::path& file);
+
+// A viewer that is told what to do line by line.
+class ScriptedViewer {
+ public:
+  ScriptedViewer(const std::string& address, const Xvfb& screen, std::vector<std::string> more = {});
+  // Says a command and waits for its answer; true when that begins with "ok".
+  [[nodiscard]] bool tell(const std::string& command, std::chrono::milliseconds patience = std::chrono::seconds{60});
+  [[nodiscard]] Process& process() { return process_; }
+
+ private:
+  Process process_;
+};
+
+class Stage {
+ public:
+  // Imports the layered block of force-laws.md and starts a server on it.
+  explicit Stage(double width_mm = 40.0);
+
+  [[nodiscard]] const std::string& address() const { return address_; }
+  [[nodiscard]] std::filesystem::path operator/(const std::string& name) const { return temp_ / name; }
+  [[nodiscard]] Process& server() { return *server_; }
+  [[nodiscard]] Process start(const std::string& name, std::vector<std::string> arguments, ProcessOptions options = {}) const;
+  // A haptic client that carries out a plan and leaves NAME.csv, NAME-cuts.csv and NAME.json.
+  [[nodiscard]] Process start_haptic(const std::string& name, const nlohmann::json& plan) const;
+
+ private:
+  TempDir temp_;
+  std::unique_ptr<Process> server_;
+  std::string address_;
+};
+
+// A step that drills along −z through the block at (x, y).
+[[nodiscard]] nlohmann::json drill_at(double x_mm, double y_mm, const std::string& hand);
+
+}  // namespace osteon::test
