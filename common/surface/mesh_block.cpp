@@ -210,4 +210,15 @@ Digest mesh_hash(const BlockPayload& payload) {
   return hasher.finish();
 }
 
+Digest surface_hash(const std::map<BlockKey, Digest>& mesh_hashes) {
+  Hasher hasher;
+  for (const auto& [key, digest] : mesh_hashes) {
+    hasher.integer(key.body.value);
+    hasher.integer(static_cast<std::uint64_t>(key.level));
+    for (const std::int32_t i : {key.index.x, key.index.y, key.index.z}) hasher.integer(static_cast<std::uint32_t>(i));
+    hasher.bytes(std::as_bytes(std::span(digest.bytes)));
+  }
+  return hasher.finish();
+}
+
 }  // namespace osteon

@@ -3,6 +3,7 @@
 #include <array>
 #include <compare>
 #include <cstdint>
+#include <map>
 #include <span>
 #include <vector>
 
@@ -53,5 +54,7 @@ struct BlockPayload {
 [[nodiscard]] Result<Mesh> decode_block(const BlockKey& key, const BlockPayload& payload, double level_pitch_mm);
 // The payload's digest, by which viewers check what they hold.
 [[nodiscard]] Digest mesh_hash(const BlockPayload& payload);
+// One name for a whole surface: over the mesh hashes of its blocks that are not empty, in the order of their keys.
+[[nodiscard]] Digest surface_hash(const std::map<BlockKey, Digest>& mesh_hashes);
 
 }  // namespace osteon
