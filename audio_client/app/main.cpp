@@ -1,0 +1,218 @@
+// osteon-audio: joins a room and makes its tools heard.
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "audio_client/net/cutting_watch.hpp"
+#include "audio_client/output/audio_output.hpp"
+#include "audio_client/output/sound_engine.hpp"
+#include "audio_client/output/wav_recorder.hpp"
+#include "audio_client/synth/sound_scene.hpp"
+#include "common/runtime/files.hpp"
+#include "common/runtime/log.hpp"
+#include "common/runtime/stop_signal.hpp"
+#include "common/wire/room_client.hpp"
+
+namespace {
+
+using namespace osteon;
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr const char* kProgram = "osteon-audio";
+constexpr auto kPoll = 20ms;
+// Tools of which nothing was heard for so long run down: a working server sends their states at 120 Hz.
+constexpr auto kStale = 2s;
+// Running down takes half a second at most; an output that does not go on must not hold the program.
+constexpr auto kRunDown = 2s;
+
+struct Options {
+  std::string server;
+  std::string output = "pulse";
+  std::filesystem::path wav_file, state_log_file, summary_file;
+  double patience_s = 5;
+};
+
+// Rows of the state log and the latency that they add up to.
+//
+// sounded_mono_ns is the start of the render() call that first used the state, plus the frames that the synthesis looks
+// ahead (64, 1.3 ms), plus the output's latency: all buffers in front of the card, full (4 x 256 frames, 21.3 ms). On
+// PulseAudio this is an upper bound; the monitor of a null sink hears a frame up to one buffer earlier.
+class StateLog {
+ public:
+  [[nodiscard]] Result<void> open(const std::filesystem::path& file) {
+    if (file.empty()) return {};
+    file_.open(file);
+    file_ << "state_seq,received_mono_ns,sounded_mono_ns,author\n";
+    if (!file_) return failure(ErrorCode::internal, "cannot write the state log " + file.string() + "; give --state-log a file in a folder that exists");
+    return {};
+  }
+
+  void drain(audio::SoundEngine& engine, const audio::AudioOutput& output) {
+    audio::Sounded sounded;
+    while (engine.next_sounded(sounded)) {
+      const auto delay = engine.latency() + output.latency();
+      const std::int64_t sounded_ns = sounded.rendered_ns + std::chrono::nanoseconds(delay).count();
+      latency_.record(std::chrono::nanoseconds(sounded_ns - sounded.received_ns));
+      if (file_.is_open())
+        file_ << sounded.state_seq << ',' << sounded.received_ns << ',' << sounded_ns << ',' << sounded.author << '\n';
+    }
+  }
+
+  [[nodiscard]] Result<void> close(const std::filesystem::path& file) {
+    if (!file_.is_open()) return {};
+    file_.close();
+    if (!file_) return failure(ErrorCode::internal, "the state log " + file.string() + " could not be written whole");
+    return {};
+  }
+
+  [[nodiscard]] const DurationHistogram& latency() const { return latency_; }
+
+ private:
+  std::ofstream file_;
+  DurationHistogram latency_;
+};
+
+nlohmann::json summary_of(const Options& options, const audio::SoundEngine& engine, const audio::AudioOutput& output,
+                          const StateLog& states, const std::optional<audio::WavRecorder>& recorder) {
+  const double peak = engine.peak();
+  nlohmann::json summary = {
+      {"output", options.output},
+      {"frames", engine.frames()},
+      {"seconds", static_cast<double>(engine.frames()) / 48000.0},
+      // PulseAudio's own underruns do not reach RtAudio 5.2; these are the calls that came too late to fill in time.
+      {"gaps", output.gaps()},
+      {"states_sounded", states.latency().count()},
+      {"callback_work",
+       {{"p50_us", engine.work().percentile_us(50)},
+        {"p99_us", engine.work().percentile_us(99)},
+        {"max_us", engine.work().max_us()}}},
+      {"received_to_sounded",
+       {{"p50_ms", states.latency().percentile_us(50) / 1000},
+        {"p99_ms", states.latency().percentile_us(99) / 1000},
+        {"max_ms", states.latency().max_us() / 1000}}},
+      {"output_latency_ms", std::chrono::duration<double, std::milli>(output.latency()).count()},
+      {"peak", peak},
+      {"peak_db", peak > 0 ? nlohmann::json(20.0 * std::log10(peak)) : nlohmann::json(nullptr)},
+  };
+  if (recorder) {
+    summary["wav_frames"] = recorder->frames_written();
+    summary["wav_frames_lost"] = recorder->frames_lost();
+  }
+  return summary;
+}
+
+Result<void> run(const Options& options, const StopSignal& stop) {
+  const Result<audio::OutputKind> kind = audio::output_kind(options.output);
+  if (!kind) return tl::unexpected(kind.error());
+  audio::OutputParams output_params;
+  output_params.kind = *kind;
+
+  // What fails on this machine is found before the server is bothered.
+  StateLog states;
+  if (Result<void> opened = states.open(options.state_log_file); !opened) return opened;
+  std::optional<audio::WavRecorder> recorder;
+  if (!options.wav_file.empty()) {
+    Result<audio::WavRecorder> opened = audio::WavRecorder::open(options.wav_file, output_params.rate_hz);
+    if (!opened) return tl::unexpected(opened.error());
+    recorder = std::move(*opened);
+  }
+  audio::SynthParams synth_params;
+  synth_params.rate_hz = output_params.rate_hz;
+  audio::SoundEngine engine(synth_params, recorder ? &*recorder : nullptr);
+  Result<std::unique_ptr<audio::AudioOutput>> output = audio::open_output(output_params, engine);
+  if (!output) return tl::unexpected(output.error());
+
+  Result<wire::JoinedRoom> room =
+      wire::join_room(options.server, wire::ClientKind::audio, "audio",
+                      std::chrono::milliseconds(static_cast<std::int64_t>(1000 * options.patience_s)),
+                      [&] { return stop.requested(); });
+  // A stop is what was asked for, also before the server answered.
+  if (!room && room.error().code == ErrorCode::cancelled) return {};
+  if (!room) return tl::unexpected(room.error());
+  if (Result<void> started = (*output)->start(); !started) return started;
+  log::info("joined", {{"server", options.server}, {"case", room->case_title}, {"output", options.output}});
+
+  // The reader and this thread deliver in turns.
+  std::mutex delivering;
+  std::optional<Clock::time_point> heard;  // guarded: when the last message came, none while all is at rest
+  auto watch = CuttingWatch::start(
+      std::move(*room), [&](const std::vector<CuttingState>& tools, Clock::time_point received) {
+        const audio::SoundScene scene = audio::sound_scene(tools, received.time_since_epoch().count());
+        const std::lock_guard lock(delivering);
+        engine.deliver(scene);
+        heard = received;
+      });
+
+  std::optional<Error> broken;
+  while (!broken && !stop.wait_for(kPoll)) {
+    states.drain(engine, **output);
+    if (const std::lock_guard lock(delivering); heard && Clock::now() - *heard > kStale) {
+      engine.deliver(audio::SoundScene{});
+      heard.reset();
+    }
+    broken = watch->ended();
+    if (const std::string why = (*output)->failure_reason(); !why.empty()) broken = Error{ErrorCode::unavailable, why};
+  }
+
+  // The tools run down as if their motors had been switched off: no click at the end. The reader is gone from here.
+  watch.reset();
+  engine.deliver(audio::SoundScene{});
+  const auto end = Clock::now() + kRunDown;
+  std::this_thread::sleep_for(2 * kPoll);
+  while (!engine.silent() && (*output)->failure_reason().empty() && Clock::now() < end) std::this_thread::sleep_for(kPoll);
+  (*output)->stop();
+  states.drain(engine, **output);
+
+  // All files are finished before the first error is told.
+  Result<void> outcome = broken ? Result<void>(tl::unexpected(*broken)) : Result<void>();
+  const auto keep_first = [&](Result<void> result) {
+    if (outcome && !result) outcome = std::move(result);
+  };
+  keep_first(states.close(options.state_log_file));
+  if (recorder) keep_first(recorder->close());
+  const nlohmann::json summary = summary_of(options, engine, **output, states, recorder);
+  if (!options.summary_file.empty()) keep_first(write_file(options.summary_file, summary.dump(2) + "\n"));
+  log::info("stopped", {{"seconds", static_cast<double>(engine.frames()) / output_params.rate_hz},
+                        {"states", states.latency().count()},
+                        {"gaps", (*output)->gaps()},
+                        {"callback_p99_us", engine.work().percentile_us(99)},
+                        {"received_to_sounded_p50_ms", states.latency().percentile_us(50) / 1000}});
+  return outcome;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  CLI::App app("Makes the tools of a room heard: the drill's sound follows speed, load and bone density.", kProgram);
+  app.add_option("--server", options.server, "HOST:PORT of osteon-server")->required();
+  app.add_option("--output", options.output, "pulse: PulseAudio's default sink; none: at the same pace to nowhere")
+      ->capture_default_str();
+  app.add_option("--wav", options.wav_file, "Record what is heard: 48 kHz, 16 bit, mono");
+  app.add_option("--state-log", options.state_log_file, "CSV: when each cutting state came and when it sounded");
+  app.add_option("--summary", options.summary_file, "JSON written at the end: frames, latencies, callback work, peak");
+  app.add_option("--patience", options.patience_s, "Seconds to wait for the server")
+      ->check(CLI::Range(0.0, 3600.0))
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    return log::exit_with(kProgram, {ErrorCode::invalid_input, std::string(error.what()) + "; see --help"});
+  }
+
+  log::open(kProgram);
+  const StopSignal stop;
+  const Result<void> outcome = run(options, stop);
+  return outcome ? 0 : log::exit_with(kProgram, outcome.error());
+}

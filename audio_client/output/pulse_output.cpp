@@ -1,0 +1,131 @@
+// RtAudio 5.2 on PulseAudio. Its exceptions end here.
+#include <rtaudio/RtAudio.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <vector>
+
+#include "audio_client/output/audio_output.hpp"
+
+namespace osteon::audio {
+namespace {
+
+constexpr unsigned kChannels = 2;
+constexpr unsigned kMaxFrames = 4096;
+
+// RtAudio's error callback carries no user data, so the flag must be static. Only one output is open at a time.
+std::atomic<bool> stream_failed{false};
+
+void on_error(RtAudioError::Type, const std::string&) { stream_failed.store(true, std::memory_order_relaxed); }
+
+tl::unexpected<Error> no_server(const std::string& what) {
+  return failure(ErrorCode::unavailable,
+                 "no sound server answers (" + what + "); start PulseAudio, or use --output none with --wav FILE");
+}
+
+class PulseOutput final : public AudioOutput {
+ public:
+  PulseOutput(const OutputParams& params, SoundSource& source) : params_(params), source_(source) {}
+  ~PulseOutput() override { close(); }
+
+  Result<void> open() {
+    try {
+      audio_ = std::make_unique<RtAudio>(RtAudio::LINUX_PULSE);
+      if (audio_->getCurrentApi() != RtAudio::LINUX_PULSE) return no_server("this RtAudio was built without PulseAudio");
+      audio_->showWarnings(false);
+      const unsigned devices = audio_->getDeviceCount();
+      if (devices == 0) return no_server("it names no device");
+      RtAudio::StreamParameters to;
+      to.deviceId = std::min(audio_->getDefaultOutputDevice(), devices - 1);
+      to.nChannels = kChannels;
+      RtAudio::StreamOptions options;
+      options.numberOfBuffers = params_.buffers;  // 0 would let PulseAudio hold 137 ms
+      options.flags = RTAUDIO_SCHEDULE_REALTIME;
+      options.priority = 20;
+      options.streamName = "Osteon";
+      unsigned frames = params_.frames;
+      stream_failed = false;
+      audio_->openStream(&to, nullptr, RTAUDIO_FLOAT32, params_.rate_hz, &frames, &PulseOutput::callback, this,
+                         &options, &on_error);
+      if (!audio_->isStreamOpen() || stream_failed) return no_server("it refuses a stream");
+      if (frames > kMaxFrames) return no_server("it wants buffers of " + std::to_string(frames) + " frames");
+      params_.frames = frames;
+      return {};
+    } catch (const RtAudioError& error) {
+      return no_server(error.getMessage());
+    }
+  }
+
+  Result<void> start() override {
+    try {
+      audio_->startStream();
+      if (!audio_->isStreamRunning()) return no_server("the stream does not start");
+      return {};
+    } catch (const RtAudioError& error) {
+      return no_server(error.getMessage());
+    }
+  }
+
+  void stop() noexcept override {
+    try {
+      if (audio_ && audio_->isStreamRunning()) audio_->stopStream();
+    } catch (const RtAudioError&) {
+      stream_failed = true;  // the server is gone: there is nothing left to stop
+    }
+  }
+
+  std::chrono::nanoseconds latency() const noexcept override {
+    return std::chrono::nanoseconds(1'000'000'000LL * params_.frames * params_.buffers / params_.rate_hz);
+  }
+  std::uint64_t gaps() const noexcept override { return gaps_.load(std::memory_order_relaxed); }
+  std::string failure_reason() const override {
+    if (!stream_failed.load(std::memory_order_relaxed)) return {};
+    return "the sound server went away; start it again, or use --output none with --wav FILE";
+  }
+
+ private:
+  // [audio]
+  static int callback(void* out, void*, unsigned frames, double, RtAudioStreamStatus, void* self) {
+    static_cast<PulseOutput*>(self)->fill(static_cast<float*>(out), frames);
+    return 0;
+  }
+
+  void fill(float* out, unsigned frames) noexcept {
+    // PulseAudio's underruns do not reach RtAudio 5.2; a call that comes later than all buffers last proves one.
+    const auto now = std::chrono::steady_clock::now();
+    if (called_ && now - last_call_ > latency()) gaps_.fetch_add(1, std::memory_order_relaxed);
+    called_ = true;
+    last_call_ = now;
+    const std::span<float> mono(mono_.data(), std::min(frames, kMaxFrames));
+    source_.render(mono);
+    for (std::size_t i = 0; i < mono.size(); ++i) out[kChannels * i] = out[kChannels * i + 1] = mono[i];
+  }
+
+  void close() noexcept {
+    stop();
+    try {
+      if (audio_ && audio_->isStreamOpen()) audio_->closeStream();
+    } catch (const RtAudioError&) {
+      stream_failed = true;
+    }
+  }
+
+  OutputParams params_;
+  SoundSource& source_;
+  std::unique_ptr<RtAudio> audio_;
+  std::array<float, kMaxFrames> mono_{};
+  std::atomic<std::uint64_t> gaps_{0};
+  std::chrono::steady_clock::time_point last_call_;
+  bool called_ = false;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<AudioOutput>> open_pulse_output(const OutputParams& params, SoundSource& source) {
+  auto output = std::make_unique<PulseOutput>(params, source);
+  if (const Result<void> opened = output->open(); !opened) return tl::unexpected(opened.error());
+  return output;
+}
+
+}  // namespace osteon::audio

@@ -1,0 +1,54 @@
+#include "audio_client/output/sound_engine.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace osteon::audio {
+namespace {
+
+// Read through the vDSO: no system call.
+std::int64_t now_ns() noexcept { return std::chrono::steady_clock::now().time_since_epoch().count(); }
+
+}  // namespace
+
+SoundEngine::SoundEngine(const SynthParams& params, WavRecorder* recorder)
+    : rate_hz_(params.rate_hz), recorder_(recorder) {
+  synth_.prepare(params);
+}
+
+void SoundEngine::render(std::span<float> mono) noexcept {
+  const std::int64_t start_ns = now_ns();
+  take_scene(start_ns);
+  synth_.process(mono);
+  if (recorder_) recorder_->push(mono);
+
+  float peak = peak_.load(std::memory_order_relaxed);
+  for (const float x : mono) peak = std::max(peak, std::abs(x));
+  peak_.store(peak, std::memory_order_relaxed);
+  frames_.fetch_add(mono.size(), std::memory_order_relaxed);
+  silent_.store(synth_.silent(), std::memory_order_relaxed);
+  work_.record(std::chrono::nanoseconds(now_ns() - start_ns));
+}
+
+void SoundEngine::take_scene(std::int64_t start_ns) noexcept {
+  if (!scenes_.refresh()) return;
+  const SoundScene& scene = scenes_.value();
+  synth_.aim(scene);
+  for (int t = 0; t < scene.count; ++t) {
+    const ToolSound& tool = scene.tools[static_cast<std::size_t>(t)];
+    const auto known = last_.tools.begin() + last_.count;
+    const bool old = std::any_of(last_.tools.begin(), known, [&](const ToolSound& seen) {
+      return seen.author == tool.author && seen.state_seq == tool.state_seq;
+    });
+    // A full queue loses the note, not the sound.
+    if (!old) sounded_.try_push({tool.author, tool.state_seq, scene.received_ns, start_ns});
+  }
+  last_ = scene;
+}
+
+std::chrono::nanoseconds SoundEngine::latency() const noexcept {
+  return std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 * DrillSynth::kLatency_frames / rate_hz_));
+}
+
+}  // namespace osteon::audio

@@ -1,0 +1,56 @@
+// What the sound card's thread runs: takes the newest scene, renders it, records it, and notes when it was first heard.
+#pragma once
+#include <atomic>
+#include <cstdint>
+#include <span>
+
+#include "audio_client/output/audio_output.hpp"
+#include "audio_client/output/wav_recorder.hpp"
+#include "audio_client/synth/drill_synth.hpp"
+#include "common/runtime/event_queue.hpp"
+#include "common/runtime/latest_value.hpp"
+#include "common/runtime/tick_stats.hpp"
+
+namespace osteon::audio {
+
+// A state that has reached the buffers for the first time. Steady clock.
+struct Sounded {
+  std::uint64_t author = 0;
+  std::uint64_t state_seq = 0;
+  std::int64_t received_ns = 0;
+  std::int64_t rendered_ns = 0;  // start of the render() call that first used it
+};
+
+class SoundEngine final : public SoundSource {
+ public:
+  // `recorder` may be null, else it must outlive the engine.
+  SoundEngine(const SynthParams& params, WavRecorder* recorder);
+
+  void deliver(const SoundScene& scene) noexcept { scenes_.store(scene); }  // one thread only
+  void render(std::span<float> mono) noexcept override;                     // [audio]
+  bool next_sounded(Sounded& sounded) noexcept { return sounded_.try_pop(sounded); }  // one thread only
+
+  // From the start of render() to the frame that first carries the new scene, without the output's own latency.
+  [[nodiscard]] std::chrono::nanoseconds latency() const noexcept;
+  [[nodiscard]] bool silent() const noexcept { return silent_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t frames() const noexcept { return frames_.load(std::memory_order_relaxed); }
+  [[nodiscard]] float peak() const noexcept { return peak_.load(std::memory_order_relaxed); }
+  // Work of one render(). Only after the output was stopped.
+  [[nodiscard]] const DurationHistogram& work() const noexcept { return work_; }
+
+ private:
+  void take_scene(std::int64_t now_ns) noexcept;
+
+  double rate_hz_;
+  DrillSynth synth_;
+  WavRecorder* recorder_;
+  LatestValue<SoundScene> scenes_;
+  EventQueue<Sounded, 1024> sounded_;
+  SoundScene last_;  // what was noted last, to note each state once
+  std::atomic<std::uint64_t> frames_{0};
+  std::atomic<float> peak_{0};
+  std::atomic<bool> silent_{true};
+  DurationHistogram work_;
+};
+
+}  // namespace osteon::audio

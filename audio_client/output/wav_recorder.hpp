@@ -1,0 +1,33 @@
+// Writes what is heard to a WAV file: the sound card's thread pushes into a fixed queue, a thread of its own writes.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+
+#include "common/core/result.hpp"
+
+namespace osteon::audio {
+
+class WavRecorder {
+ public:
+  // 16-bit PCM, mono. Error: internal, naming the path.
+  [[nodiscard]] static Result<WavRecorder> open(const std::filesystem::path& file, unsigned rate_hz);
+  WavRecorder(WavRecorder&&) noexcept;
+  WavRecorder& operator=(WavRecorder&&) noexcept;
+  ~WavRecorder();  // closes
+
+  // [audio] Never waits: what does not fit into the queue of about 5 s is left out and counted.
+  void push(std::span<const float> mono) noexcept;
+  // Writes what is queued and closes. Error: internal, naming the path (a full disk shows here).
+  [[nodiscard]] Result<void> close();
+  [[nodiscard]] std::uint64_t frames_written() const noexcept;
+  [[nodiscard]] std::uint64_t frames_lost() const noexcept;
+
+ private:
+  struct Impl;
+  explicit WavRecorder(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace osteon::audio

@@ -1,0 +1,60 @@
+#include "audio_client/synth/sound_scene.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "common/tools/tool.hpp"
+
+namespace osteon::audio {
+namespace {
+
+// Load 1: half of it from the thrust, half from the power at the spindle.
+struct LoadScale {
+  double thrust_N, power_W;
+};
+// The drill at Chi's cortical point: 29 N and 27 N mm at 1000 rpm. The burr: a firm hand's side load on cortical bone.
+constexpr LoadScale kLoadScales[kHandpieceKinds] = {{29.0, 2.8}, {6.0, 6.0}};
+
+constexpr double kCorticalDensity_g_cm3 = 1.9;
+constexpr double kMaxRpm = 120000.0;
+
+double within(double value, double high) { return std::isfinite(value) ? std::clamp(value, 0.0, high) : 0.0; }
+
+}  // namespace
+
+ToolSound tool_sound(const CuttingState& state) {
+  const Result<Tool> tool = find_tool(state.tool_name);
+  ToolSound sound;
+  sound.author = state.author.value;
+  sound.state_seq = state.state_seq;
+  // A tool that this build does not know is heard as a drill.
+  sound.handpiece =
+      tool && tool->kind == ToolKind::round_burr ? HandpieceKind::direct_burr : HandpieceKind::geared_drill;
+  sound.rpm = within(state.spindle_rpm, kMaxRpm);
+
+  const bool contact = state.phase == CuttingPhase::cutting || state.phase == CuttingPhase::rubbing;
+  if (!contact) return sound;
+  const LoadScale& scale = kLoadScales[static_cast<int>(sound.handpiece)];
+  const double power_W = std::abs(state.torque_Nmm) * 1e-3 * 2.0 * std::numbers::pi * sound.rpm / 60.0;
+  sound.load = within(0.5 * state.force_physical_N.norm() / scale.thrust_N + 0.5 * power_W / scale.power_W, 1.5);
+  sound.hardness = within(state.density_g_cm3 / kCorticalDensity_g_cm3, 1.2);
+  sound.advancing = state.feed_mm_per_s > 0;
+  if (state.phase == CuttingPhase::cutting) {
+    // Removed mass sets the flow; soft bone crumbles where hard bone breaks into chips that are heard.
+    const double flow = within(state.feed_mm_per_s, 1000.0) * sound.hardness;
+    sound.chips = std::min(1.5, std::sqrt(flow) * std::pow(sound.hardness, 0.7));
+  }
+  return sound;
+}
+
+SoundScene sound_scene(std::span<const CuttingState> states, std::int64_t received_ns) {
+  SoundScene scene;
+  scene.received_ns = received_ns;
+  for (const CuttingState& state : states.first(std::min<std::size_t>(states.size(), kMaxTools))) {
+    scene.tools[static_cast<std::size_t>(scene.count++)] = tool_sound(state);
+  }
+  return scene;
+}
+
+}  // namespace osteon::audio

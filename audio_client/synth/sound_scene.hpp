@@ -1,0 +1,36 @@
+// What is to be heard now: every tool in the room reduced to numbers, ready to cross into the sound card's thread.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "audio_client/synth/handpiece.hpp"
+#include "common/mechanics/cutting_state.hpp"
+
+namespace osteon::audio {
+
+struct ToolSound {
+  std::uint64_t author = 0;
+  std::uint64_t state_seq = 0;
+  HandpieceKind handpiece = HandpieceKind::geared_drill;
+  double rpm = 0;
+  double load = 0;             // 0 free; 1 as at the cortical reference point of the hand piece; at most 1.5
+  double hardness = 0;         // density under the cutting part / 1.9 g/cm^3, 0 without contact
+  double chips = 0;            // chip flow, 0 without cutting; 1 at 1 mm/s through cortical bone; at most 1.5
+  bool advancing = false;      // moves into the bone
+};
+
+inline constexpr int kMaxTools = 8;
+
+struct SoundScene {
+  std::array<ToolSound, kMaxTools> tools{};
+  int count = 0;
+  std::int64_t received_ns = 0;  // steady clock
+};
+
+[[nodiscard]] ToolSound tool_sound(const CuttingState& state);
+
+// The first kMaxTools of them: tools beyond that are not heard.
+[[nodiscard]] SoundScene sound_scene(std::span<const CuttingState> states, std::int64_t received_ns);
+
+}  // namespace osteon::audio

@@ -1,0 +1,359 @@
+// The drill's sound as a listener would measure it: the synthesised signal goes through common/sound.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <vector>
+
+#include "audio_client/synth/drill_synth.hpp"
+#include "audio_client/synth/gearbox.hpp"
+#include "audio_client/synth/limiter.hpp"
+#include "common/sound/levels.hpp"
+#include "common/sound/spectrum.hpp"
+#include "common/sound/tones.hpp"
+#include "tests/support/allocation_counter.hpp"
+#include "tests/unit/audio_client/scripted_drilling.hpp"
+
+namespace osteon::audio {
+namespace {
+
+using test::cancellous_drill;
+using test::cortical_drill;
+using test::free_drill;
+using test::idle_drill;
+using test::kRate_hz;
+using test::play;
+
+DrillSynth make_synth(std::uint64_t seed = 1, const VoiceParams& voice = {}) {
+  DrillSynth synth;
+  synth.prepare({.rate_hz = kRate_hz, .seed = seed, .voice = voice});
+  return synth;
+}
+
+// Without noise and flutter, what is left is the partials alone.
+constexpr VoiceParams kPure{.noise = 0, .flutter = 0};
+
+CuttingState burr(double rpm, double density_g_cm3) {
+  CuttingState state = free_drill(rpm);
+  state.tool_name = "burr-round-5";
+  if (density_g_cm3 > 0) {
+    state.phase = CuttingPhase::cutting;
+    state.density_g_cm3 = density_g_cm3;
+    state.feed_mm_per_s = 10;
+    state.force_physical_N = Vec3(0, 0, 3.0 * density_g_cm3 / 1.9);
+    state.torque_Nmm = 2.0 * density_g_cm3 / 1.9;
+  }
+  return state;
+}
+
+// One second of the steady sound.
+std::vector<float> steady(const CuttingState& state, const VoiceParams& voice = {}, std::uint64_t seed = 1) {
+  DrillSynth synth = make_synth(seed, voice);
+  static_cast<void>(play(synth, state, 0.75));
+  return play(synth, state, 1.0);
+}
+
+double brightness_hz(const std::vector<float>& samples) {
+  return sound::centroid_hz(sound::power_spectrum(samples, kRate_hz), 20, 20000);
+}
+
+class SpindleSpeed : public testing::TestWithParam<double> {};
+
+TEST_P(SpindleSpeed, PartialsAreLockedToTheSpindle) {
+  const double spindle_hz = GetParam() / 60.0;
+  const std::vector<float> samples = steady(cortical_drill(GetParam()));
+  constexpr Gearbox gears;
+  for (const double ratio : {gears.output_mesh(), 2 * gears.output_mesh(), gears.motor_mesh(),
+                             3 * kCommutatorSegments * gears.motor()}) {
+    const double hz = ratio * spindle_hz;
+    // One second of a line in noise: far better than the 1 Hz of a plain spectrum.
+    EXPECT_NEAR(sound::find_tone(samples, kRate_hz, hz - 15, hz + 15).hz, hz, 0.05) << "ratio " << ratio;
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Drills, SpindleSpeed, testing::Values(600.0, 1000.0, 1345.0, 1400.0));
+
+TEST(DrillSound, PitchDroopsWithTheSpindleUnderLoad) {
+  // The state's spindle speed carries the droop: the sound repeats it, line by line.
+  DrillSynth synth = make_synth();
+  static_cast<void>(play(synth, free_drill(1000), 0.75));
+  const std::vector<float> samples = play(synth, cortical_drill(955), 1.0);
+  const double mesh_hz = Gearbox{}.output_mesh() * 1000 / 60.0;
+  const std::vector<double> track = sound::track_tone(samples, kRate_hz, mesh_hz, {.reach = 0.06});
+  ASSERT_FALSE(track.empty());
+  EXPECT_NEAR(track.back() / mesh_hz, 0.955, 1e-3);
+}
+
+TEST(DrillSound, GrowsFromFreeOverCancellousToCortical) {
+  const double free_db = sound::rms_db(steady(free_drill(1400)));
+  const double cancellous_db = sound::rms_db(steady(cancellous_drill(1380)));
+  const double cortical_db = sound::rms_db(steady(cortical_drill(1345)));
+  // 8.6.3: 3 dB to 5 dB are an obvious difference in loudness.
+  EXPECT_GT(cancellous_db, free_db + 3);
+  EXPECT_GT(cortical_db, cancellous_db + 4);
+  EXPECT_LT(cortical_db, -10) << "room for other tools";
+}
+
+TEST(DrillSound, CorticalIsBrighterThanCancellous) {
+  const double soft = brightness_hz(steady(cancellous_drill(1380)));
+  const double middle = [&] {
+    CuttingState state = cortical_drill(1360);
+    state.density_g_cm3 = 1.0;
+    state.force_physical_N = Vec3(0, 0, 19);
+    state.torque_Nmm = 17;
+    return brightness_hz(steady(state));
+  }();
+  const double hard = brightness_hz(steady(cortical_drill(1345)));
+  EXPECT_GT(middle, soft + 100);
+  EXPECT_GT(hard, middle + 100);
+}
+
+TEST(DrillSound, MotorLeadsWhereThereIsLoadOrNoneAndTheGearsBetween) {
+  // 8.5.4: 5500 Hz before 4000 Hz free and cortical, the other way round cancellous.
+  constexpr Gearbox gears;
+  const auto lead_db = [&](const CuttingState& state) {
+    const std::vector<float> samples = steady(state);
+    const double spindle_hz = state.spindle_rpm / 60.0;
+    return sound::tone_db(samples, kRate_hz, 3 * kCommutatorSegments * gears.motor() * spindle_hz) -
+           sound::tone_db(samples, kRate_hz, gears.motor_mesh() * spindle_hz);
+  };
+  EXPECT_GT(lead_db(free_drill(1400)), 1);
+  EXPECT_LT(lead_db(cancellous_drill(1380)), -1);
+  EXPECT_GT(lead_db(cortical_drill(1345)), 1);
+}
+
+TEST(DrillSound, LowBandFillsWhileCutting) {
+  // 8.5.4: 0-400 Hz is quiet running free and strongest in cortical bone.
+  const auto low_db = [](const CuttingState& state) {
+    return sound::band_db(sound::power_spectrum(steady(state), kRate_hz), 0, 400);
+  };
+  EXPECT_GT(low_db(cancellous_drill(1380)), low_db(free_drill(1400)) + 3);
+  EXPECT_GT(low_db(cortical_drill(1345)), low_db(cancellous_drill(1380)) + 3);
+}
+
+TEST(DrillSound, FasterIsLouder) {
+  EXPECT_GT(sound::rms_db(steady(free_drill(1400))), sound::rms_db(steady(free_drill(700))) + 3);
+}
+
+TEST(DrillSound, SlowlyCutIsQuieterAtEqualDensity) {
+  CuttingState light = cortical_drill(1380);
+  light.force_physical_N = Vec3(0, 0, 8);
+  light.torque_Nmm = 7;
+  light.feed_mm_per_s = 0.1;
+  EXPECT_GT(sound::rms_db(steady(cortical_drill(1380))), sound::rms_db(steady(light)) + 3);
+}
+
+TEST(DrillSound, ChipsAreHeardBesideTheLines) {
+  const auto noise = [](const VoiceParams& voice) {
+    // A rest of one second at a speed that puts no line between 6300 and 6600 Hz.
+    return sound::band_db(sound::power_spectrum(steady(cortical_drill(1345), voice), kRate_hz), 6300, 6400);
+  };
+  EXPECT_GT(noise({}), noise(kPure) + 10);
+}
+
+TEST(BurrSound, PartialsFollowTheSpindleAndGrowWithDensity) {
+  const double rpm = 20000;
+  const std::vector<float> samples = steady(burr(rpm, 1.9));
+  const double flutes_hz = 8 * rpm / 60.0;
+  EXPECT_NEAR(sound::find_tone(samples, kRate_hz, flutes_hz - 20, flutes_hz + 20).hz, flutes_hz, 0.05);
+  const double free_db = sound::rms_db(steady(burr(rpm, 0)));
+  const double cancellous_db = sound::rms_db(steady(burr(rpm, 0.3)));
+  const double cortical_db = sound::rms_db(samples);
+  EXPECT_GT(cancellous_db, free_db + 0.5);
+  EXPECT_GT(cortical_db, cancellous_db + 4);
+  EXPECT_GT(brightness_hz(samples), brightness_hz(steady(burr(rpm, 0.3))));
+}
+
+TEST(BurrSound, HighestSpeedsDoNotFoldBack) {
+  // Every line must lie on a partial; the folded 24 kHz and 32 kHz of a 60 000 rpm burr would stand at 24 and 16 kHz,
+  // those of 57 000 rpm at 17.6 kHz.
+  for (const double rpm : {57000.0, 60000.0, 90000.0}) {
+    const std::vector<float> samples = steady(burr(rpm, 1.9), kPure);
+    const sound::Spectrum spectrum = sound::power_spectrum(samples, kRate_hz, 16384);
+    const Handpiece piece = make_handpiece(HandpieceKind::direct_burr);
+    double strange = 0, all = 0;
+    for (std::size_t k = 0; k < spectrum.power.size(); ++k) {
+      const double hz = static_cast<double>(k) * spectrum.bin_hz;
+      const bool expected = std::any_of(piece.partials.begin(), piece.partials.end(), [&](const Partial& p) {
+        // The Hann window's skirts have fallen by 100 dB there.
+        return std::abs(p.ratio * rpm / 60.0 - hz) < 32 * spectrum.bin_hz;
+      });
+      all += spectrum.power[k];
+      if (!expected) strange += spectrum.power[k];
+    }
+    EXPECT_GT(all, 0);
+    EXPECT_LT(10 * std::log10(strange / all), -70) << rpm << " rpm";
+    EXPECT_LT(sound::band_db(spectrum, 21500, 24001), -90) << rpm << " rpm";
+  }
+}
+
+TEST(DrillSound, RunsUpAndDownInsteadOfJumping) {
+  DrillSynth synth = make_synth();
+  const std::vector<float> up = play(synth, free_drill(1400), 0.5);
+  // Half way up after half of the run-up time: the mesh lies near half of its pitch, and the level is below the last.
+  const auto part = [&](double from_s, double to_s) {
+    return std::vector<float>(up.begin() + static_cast<int>(from_s * kRate_hz), up.begin() + static_cast<int>(to_s * kRate_hz));
+  };
+  EXPECT_LT(sound::rms_db(part(0.0, 0.05)), sound::rms_db(part(0.4, 0.5)) - 12);
+  EXPECT_LT(sound::rms_db(part(0.1, 0.15)), sound::rms_db(part(0.4, 0.5)) - 3);
+  const std::vector<float> down = play(synth, idle_drill(), 1.0);
+  EXPECT_GT(sound::peak(std::span(down).first(4800)), 1e-3) << "it still turns";
+  EXPECT_EQ(sound::peak(std::span(down).last(4800)), 0) << "it stands still";
+  EXPECT_TRUE(synth.silent());
+}
+
+TEST(DrillSound, SilentAtRest) {
+  DrillSynth synth = make_synth();
+  EXPECT_TRUE(synth.silent());
+  EXPECT_EQ(sound::peak(play(synth, idle_drill(), 0.5)), 0);
+  EXPECT_TRUE(synth.silent());
+}
+
+TEST(DrillSound, ResetSilencesAtOnceAndStartsAgainAlike) {
+  DrillSynth synth = make_synth();
+  const std::vector<float> first = play(synth, cortical_drill(1345), 0.5);
+  synth.reset();
+  std::vector<float> rest(4800, 1.0F);
+  synth.process(rest);
+  EXPECT_EQ(sound::peak(rest), 0);
+  synth.reset();
+  EXPECT_EQ(play(synth, cortical_drill(1345), 0.5), first);
+}
+
+TEST(DrillSound, ToolThatLeavesTheRoomRunsDown) {
+  DrillSynth synth = make_synth();
+  static_cast<void>(play(synth, cortical_drill(1345), 0.5));
+  synth.aim(SoundScene{});
+  std::vector<float> after(48000);
+  synth.process(after);
+  EXPECT_LT(sound::largest_step(after), 0.25);
+  EXPECT_EQ(sound::peak(std::span(after).last(4800)), 0);
+}
+
+TEST(DrillSound, EqualSeedsMakeEqualSamplesWhateverTheBlocks) {
+  const test::ScriptedDrilling script = test::scripted_drilling();
+  const std::vector<CuttingState> part(script.states.begin() + 240, script.states.begin() + 360);
+  DrillSynth one = make_synth(7), two = make_synth(7), other = make_synth(8);
+  const std::vector<float> whole = play(one, part);
+  std::vector<float> pieces(whole.size());
+  for (std::size_t i = 0; i < part.size(); ++i) {
+    two.aim(sound_scene(std::span(&part[i], 1), 0));
+    std::span<float> frames = std::span(pieces).subspan(i * test::kFramesPerState, test::kFramesPerState);
+    for (const std::size_t count : {1U, 63U, 100U, 236U}) {
+      two.process(frames.first(count));
+      frames = frames.subspan(count);
+    }
+  }
+  EXPECT_EQ(whole, pieces);
+  EXPECT_NE(whole, play(other, part));
+}
+
+TEST(DrillSound, ParametersMoveWithoutClicks) {
+  // The largest slope of the steady sounds bounds that of a change between them; a click would stand out of it.
+  const auto step_of = [](const CuttingState& state) { return sound::largest_step(steady(state, kPure)); };
+  const double steady_step = std::max(step_of(cortical_drill(1345)), step_of(free_drill(1400)));
+  DrillSynth synth = make_synth(1, kPure);
+  static_cast<void>(play(synth, free_drill(1400), 0.75));
+  for (int i = 0; i < 10; ++i) {
+    // Contact lost and found within one state, the worst that a stream can bring.
+    EXPECT_LT(sound::largest_step(play(synth, cortical_drill(1345), 0.1)), 1.25 * steady_step);
+    EXPECT_LT(sound::largest_step(play(synth, free_drill(1400), 0.1)), 1.25 * steady_step);
+  }
+}
+
+TEST(DrillSound, SeveralToolsAddUpByPower) {
+  CuttingState second = cortical_drill(1300);
+  second.author = AuthorId{2};
+  const std::vector<CuttingState> both = {cortical_drill(1345), second};
+  DrillSynth synth = make_synth();
+  std::vector<float> samples(96000);
+  for (std::size_t at = 0; at < samples.size(); at += 400) {
+    synth.aim(sound_scene(both, 0));
+    synth.process(std::span(samples).subspan(at, 400));
+  }
+  const double together_db = sound::rms_db(std::span(samples).last(48000));
+  const double a = std::pow(10, sound::rms_db(steady(both[0])) / 10), b = std::pow(10, sound::rms_db(steady(both[1])) / 10);
+  EXPECT_NEAR(together_db, 10 * std::log10(a + b), 0.7);
+}
+
+TEST(DrillSound, ChangedToolRunsDownBesideTheNewOne) {
+  DrillSynth synth = make_synth();
+  static_cast<void>(play(synth, free_drill(1400), 0.5));
+  const std::vector<float> samples = play(synth, burr(20000, 0), 1.5);
+  const double whine_hz = 20000 / 60.0;
+  EXPECT_GT(sound::find_tone(std::span(samples).last(24000), kRate_hz, whine_hz - 5, whine_hz + 5).level_db, -60);
+  const double mesh_hz = 48 * 1400 / 60.0;
+  EXPECT_LT(sound::tone_db(std::span(samples).last(24000), kRate_hz, mesh_hz), -75) << "the drill stands still";
+}
+
+TEST(DrillSound, EverythingAtOnceStaysWithinFullScale) {
+  std::vector<CuttingState> states;
+  for (std::uint64_t author = 1; author <= 12; ++author) {
+    CuttingState state = author % 2 ? cortical_drill(4000) : burr(60000, 1.9);
+    state.author = AuthorId{author};
+    state.force_physical_N = Vec3(0, 0, 500);
+    state.torque_Nmm = 5000;
+    state.feed_mm_per_s = 900;
+    states.push_back(state);
+  }
+  DrillSynth synth = make_synth();
+  std::vector<float> samples(96000);
+  double loudest = 0;
+  for (std::size_t at = 0; at < samples.size(); at += 400) {
+    synth.aim(sound_scene(states, 0));
+    synth.process(std::span(samples).subspan(at, 400));
+    loudest = std::max(loudest, sound::peak(std::span(samples).subspan(at, 400)));
+  }
+  EXPECT_LT(loudest, 1.0);
+  EXPECT_GT(loudest, 0.5) << "the limiter was needed";
+}
+
+TEST(DrillSound, NumbersOutOfRangeAreBounded) {
+  CuttingState state = cortical_drill(1e9);
+  state.density_g_cm3 = 1e9;
+  state.torque_Nmm = -1e9;
+  state.feed_mm_per_s = std::numeric_limits<double>::quiet_NaN();
+  DrillSynth synth = make_synth();
+  for (const float x : play(synth, state, 0.5)) ASSERT_TRUE(std::isfinite(x) && std::abs(x) <= 1.0F);
+}
+
+TEST(DrillSound, ProcessDoesNotAllocate) {
+  const test::ScriptedDrilling script = test::scripted_drilling();
+  std::vector<SoundScene> scenes;
+  for (const CuttingState& state : script.states) scenes.push_back(sound_scene(std::span(&state, 1), 0));
+  DrillSynth synth = make_synth();
+  std::vector<float> frames(test::kFramesPerState);
+  const test::AllocationCounter heap;
+  for (const SoundScene& scene : scenes) {
+    synth.aim(scene);
+    synth.process(frames);
+  }
+  synth.reset();
+  EXPECT_EQ(heap.count(), 0);
+  delete static_cast<int*>(::operator new(sizeof(int)));
+  EXPECT_GT(heap.count(), 0) << "the counter counts";
+}
+
+TEST(Limiter, LeavesWhatFitsAndHoldsWhatDoesNot) {
+  Limiter limiter;
+  double loudest = 0, softest = 0;
+  for (int block = 0; block < 400; ++block) {
+    // A tone that jumps from a quarter of full scale to four times full scale and back.
+    const double amplitude = block / 100 % 2 ? 4.0 : 0.25;
+    Block frames;
+    for (int i = 0; i < kBlockFrames; ++i) {
+      frames[static_cast<std::size_t>(i)] = static_cast<float>(
+          amplitude * std::sin(2 * std::numbers::pi * 440 * (block * kBlockFrames + i) / kRate_hz));
+    }
+    limiter.process(frames);
+    loudest = std::max(loudest, sound::peak(frames));
+    if (block == 50) softest = sound::peak(frames);
+  }
+  EXPECT_LT(loudest, 1.0);
+  EXPECT_GT(loudest, 0.9);
+  EXPECT_NEAR(softest, 0.25, 0.01);
+}
+
+}  // namespace
+}  // namespace osteon::audio
