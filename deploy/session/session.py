@@ -194,7 +194,7 @@ class Session:
             "cut_sites": [{key: rounded(value) for key, value in site.items() if key not in ("first", "last")}
                           for site in sites],
             "exit_codes": codes,
-            "mesh_hashes": [status.get("scene_mesh_hash") for status in statuses],
+            "mesh_hashes": [summaries["server"].get("mesh_hash"), *(status.get("scene_mesh_hash") for status in statuses)],
             "programs": summaries,
             "plan": self.plan,
         }
@@ -244,6 +244,6 @@ def agreement(numbers):
         "field_hash_server": server,
         "field_hash_haptic": haptic,
         "field_hash_equal": bool(server) and server == haptic,
-        # A viewer that saw every change, against one that came late.
+        # Viewers, those that saw every change and those that came late, whose surface is not the server's.
         "mesh_differences": sum(mesh != meshes[0] for mesh in meshes),
     }

@@ -81,13 +81,16 @@ class Run:
             self.say(line)
 
 
-def in_layer(session, layer, margin_mm=1.5):
-    """Rows whose whole cone is inside one layer, away from its faces."""
-    top = sum(thickness for thickness, _ in LAYERS[:layer])
-    bottom = top + LAYERS[layer][0]
+# Depths of the tip, mm, between which the whole cone is in the near cortex, the medulla, the far cortex.
+INSIDE = {"near cortex": (1.5, 4.8), "medulla": (6.5, 24.5), "far cortex": (26.5, 29.5)}
+
+
+def inside(session, layer):
+    """Rows whose whole cone is in a layer, on the way in."""
+    low, high = INSIDE[layer]
     depth = session["depth_mm"]
-    inside = (depth > top + POINT_HEIGHT_MM + margin_mm * 0.4) & (depth < bottom - margin_mm * 0.2)
-    return inside & (session["feed_mm_per_s"] > 0)
+    advancing = depth >= np.maximum.accumulate(depth)
+    return advancing & (depth >= low) & (depth <= high)
 
 
 def loop_figures(run, numbers):
@@ -132,13 +135,14 @@ def rig_physics(folder, numbers):
     session = record.read_table(folder / "session.csv")
     force = session["force_physical_n"]
     cortical, medullary = chi_force_n(1.0, 1.9), chi_force_n(1.0, 0.3)
-    measured = [float(np.mean(force[in_layer(session, layer)])) for layer in range(3)]
+    measured = {layer: float(np.mean(force[inside(session, layer)])) for layer in INSIDE}
     gone = session["depth_mm"] > THICKNESS_MM + POINT_HEIGHT_MM + 1.0
     removed = numbers["programs"]["server"]["removed_mm3"]
     cylinder = np.pi * DRILL_RADIUS_MM ** 2 * THICKNESS_MM
     return {
-        "rig_force_cortical_error": (max(error_percent(measured[i], cortical) for i in (0, 2)), cortical),
-        "rig_force_medullary_error": (error_percent(measured[1], medullary), medullary),
+        "rig_force_cortical_error": (
+            max(error_percent(measured[layer], cortical) for layer in ("near cortex", "far cortex")), cortical),
+        "rig_force_medullary_error": (error_percent(measured["medulla"], medullary), medullary),
         "rig_force_after_exit": (float(np.max(np.abs(force[gone]))) if gone.any() else None, None),
         "rig_removed_volume_error": (error_percent(removed, cylinder), cylinder),
     }
@@ -148,9 +152,9 @@ def hand(run, who):
     """One hand through the phantom: its feeds and its plunge behind the far cortex."""
     folder, _ = run.session(who, plans.drill(who))
     session = record.read_table(folder / "session.csv")
-    feeds = [float(np.median(session["feed_mm_per_s"][in_layer(session, layer)])) for layer in range(2)]
+    feeds = {layer: float(np.mean(session["feed_mm_per_s"][inside(session, layer)])) for layer in INSIDE}
     # The plunge begins where the drill's lips reach the far face.
-    plunge = float(np.max(session["device_depth_mm"])) - (THICKNESS_MM + POINT_HEIGHT_MM)
+    plunge = float(np.max(session["depth_mm"])) - (THICKNESS_MM + POINT_HEIGHT_MM)
     run.plunges[who] = plunge
     return feeds, plunge
 
@@ -158,7 +162,7 @@ def hand(run, who):
 def expert(run):
     feeds, plunge = hand(run, "expert")
     return {
-        "feed_medullary_over_cortical": (feeds[1] / feeds[0], REFERENCE_FEED_RATIO),
+        "feed_medullary_over_cortical": (feeds["medulla"] / feeds["near cortex"], REFERENCE_FEED_RATIO),
         "plunge_expert_error": (error_percent(plunge, REFERENCE_PLUNGE_MM["expert"]), REFERENCE_PLUNGE_MM["expert"]),
     }
 

@@ -72,7 +72,7 @@ FIGURES = [
     # Agreement of all holders of the bone, over every session of this run.
     Figure("field_hash_differences", "count", "sessions after which server and haptic client held different bone", "rig",
            ("==", 0)),
-    Figure("mesh_hash_differences", "count", "late viewers that held another surface than the viewer that saw every change", "rig",
+    Figure("mesh_hash_differences", "count", "viewers, one of them late, that held another surface than the server at the end", "rig",
            ("==", 0)),
     # Kernels.
     Figure("cut_burr", "us", "applying a 5 mm burr's cut of 8 ms at 0.125 mm", "bench",
