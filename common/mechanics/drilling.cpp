@@ -1,0 +1,49 @@
+#include "common/mechanics/drilling.hpp"
+
+#include <cmath>
+
+namespace osteon {
+namespace {
+
+constexpr double kChiScale = 134.6, kChiSpeed = -0.3327, kChiFeed = 0.5189, kChiDensity = 1.1841;
+constexpr double kReferenceDiameter_mm = 3.2, kReferenceDensity = 1.9;
+
+double scale_n(const DrillingParams& p, double rpm, double density_g_cm3) noexcept {
+  return kChiScale * std::pow(rpm, kChiSpeed) * std::pow(density_g_cm3, kChiDensity) * p.wear *
+         (p.diameter_mm / kReferenceDiameter_mm);
+}
+
+}  // namespace
+
+Newtons drilling_thrust(const DrillingParams& params, RevolutionsPerMinute speed, MillimetresPerSecond feed,
+                        GramsPerCm3 density) noexcept {
+  if (speed.value() < kMinCuttingRpm || feed.value() <= 0.0 || density.value() <= 0.0) return Newtons{0.0};
+  return Newtons{scale_n(params, speed.value(), density.value()) * std::pow(feed.value(), kChiFeed)};
+}
+
+MillimetresPerSecond drilling_feed(const DrillingParams& params, RevolutionsPerMinute speed, Newtons thrust,
+                                   GramsPerCm3 density) noexcept {
+  if (speed.value() < kMinCuttingRpm || thrust.value() <= 0.0 || density.value() <= 0.0) return MillimetresPerSecond{0.0};
+  return MillimetresPerSecond{std::pow(thrust.value() / scale_n(params, speed.value(), density.value()), 1.0 / kChiFeed)};
+}
+
+MillimetresPerSecond heel_contact_feed(const DrillingParams& params, RevolutionsPerMinute speed) noexcept {
+  return MillimetresPerSecond{0.33 * params.diameter_mm * speed.value() / 60.0};
+}
+
+NewtonMillimetres drilling_torque(const DrillingParams& params, Newtons thrust) noexcept {
+  return NewtonMillimetres{thrust.value() * params.diameter_mm / (4.0 * std::sin(0.5 * params.point_angle_rad))};
+}
+
+FeedLaw drilling_law(const DrillingParams& params, RevolutionsPerMinute speed, GramsPerCm3 density,
+                     double engaged) noexcept {
+  if (speed.value() < kMinCuttingRpm) return {};
+  const double rho = density.value() > 0.0 ? density.value() : 0.0;
+  return {.scale_n = engaged * scale_n(params, speed.value(), rho),
+          .exponent = kChiFeed,
+          .max_feed_mm_per_s = heel_contact_feed(params, speed).value(),
+          .threshold_n = params.threshold_n * params.wear * engaged * (params.diameter_mm / kReferenceDiameter_mm) *
+                         std::pow(rho / kReferenceDensity, kChiDensity)};
+}
+
+}  // namespace osteon

@@ -1,0 +1,33 @@
+#include "common/mechanics/feed_law.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace osteon {
+
+double resistance_n(const FeedLaw& law, double feed_mm_per_s) noexcept {
+  if (feed_mm_per_s <= 0.0) return 0.0;
+  return law.exponent == 1.0 ? law.scale_n * feed_mm_per_s : law.scale_n * std::pow(feed_mm_per_s, law.exponent);
+}
+
+FeedSolution solve_feed(const FeedLaw& law, double stiffness_n_per_mm, double extension_mm, double dt_s) noexcept {
+  const double available_n = stiffness_n_per_mm * extension_mm;
+  if (!(available_n > 0.0) || !(law.max_feed_mm_per_s > 0.0) || available_n < law.threshold_n)
+    return {.rubbing = available_n > 0.0};
+
+  const auto surplus_n = [&](double feed) {
+    return stiffness_n_per_mm * (extension_mm - feed * dt_s) - resistance_n(law, feed);
+  };
+  double low = 0.0, high = std::min(law.max_feed_mm_per_s, extension_mm / dt_s);
+  if (surplus_n(high) >= 0.0)
+    return {high, resistance_n(law, high), high == law.max_feed_mm_per_s, false};
+
+  // Bisection: 48 halvings are far below any force a hand feels, and the time is the same in every tick.
+  for (int i = 0; i < 48; ++i) {
+    const double middle = 0.5 * (low + high);
+    (surplus_n(middle) >= 0.0 ? low : high) = middle;
+  }
+  return {low, resistance_n(law, low), false, false};
+}
+
+}  // namespace osteon

@@ -1,0 +1,29 @@
+// Cutting resistance as a function of feed, and its inversion against a stiff coupling: feed follows force.
+#pragma once
+
+namespace osteon {
+
+// resistance(v) = scale · v^exponent, v in mm/s, N. What a drilling or milling law leaves once speed, density and
+// engagement of the moment are put in.
+struct FeedLaw {
+  double scale_n = 0;              // N at 1 mm/s
+  double exponent = 1;             // > 0
+  double max_feed_mm_per_s = 0;    // heel contact: the tool's flank touches the bone and cannot go faster
+  double threshold_n = 0;          // below this force the tool rubs and does not advance
+};
+
+[[nodiscard]] double resistance_n(const FeedLaw& law, double feed_mm_per_s) noexcept;
+
+struct FeedSolution {
+  double feed_mm_per_s = 0;
+  double cutting_n = 0;  // the law's share of the force; the rest is borne by the heel or by rubbing
+  bool heel_contact = false;
+  bool rubbing = false;
+};
+
+// Solves stiffness · (extension − v·dt) = resistance(v) for v in [0, min(cap, extension/dt)]. Both sides are monotone,
+// so the root is bracketed and unique. Fails soft: no extension or no law gives zero feed.
+[[nodiscard]] FeedSolution solve_feed(const FeedLaw& law, double stiffness_n_per_mm, double extension_mm,
+                                      double dt_s) noexcept;
+
+}  // namespace osteon

@@ -1,0 +1,48 @@
+// Turns the proxy's path into cuts: knots in the canonical integers, simplified, closed every 8 ms.
+#pragma once
+#include <array>
+#include <cstdint>
+
+#include "common/field/cut.hpp"
+
+namespace osteon::haptic {
+
+// A piece of path on its way from the haptic thread to the replica: a Cut without what only the session knows.
+struct CutPiece {
+  static constexpr int kMostKnots = 12;
+  std::uint64_t author_seq = 0;
+  int tool = 0;                // which of the loop's tools
+  int knots = 0;
+  std::array<QuantisedPose, kMostKnots> path{};
+  std::uint32_t spindle_rpm = 0;
+  std::int64_t closed_tick = 0;
+};
+
+class CutRecorder {
+ public:
+  static constexpr double kTolerance_mm = 0.01;  // of the path at both ends of the cutting part
+  static constexpr int kTicksPerCut = 7;         // closes within 8 ms even when the next tick is late
+
+  // [haptic] Starts a path here; what was not closed is forgotten.
+  void begin(const Pose& pose_bone_tool, double cutting_length_mm) noexcept;
+  // [haptic] The proxy has moved on.
+  void add(const Pose& pose_bone_tool) noexcept;
+  [[nodiscard]] bool recording() const noexcept { return recording_; }
+  [[nodiscard]] bool due() const noexcept { return count_ > kTicksPerCut; }
+  // [haptic] Ends the piece; the next begins at its last knot. False when nothing has moved; nothing is closed then.
+  bool close(CutPiece& piece) noexcept;
+  // [haptic] Ends the path.
+  void end() noexcept { recording_ = false; }
+
+ private:
+  [[nodiscard]] bool straight(int from, int to) const noexcept;
+
+  static constexpr int kMostPoses = CutPiece::kMostKnots;
+  std::array<Pose, kMostPoses> poses_;
+  int count_ = 0;
+  bool recording_ = false;
+  double cutting_length_mm_ = 0;
+  QuantisedPose last_{};
+};
+
+}  // namespace osteon::haptic

@@ -1,0 +1,104 @@
+// One millisecond of touch: device pose in; force, cutting state and cuts out. No clock, thread, log or allocation; the
+// caller gives time by calling.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "common/core/id.hpp"
+#include "common/mechanics/cutting_state.hpp"
+#include "common/mechanics/spindle.hpp"
+#include "common/runtime/event_queue.hpp"
+#include "haptic_client/control/cut_recorder.hpp"
+#include "haptic_client/control/proxy.hpp"
+#include "haptic_client/control/workspace_mapping.hpp"
+
+namespace osteon::haptic {
+
+struct LoopParams {
+  double dt_s = 1e-3;
+  double force_scale = 1.0;               // s: rendered = s · physical
+  double stiffness_n_per_mm = 50.0;       // K_c of the coupling, physical; k_c = s · K_c on the device
+  double peak_n = 60.0;                   // of the device
+  double continuous_n = 30.0;             // of the device; the limit while it is warm
+  double slew_n_per_ms = 0.5;             // growth of force that the hand did not cause; on the device
+};
+
+// K_c and s for a device: s = continuous force / 30 N unless given, and s · K_c within the device's stiffness.
+[[nodiscard]] LoopParams loop_params(double peak_n, double continuous_n, double stiffness_n_per_mm, double force_scale);
+
+struct LoopInput {
+  Pose pose_device_tool;      // the handle, device frame
+  bool clutch = false;        // held: the tool stays, no force, the handle moves freely
+  double spindle_rpm = 0;     // commanded
+  bool device_ok = true;
+  bool device_warm = false;
+  bool link_ok = true;        // false: the server has gone; no force, no spindle
+  int periods = 1;            // since the last tick; 1 when on time
+};
+
+// Bits of LoopReport::events.
+enum LoopEvent : std::uint32_t {
+  kUncovered = 1,        // no patch round the tool: no force, the tool stays
+  kForceLimited = 2,     // the device's limit cut the force
+  kSlewLimited = 4,
+  kCutsWaiting = 8,      // too many cuts wait for the replica: the tool rubs until it follows
+  kMissedTicks = 16,
+  kHeelContact = 32,
+};
+
+struct LoopReport {
+  Vec3 force_device_n = Vec3::Zero();    // to write to the device, device frame
+  Vec3 force_physical_n = Vec3::Zero();  // of the bone on the tool, bone frame; not scaled, within the device's limit
+  Vec3 cutting_force_n = Vec3::Zero();   // of the tool on the bone, the law's part, bone frame
+  Vec3 moved_mm = Vec3::Zero();          // of the proxy in this tick
+  Pose pose_bone_proxy, pose_bone_device;
+  double spindle_rpm = 0, feed_mm_per_s = 0, density_g_cm3 = 0, engaged = 0, torque_nmm = 0;
+  CuttingPhase phase = CuttingPhase::idle;
+  int tool = 0;
+  std::uint64_t state_seq = 0;           // counts ticks
+  std::uint32_t events = 0;
+};
+
+class HapticLoop {
+ public:
+  // `tools`: every tool of the session, ready; a tool is named by its place there.
+  HapticLoop(const LoopParams& params, std::vector<ToolModel> tools);
+
+  // [haptic] Takes up a tool in free air, with the handle at a place of the device.
+  void take_up(int tool, const Pose& pose_bone_tool, const WorkspaceMapping& mapping) noexcept;
+  // [haptic] `patch`: the newest there is.
+  LoopReport tick(const LoopInput& input, const Patch& patch) noexcept;
+
+  // [replica] Closed cuts in order.
+  [[nodiscard]] bool take_piece(CutPiece& piece) noexcept { return pieces_.try_pop(piece); }
+  [[nodiscard]] const ToolModel& tool(int index) const { return tools_[static_cast<std::size_t>(index)]; }
+  [[nodiscard]] const LoopParams& params() const { return params_; }
+  // [haptic]
+  [[nodiscard]] const WorkspaceMapping& mapping() const noexcept { return mapping_; }
+  [[nodiscard]] std::uint64_t cuts_closed() const noexcept { return cuts_closed_; }
+
+ private:
+  void record(const ToolModel& model, bool near_bone, LoopReport& report) noexcept;
+  [[nodiscard]] Vec3 rendered_force(const Vec3& extension_mm, const LoopInput& input, LoopReport& report) noexcept;
+
+  static constexpr int kQuietTicks = 20;  // a path ends when the tool has been off the bone for so long
+
+  LoopParams params_;
+  std::vector<ToolModel> tools_;
+  EventQueue<CutPiece, 64> pieces_;
+  WorkspaceMapping mapping_;
+  Proxy proxy_;
+  Spindle spindle_;
+  CutRecorder recorder_;
+  int tool_ = 0;
+  bool placed_ = false, clutched_ = false;
+  int quiet_ticks_ = 0;
+  double torque_nmm_ = 0;
+  std::uint64_t cuts_closed_ = 0, ticks_ = 0;
+  Vec3 extension_mm_ = Vec3::Zero();      // of the last tick
+  Vec3 force_bone_n_ = Vec3::Zero();      // rendered in the last tick
+  Vec3 device_mm_ = Vec3::Zero();         // device in the last tick, bone frame
+};
+
+}  // namespace osteon::haptic

@@ -1,0 +1,56 @@
+// The bone round the tool as the haptic loop feels it: fine bricks at the pitch of the tool's cuts round its cutting
+// part, coarse ones at h round the whole tool. Built by PatchBuilder on another thread, read-only afterwards.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "common/core/id.hpp"
+#include "common/geometry/lattice.hpp"
+
+namespace osteon::haptic {
+
+// Samples of 8³ cells with an apron of one on the upper sides, so that every point in the cells can be interpolated.
+inline constexpr int kBrickCells = 8;
+inline constexpr int kBrickSamples = kBrickCells + 1;
+struct Brick {
+  std::array<float, kBrickSamples * kBrickSamples * kBrickSamples> values;  // z fastest
+};
+
+// A box of bricks of one level; places without a brick are unknown.
+class BrickGrid {
+ public:
+  // Bricks `first` to `last`, both included, in bricks of this pitch; all unknown. Keeps its memory.
+  void reset(double pitch_mm, Coord first, Coord last);
+  // The owners are the patches that hold a brick and the builder's store; the haptic thread owns none.
+  void set(Coord brick, std::shared_ptr<const Brick> values);
+  [[nodiscard]] double pitch_mm() const { return pitch_mm_; }
+  // Trilinear; false where no brick covers the point.
+  [[nodiscard]] bool sample(const Vec3& point_mm, double& value) const noexcept;
+
+ private:
+  double pitch_mm_ = 0;
+  Coord first_, dims_;
+  std::vector<std::shared_ptr<const Brick>> bricks_;
+};
+
+struct Patch {
+  BrickGrid fine;            // f, mm: negative in bone
+  BrickGrid coarse;          // f
+  BrickGrid density;         // g/cm³, at h
+  std::uint64_t own_cuts = 0;  // own cuts up to this number are in it
+  RoomSeq room_seq;            // committed events that are in it
+  std::uint64_t version = 0;   // 0: never filled
+
+  // f at a point, fine where there is a fine brick; false where the patch does not reach.
+  [[nodiscard]] bool solid(const Vec3& point_mm, double& solid_mm) const noexcept {
+    return fine.sample(point_mm, solid_mm) || coarse.sample(point_mm, solid_mm);
+  }
+  [[nodiscard]] double density_at(const Vec3& point_mm) const noexcept {
+    double value = 0.0;
+    return density.sample(point_mm, value) ? value : 0.0;
+  }
+};
+
+}  // namespace osteon::haptic

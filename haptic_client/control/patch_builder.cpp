@@ -1,0 +1,122 @@
+#include "haptic_client/control/patch_builder.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/field/kernel.hpp"
+
+namespace osteon::haptic {
+namespace {
+
+constexpr std::size_t kMostKeptBricks = 20000;
+
+CoordBox brick_samples(Coord index) {
+  const Coord first = kBrickCells * index;
+  return {first, first + Coord{kBrickCells, kBrickCells, kBrickCells}};
+}
+
+// Bricks of this pitch that touch the box.
+CoordBox bricks_in(const Box& box, double pitch_mm) {
+  const CoordBox samples = covering_samples(box, pitch_mm);
+  return {shift_down(samples.min, 3), shift_down(samples.max, 3)};
+}
+
+Vec3 brick_centre_mm(Coord index, double pitch_mm) {
+  return (kBrickCells * pitch_mm) * Vec3(index.x + 0.5, index.y + 0.5, index.z + 0.5);
+}
+
+// Box of a part of the tool between two places on its axis.
+Box tool_box(const Tool& tool, const Pose& pose, double from_z_mm, double to_z_mm) {
+  Box box;
+  box.include(pose.point({0, 0, from_z_mm}));
+  box.include(pose.point({0, 0, to_z_mm}));
+  return box.grown(0.5 * std::max(tool.diameter_mm, tool.shank_diameter_mm));
+}
+
+template <class Visit>
+void for_each(const CoordBox& box, const Visit& visit) {
+  for (Coord c{box.min.x, 0, 0}; c.x <= box.max.x; ++c.x)
+    for (c.y = box.min.y; c.y <= box.max.y; ++c.y)
+      for (c.z = box.min.z; c.z <= box.max.z; ++c.z) visit(c);
+}
+
+}  // namespace
+
+void PatchBuilder::changed(double pitch_mm, int level, const std::vector<Coord>& leaf_origins) {
+  const double leaf_pitch = level_pitch_mm(pitch_mm, level);
+  for (const Coord& origin : leaf_origins) {
+    // One sample more on every side: interpolation reaches there.
+    const Box box{position_mm(origin - Coord{1, 1, 1}, leaf_pitch),
+                  position_mm(origin + Coord{kLeafSize, kLeafSize, kLeafSize}, leaf_pitch)};
+    const auto forget = [&](Store& store, double pitch) {
+      if (store.empty()) return;
+      CoordBox bricks = bricks_in(box, pitch);
+      // The apron of the brick below also holds these samples.
+      bricks.min = bricks.min - Coord{1, 1, 1};
+      for_each(bricks, [&](Coord index) {
+        const CoordBox samples = brick_samples(index);
+        const Vec3 low = position_mm(samples.min, pitch), high = position_mm(samples.max, pitch);
+        if ((low.array() <= box.max_mm.array()).all() && (high.array() >= box.min_mm.array()).all()) store.erase(index);
+      });
+    };
+    if (fine_level_ >= 0) forget(fine_, level_pitch_mm(pitch_mm, fine_level_));
+    forget(coarse_, pitch_mm);
+  }
+}
+
+std::shared_ptr<const Brick> PatchBuilder::brick(Store& store, const CutField& field, int level, Coord index,
+                                                 Quantity quantity) {
+  auto& kept = store[index];
+  if (kept) return kept;
+  const CoordBox samples = brick_samples(index);
+  const CoordBox at_h{shift_down(samples.min, level), shift_down(samples.max, level) + Coord{1, 1, 1}};
+  if (quantity == Quantity::solid && !field.bone().has_bone(at_h)) {
+    if (!air_) {
+      auto air = std::make_shared<Brick>();
+      air->values.fill(static_cast<float>(kBandVoxels * field.bone().pitch_mm()));
+      air_ = air;
+    }
+    return kept = air_;
+  }
+  auto made = std::make_shared<Brick>();
+  if (quantity == Quantity::density) field.bone().gather_density(samples, made->values);
+  else field.gather_solid(level, samples, made->values);
+  ++bricks_made_;
+  return kept = made;
+}
+
+void PatchBuilder::build(const CutField& field, const ToolModel& model, const Pose& pose, Patch& patch) {
+  const double h = field.bone().pitch_mm();
+  const Tool& tool = model.tool;
+  if (fine_level_ != tool.cut_level || fine_.size() > kMostKeptBricks) fine_.clear();
+  if (coarse_.size() > kMostKeptBricks) coarse_.clear(), density_.clear();
+  fine_level_ = tool.cut_level;
+  const Pose pose_tool_bone = pose.inverse();
+
+  // Bricks whose centre is farther from the tool's surface than the margin and half their diagonal are left out, and so
+  // are those deep inside it.
+  const auto fill = [&](BrickGrid& grid, const CoordBox& bricks, double pitch, double margin_mm, const auto& make) {
+    grid.reset(pitch, bricks.min, bricks.max);
+    const double half_diagonal_mm = 0.5 * std::sqrt(3.0) * kBrickCells * pitch;
+    for_each(bricks, [&](Coord index) {
+      const double distance_mm = signed_distance_mm(tool, pose_tool_bone.point(brick_centre_mm(index, pitch)));
+      if (distance_mm < margin_mm + half_diagonal_mm && distance_mm > -half_diagonal_mm - model.fine_pitch_mm)
+        grid.set(index, make(index));
+    });
+  };
+
+  // The fine box ends a margin beyond the tip and reaches back as far as the sample limit allows.
+  const double fine_reach_mm = params_.fine_samples * model.fine_pitch_mm - 2.0 * params_.fine_margin_mm - tool.diameter_mm;
+  const Box fine_box = tool_box(tool, pose, 0.0, -std::min(tool.cutting_length_mm, std::max(1.0, fine_reach_mm)));
+  fill(patch.fine, bricks_in(fine_box.grown(params_.fine_margin_mm), model.fine_pitch_mm), model.fine_pitch_mm,
+       params_.fine_margin_mm, [&](Coord i) { return brick(fine_, field, tool.cut_level, i, Quantity::solid); });
+
+  const CoordBox coarse = bricks_in(tool_box(tool, pose, 0.0, -tool.reach_mm()).grown(params_.coarse_margin_mm), h);
+  fill(patch.coarse, coarse, h, params_.coarse_margin_mm,
+       [&](Coord i) { return brick(coarse_, field, 0, i, Quantity::solid); });
+  fill(patch.density, coarse, h, params_.coarse_margin_mm,
+       [&](Coord i) { return brick(density_, field, 0, i, Quantity::density); });
+  ++patch.version;
+}
+
+}  // namespace osteon::haptic

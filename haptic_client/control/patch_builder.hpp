@@ -1,0 +1,42 @@
+// Gathers patches from the replica of the cut field. Bricks are kept between patches and made again only where a cut
+// changed them, so that a patch costs what the last cuts touched.
+#pragma once
+#include <memory>
+#include <unordered_map>
+#include <vector>
+
+#include "common/volume/cut_field.hpp"
+#include "haptic_client/control/patch.hpp"
+#include "haptic_client/control/tool_model.hpp"
+
+namespace osteon::haptic {
+
+struct PatchParams {
+  double fine_margin_mm = 1.5;    // of fine bricks round the cutting part
+  double coarse_margin_mm = 4.0;  // of coarse bricks round the whole tool
+  int fine_samples = 160;         // along an axis, at most
+};
+
+class PatchBuilder {
+ public:
+  explicit PatchBuilder(const PatchParams& params = {}) : params_(params) {}
+
+  // Forgets bricks that contain samples of these leaves (origins at `level`) of a field with this h.
+  void changed(double pitch_mm, int level, const std::vector<Coord>& leaf_origins);
+  // Fills `patch` round the tool at this pose. Cuts and room_seq of the patch are the caller's to set.
+  void build(const CutField& field, const ToolModel& model, const Pose& pose_bone_tool, Patch& patch);
+  [[nodiscard]] std::size_t bricks_made() const { return bricks_made_; }
+
+ private:
+  using Store = std::unordered_map<Coord, std::shared_ptr<const Brick>, CoordHash>;
+  enum class Quantity { solid, density };
+  std::shared_ptr<const Brick> brick(Store& store, const CutField& field, int level, Coord index, Quantity quantity);
+
+  PatchParams params_;
+  int fine_level_ = -1;
+  Store fine_, coarse_, density_;
+  std::shared_ptr<const Brick> air_;  // shared by every brick far from bone
+  std::size_t bricks_made_ = 0;
+};
+
+}  // namespace osteon::haptic

@@ -1,0 +1,48 @@
+#include "haptic_client/control/session.hpp"
+
+namespace osteon::haptic {
+
+SimulatedSession::SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale)
+    : surgeon_(std::move(plan)),
+      device_(device),
+      loop_(loop_params(device.limits.peak_n, device.limits.continuous_n, device.limits.stiffness_n_per_mm, force_scale),
+            surgeon_.plan().tools) {}
+
+SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok, int periods) noexcept {
+  const double dt_s = loop_.params().dt_s;
+  SessionTick result;
+  result.order = surgeon_.act(last_, dt_s);
+  if (result.order.phase != SurgeonPhase::done && result.order.phase != SurgeonPhase::wait) {
+    const ReadyStep& step = surgeon_.plan().steps[result.order.step];
+    if (result.order.take_up) {
+      const WorkspaceMapping mapping = Surgeon::mapping_for(step, device_.limits().workspace_radius_mm);
+      const Pose pose_bone_tool{result.order.hand.target_mm, step.rotation};
+      loop_.take_up(step.tool, pose_bone_tool, mapping);
+      // On a device that shows less than the physical force the whole hand is that much lighter.
+      HandParams hand = scaled(Surgeon::hand_for(step.plan), loop_.params().force_scale);
+      device_.take(hand, mapping.pose_device_tool(pose_bone_tool).position_mm);
+    }
+    const WorkspaceMapping& mapping = loop_.mapping();
+    HandCommand command = result.order.hand;
+    command.target_mm = mapping.pose_device_tool({command.target_mm, step.rotation}).position_mm;
+    command.axis = mapping.to_device(command.axis);
+    device_.command(command, mapping.pose_device_tool({Vec3::Zero(), step.rotation}).rotation,
+                    result.order.spindle_rpm > 0.0 ? kSpindlePedal : 0u);
+    device_.step(dt_s);
+  }
+
+  const DeviceReading reading = device_.read();
+  LoopInput input;
+  input.pose_device_tool = reading.pose_device_tool;
+  input.clutch = (reading.buttons & kClutchButton) != 0;
+  input.spindle_rpm = reading.buttons & kSpindlePedal ? result.order.spindle_rpm : 0.0;
+  input.device_ok = reading.status != DeviceStatus::fault;
+  input.device_warm = reading.status == DeviceStatus::warm;
+  input.link_ok = link_ok;
+  input.periods = periods;
+  result.report = last_ = loop_.tick(input, patch);
+  device_.write(result.report.force_device_n);
+  return result;
+}
+
+}  // namespace osteon::haptic

@@ -1,0 +1,32 @@
+// A simulated surgeon at a simulated device at the haptic loop: one tick of the whole, on whatever time the caller keeps.
+#pragma once
+#include "haptic_client/control/surgeon.hpp"
+#include "haptic_client/device/simulated_device.hpp"
+
+namespace osteon::haptic {
+
+struct SessionTick {
+  SurgeonOrder order;
+  LoopReport report;
+};
+
+class SimulatedSession {
+ public:
+  SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale);
+
+  // [haptic] `link_ok` false ends force and spindle; `periods` as in LoopInput.
+  SessionTick tick(const Patch& patch, bool link_ok, int periods) noexcept;
+  [[nodiscard]] bool done() const noexcept { return surgeon_.done(); }
+
+  [[nodiscard]] HapticLoop& loop() noexcept { return loop_; }
+  [[nodiscard]] const Surgeon& surgeon() const noexcept { return surgeon_; }
+  [[nodiscard]] const SimulatedDevice& device() const noexcept { return device_; }
+
+ private:
+  Surgeon surgeon_;
+  SimulatedDevice device_;
+  HapticLoop loop_;
+  LoopReport last_;
+};
+
+}  // namespace osteon::haptic

@@ -1,0 +1,312 @@
+#include "haptic_client/control/surgeon.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace osteon::haptic {
+namespace {
+
+constexpr double kStandOff_mm = 12.0;        // where a tool is taken up, above the surface
+constexpr double kNear_mm = 1.5;             // from here the surface is sought slowly
+constexpr double kCarrySpeed_mm_per_s = 25.0;
+constexpr double kSeekSpeed_mm_per_s = 4.0;
+constexpr double kMostPush_s = 60.0;
+constexpr double kMostWaitForPatch_s = 10.0;
+constexpr double kCorticalDensity = 1.1;     // g/cm³; what is denser counts as cortex in the means
+constexpr double kBurrTilt_rad = 30.0 * std::numbers::pi / 180.0;  // the pole of a burr does not cut
+constexpr double kPass_mm = 0.6;             // depth of a burr's pass
+
+double depth_mm(const ReadyStep& step, const Vec3& tip_mm) { return (tip_mm - step.site.entry_mm).dot(step.site.axis); }
+
+std::string at_step(std::size_t index) { return "step " + std::to_string(index + 1) + ": "; }
+
+Result<Site> find_site(const Case& bone, const PlanEntry& entry, const Site* last) {
+  if (entry.toward) return find_site_toward(bone, *entry.toward);
+  if (entry.point_mm && entry.axis) return find_site_at(bone, *entry.point_mm, *entry.axis);
+  if (entry.beside_last_mm) {
+    if (!last) return failure(ErrorCode::invalid_input, "entry.beside_last_mm needs a step before it; give entry.toward");
+    return find_site_beside(bone, *last, (*entry.beside_last_mm)[0], (*entry.beside_last_mm)[1]);
+  }
+  return failure(ErrorCode::invalid_input, "entry is missing; give {\"toward\": [x, y, z]} or {\"point_mm\": [...], \"axis\": [...]}");
+}
+
+// Back and forth over the window, pass below pass, following the imported surface.
+void plan_sweep(const Case& bone, const Tool& tool, ReadyStep& step) {
+  const Site& site = step.site;
+  const double radius = 0.5 * tool.diameter_mm;
+  // Tilted about v, so that the flank cuts; the sphere stays where it is.
+  const Eigen::Quaterniond upright = pose_along(Vec3::Zero(), site.axis).rotation;
+  step.rotation = (Eigen::Quaterniond(Eigen::AngleAxisd(kBurrTilt_rad, site.across_v)) * upright).normalized();
+  const Vec3 tip_from_centre = radius * (step.rotation * Vec3::UnitZ());
+
+  const double half_u = std::max(0.0, 0.5 * step.plan.window_u_mm - radius), half_v = std::max(0.0, 0.5 * step.plan.window_v_mm - radius);
+  const int passes = std::max(1, static_cast<int>(std::ceil(step.plan.depth_mm / kPass_mm)));
+  const int lines = 1 + static_cast<int>(std::ceil(2.0 * half_v / (0.4 * tool.diameter_mm)));
+  const int places = 1 + static_cast<int>(std::ceil(2.0 * half_u));
+  const auto surface_height = [&](double u, double v) {
+    const Vec3 from = site.entry_mm + u * site.across_u + v * site.across_v - 10.0 * site.axis;
+    const double distance = distance_to_bone_mm(bone, from, site.axis, 20.0);
+    return distance < 0.0 ? 0.0 : distance - 10.0;
+  };
+  bool forth = true;
+  for (int pass = 1; pass <= passes; ++pass) {
+    const double depth = step.plan.depth_mm * pass / passes;
+    for (int line = 0; line < lines; ++line) {
+      const double across = lines > 1 ? half_v * (2.0 * line / (lines - 1) - 1.0) : 0.0;
+      const double v = pass % 2 ? across : -across;
+      for (int place = 0; place < places; ++place) {
+        const double along = places > 1 ? half_u * (2.0 * place / (places - 1) - 1.0) : 0.0;
+        const double u = forth ? along : -along;
+        const Vec3 centre = site.entry_mm + u * site.across_u + v * site.across_v + (surface_height(u, v) + depth - radius) * site.axis;
+        step.sweep_mm.push_back(centre + tip_from_centre);
+      }
+      forth = !forth;
+    }
+  }
+}
+
+}  // namespace
+
+Result<ReadyPlan> make_ready(const std::vector<PlanStep>& plan, const Case& bone) {
+  ReadyPlan ready;
+  const Site* last = nullptr;
+  ready.steps.reserve(plan.size());  // `last` points into it
+  for (std::size_t i = 0; i < plan.size(); ++i) {
+    ReadyStep step;
+    step.plan = plan[i];
+    if (step.plan.action != Action::wait) {
+      const Result<Tool> tool = find_tool(step.plan.tool);
+      if (!tool) return failure(tool.error().code, at_step(i) + tool.error().message);
+      const ToolKind needed = step.plan.action == Action::drill ? ToolKind::drill : ToolKind::round_burr;
+      if (tool->kind != needed)
+        return failure(ErrorCode::invalid_input, at_step(i) + "tool \"" + tool->name + "\" cannot do this action; choose a " +
+                                                     (needed == ToolKind::drill ? "drill" : "round burr"));
+      Result<Site> site = find_site(bone, step.plan.entry, last);
+      if (!site) return failure(site.error().code, at_step(i) + site.error().message);
+      step.site = *site;
+      step.spindle_rpm = step.plan.spindle_rpm > 0.0 ? step.plan.spindle_rpm : tool->spindle_rpm;
+      step.tool = static_cast<int>(ready.tools.size());
+      ready.tools.emplace_back(*tool, bone.pitch_mm(), step.plan.wear);
+      ready.tools.back().spindle.full_rpm = std::max(1.0, step.spindle_rpm);
+      if (needed == ToolKind::drill) {
+        step.rotation = pose_along(Vec3::Zero(), step.site.axis).rotation;
+        step.tip_height_mm = 0.5 * tool->diameter_mm / std::tan(0.5 * tool->point_angle_rad);
+        if (step.plan.hand == HandKind::rig && step.site.thickness_mm + step.plan.beyond_mm > tool->reach_mm())
+          return failure(ErrorCode::invalid_input, at_step(i) + "the bone is thicker here than the drill is long; choose another entry");
+      } else {
+        plan_sweep(bone, *tool, step);
+      }
+    }
+    ready.steps.push_back(std::move(step));
+    if (ready.steps.back().plan.action != Action::wait) last = &ready.steps.back().site;
+  }
+  return ready;
+}
+
+const char* name(SurgeonPhase phase) {
+  constexpr const char* kNames[] = {"take_up", "approach", "spin_up", "seek", "push", "feed",
+                                    "react",   "sweep",    "retract", "lift", "wait", "done"};
+  return kNames[static_cast<int>(phase)];
+}
+
+void LayerMeans::add(double force, double feed, double density) noexcept {
+  ++ticks;
+  const double w = 1.0 / static_cast<double>(ticks);
+  force_n += w * (force - force_n);
+  feed_mm_per_s += w * (feed - feed_mm_per_s);
+  density_g_cm3 += w * (density - density_g_cm3);
+}
+
+Surgeon::Surgeon(ReadyPlan plan) : plan_(std::move(plan)), results_(plan_.steps.size()) {
+  if (!plan_.steps.empty() && plan_.steps[0].plan.action == Action::wait) phase_ = SurgeonPhase::wait;
+}
+
+HandParams Surgeon::hand_for(const PlanStep& plan) {
+  HandParams hand = plan.hand == HandKind::novice ? novice_hand() : expert_hand();
+  hand.push_n = plan.push_n;
+  return hand;
+}
+
+WorkspaceMapping Surgeon::mapping_for(const ReadyStep& step, double workspace_radius_mm) {
+  const Site& site = step.site;
+  // The view looks along the tool: the device's z comes out of the bone.
+  Eigen::Matrix3d view;
+  view.col(0) = site.across_u;
+  view.col(2) = -site.axis;
+  view.col(1) = view.col(2).cross(view.col(0));
+  const double reach_mm = std::max(kStandOff_mm, std::min(site.thickness_mm, 60.0) + 15.0);
+  WorkspaceMapping mapping;
+  mapping.align(Eigen::Quaterniond(view).normalized(), std::max(1.0, reach_mm / workspace_radius_mm), Vec3::Zero(), site.entry_mm);
+  return mapping;
+}
+
+void Surgeon::enter(SurgeonPhase phase) noexcept {
+  phase_ = phase;
+  in_phase_s_ = 0.0;
+}
+
+bool Surgeon::carry_to_depth(const ReadyStep& step, double to_mm, double speed_mm_per_s, double dt_s) noexcept {
+  const double most = speed_mm_per_s * dt_s;
+  target_depth_mm_ += std::clamp(to_mm - target_depth_mm_, -most, most);
+  hand_.mode = step.plan.hand == HandKind::rig ? HandMode::rig : HandMode::carry;
+  hand_.target_mm = step.site.entry_mm + target_depth_mm_ * step.site.axis;
+  return std::abs(to_mm - target_depth_mm_) < 1e-9;
+}
+
+void Surgeon::observe(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept {
+  StepResult& result = results_[step_];
+  result.duration_s += dt_s;
+  const double force_n = std::max(0.0, -report.force_physical_n.dot(step.site.axis));
+  const double depth = depth_mm(step, report.pose_bone_proxy.position_mm);
+  result.peak_force_n = std::max(result.peak_force_n, report.force_physical_n.norm());
+  result.deepest_mm = std::max(result.deepest_mm, depth);
+
+  if (report.phase == CuttingPhase::cutting) {
+    result.all.add(report.force_physical_n.norm(), report.feed_mm_per_s, report.density_g_cm3);
+    if (step.plan.action == Action::drill && report.engaged > 0.97 && (phase_ == SurgeonPhase::push || phase_ == SurgeonPhase::feed)) {
+      LayerMeans& layer = report.density_g_cm3 < kCorticalDensity          ? result.medulla
+                          : depth < 0.5 * step.site.thickness_mm ? result.near_cortex
+                                                                 : result.far_cortex;
+      layer.add(force_n, report.feed_mm_per_s, report.density_g_cm3);
+    }
+  }
+  if (step.plan.action != Action::drill) return;
+  // Past the far surface with nothing engaged: from here on the tip only plunges.
+  if (left_far_side_mm_ < 0.0 && depth > step.site.thickness_mm && report.engaged == 0.0) left_far_side_mm_ = depth;
+  if (left_far_side_mm_ >= 0.0) {
+    result.broke_through = true;
+    result.plunge_mm = std::max(result.plunge_mm, depth - left_far_side_mm_);
+  }
+}
+
+void Surgeon::drill(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept {
+  const double force_n = -report.force_physical_n.dot(step.site.axis);
+  const double depth = depth_mm(step, report.pose_bone_proxy.position_mm);
+  const bool rig = step.plan.hand == HandKind::rig;
+  switch (phase_) {
+    case SurgeonPhase::seek:
+      if (rig) {
+        if (carry_to_depth(step, -0.3, kSeekSpeed_mm_per_s, dt_s)) enter(SurgeonPhase::feed);
+      } else {
+        carry_to_depth(step, step.site.thickness_mm, kSeekSpeed_mm_per_s, dt_s);
+        if (force_n > 0.3 || depth > step.site.thickness_mm) enter(SurgeonPhase::push);
+      }
+      break;
+    case SurgeonPhase::feed:
+      if (carry_to_depth(step, step.site.thickness_mm + step.plan.beyond_mm, step.plan.feed_mm_per_s, dt_s)) enter(SurgeonPhase::retract);
+      break;
+    case SurgeonPhase::push:
+      hand_.mode = HandMode::push;
+      // The lips are in the far cortex and the resistance has gone: the bone gives way.
+      if (depth > step.site.thickness_mm && force_n < 0.5 * step.plan.push_n) {
+        hand_.mode = HandMode::release;
+        enter(SurgeonPhase::react);
+      } else if (in_phase_s_ > kMostPush_s) {
+        results_[step_].completed = false;
+        target_depth_mm_ = depth;
+        enter(SurgeonPhase::retract);
+      }
+      break;
+    case SurgeonPhase::react:
+      if (in_phase_s_ > 0.6) {
+        target_depth_mm_ = depth_mm(step, report.pose_bone_device.position_mm);
+        enter(SurgeonPhase::retract);
+      }
+      break;
+    default: break;
+  }
+}
+
+void Surgeon::burr(const ReadyStep& step, const LoopReport&, double dt_s) noexcept {
+  if (phase_ == SurgeonPhase::seek) {
+    hand_.target_mm = step.sweep_mm.front() - kNear_mm * step.site.axis;
+    knot_ = 0;
+    enter(SurgeonPhase::sweep);
+    return;
+  }
+  if (phase_ != SurgeonPhase::sweep) return;
+  hand_.mode = step.plan.hand == HandKind::rig ? HandMode::rig : HandMode::carry;
+  double left_mm = step.plan.sweep_mm_per_s * dt_s;
+  while (left_mm > 0.0 && knot_ < step.sweep_mm.size()) {
+    const Vec3 away = step.sweep_mm[knot_] - hand_.target_mm;
+    const double distance = away.norm();
+    if (distance <= left_mm) {
+      hand_.target_mm = step.sweep_mm[knot_++];
+    } else {
+      hand_.target_mm += away * (left_mm / distance);
+    }
+    left_mm -= distance;
+  }
+  if (knot_ == step.sweep_mm.size()) {
+    target_depth_mm_ = depth_mm(step, hand_.target_mm);
+    enter(SurgeonPhase::retract);
+  }
+}
+
+SurgeonOrder Surgeon::act(const LoopReport& report, double dt_s) noexcept {
+  SurgeonOrder order;
+  if (done()) return order;
+  const ReadyStep& step = plan_.steps[step_];
+  in_phase_s_ += dt_s;
+  order.step = step_;
+  bool finished = false;
+
+  if (step.plan.action == Action::wait) {
+    phase_ = SurgeonPhase::wait;
+    results_[step_].duration_s = in_phase_s_;
+    results_[step_].completed = finished = in_phase_s_ >= step.plan.seconds;
+  } else if (phase_ == SurgeonPhase::take_up) {
+    if (in_phase_s_ <= 1.5 * dt_s) {
+      // Above the first place that the tool goes to, along the axis of the site.
+      const Vec3 first = step.sweep_mm.empty() ? step.site.entry_mm : step.sweep_mm.front();
+      hand_ = {HandMode::carry, first - kStandOff_mm * step.site.axis, step.site.axis};
+      target_depth_mm_ = depth_mm(step, hand_.target_mm);
+      left_far_side_mm_ = -1.0;
+      spindle_rpm_ = 0.0;
+      order.take_up = true;
+    } else if (!(report.events & kUncovered)) {
+      results_[step_].completed = true;
+      enter(SurgeonPhase::approach);
+    } else if (in_phase_s_ > kMostWaitForPatch_s) {
+      finished = true;
+    }
+  } else {
+    observe(step, report, dt_s);
+    const bool drills = step.plan.action == Action::drill;
+    const double above_mm = drills ? -kNear_mm : depth_mm(step, step.sweep_mm.front()) - kNear_mm;
+    const Vec3 beside = drills ? Vec3(Vec3::Zero()) : Vec3(step.sweep_mm.front() - step.site.entry_mm);
+    switch (phase_) {
+      case SurgeonPhase::approach:
+        spindle_rpm_ = step.spindle_rpm;
+        if (carry_to_depth(step, above_mm, kCarrySpeed_mm_per_s, dt_s)) enter(SurgeonPhase::spin_up);
+        hand_.target_mm += beside - beside.dot(step.site.axis) * step.site.axis;
+        break;
+      case SurgeonPhase::spin_up:
+        if (report.spindle_rpm > 0.97 * step.spindle_rpm && in_phase_s_ > 0.3) enter(SurgeonPhase::seek);
+        break;
+      case SurgeonPhase::retract: {
+        const Vec3 lateral = hand_.target_mm - step.site.entry_mm - (hand_.target_mm - step.site.entry_mm).dot(step.site.axis) * step.site.axis;
+        if (carry_to_depth(step, -kStandOff_mm, kCarrySpeed_mm_per_s, dt_s)) enter(SurgeonPhase::lift);
+        hand_.target_mm += lateral;
+        break;
+      }
+      case SurgeonPhase::lift:
+        spindle_rpm_ = 0.0;
+        finished = report.spindle_rpm < 1.0 && in_phase_s_ > 0.2;
+        break;
+      default: drills ? drill(step, report, dt_s) : burr(step, report, dt_s); break;
+    }
+  }
+
+  order.phase = phase_;
+  order.hand = hand_;
+  order.spindle_rpm = spindle_rpm_;
+  if (finished) {
+    ++step_;
+    enter(SurgeonPhase::take_up);
+  }
+  return order;
+}
+
+}  // namespace osteon::haptic

@@ -1,0 +1,118 @@
+// The simulated surgeon: carries out a plan by moving the hand, a tick at a time. Knows the bone only through where the
+// plan's sites are and what the tool reports.
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/mechanics/hand.hpp"
+#include "haptic_client/control/haptic_loop.hpp"
+#include "haptic_client/control/site.hpp"
+
+namespace osteon::haptic {
+
+enum class Action : std::uint8_t { drill, burr, wait };
+enum class HandKind : std::uint8_t { expert, novice, rig };
+
+struct PlanEntry {
+  std::optional<Vec3> toward;
+  std::optional<Vec3> point_mm, axis;              // both or none
+  std::optional<std::array<double, 2>> beside_last_mm;
+};
+
+struct PlanStep {
+  Action action = Action::wait;
+  std::string tool;
+  double spindle_rpm = 0;             // 0: the tool's own
+  HandKind hand = HandKind::expert;
+  double push_n = 29;                 // hand
+  double feed_mm_per_s = 1;           // rig
+  double beyond_mm = 5;               // rig: past the far side
+  double window_u_mm = 12, window_v_mm = 8, depth_mm = 2, sweep_mm_per_s = 15;  // burr
+  double wear = 1;
+  PlanEntry entry;
+  double seconds = 0;                 // wait
+};
+
+// A step with its place on the bone found and its path worked out.
+struct ReadyStep {
+  PlanStep plan;
+  Site site;
+  int tool = 0;                       // place in the loop's tools
+  double spindle_rpm = 0;
+  double tip_height_mm = 0;           // of a drill's point
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // of the tool, bone frame
+  std::vector<Vec3> sweep_mm;         // places of the tip, burr
+};
+
+struct ReadyPlan {
+  std::vector<ReadyStep> steps;
+  std::vector<ToolModel> tools;
+};
+// Error invalid_input or not_found: names the step, the field and the remedy.
+[[nodiscard]] Result<ReadyPlan> make_ready(const std::vector<PlanStep>& plan, const Case& bone);
+
+enum class SurgeonPhase : std::uint8_t { take_up, approach, spin_up, seek, push, feed, react, sweep, retract, lift, wait, done };
+[[nodiscard]] const char* name(SurgeonPhase phase);
+
+// What the hand is to do in the next tick; bone frame.
+struct SurgeonOrder {
+  SurgeonPhase phase = SurgeonPhase::done;
+  std::size_t step = 0;
+  HandCommand hand;
+  double spindle_rpm = 0;
+  bool take_up = false;      // the tool is taken up at hand.target_mm
+};
+
+// Means over the ticks in which the whole cutting part was in one kind of bone.
+struct LayerMeans {
+  double force_n = 0, feed_mm_per_s = 0, density_g_cm3 = 0;
+  std::uint64_t ticks = 0;
+  void add(double force, double feed, double density) noexcept;
+};
+
+struct StepResult {
+  bool completed = false;      // false: the time ran out
+  bool broke_through = false;
+  double duration_s = 0;
+  double peak_force_n = 0;
+  double deepest_mm = 0;       // of the tip below the entry
+  double plunge_mm = 0;        // of the tip beyond where the cone left the far surface
+  LayerMeans near_cortex, medulla, far_cortex, all;
+};
+
+class Surgeon {
+ public:
+  explicit Surgeon(ReadyPlan plan);
+
+  // [haptic] `report`: of the tick before, on the tool of the present step.
+  SurgeonOrder act(const LoopReport& report, double dt_s) noexcept;
+  [[nodiscard]] bool done() const noexcept { return step_ >= plan_.steps.size(); }
+  [[nodiscard]] const ReadyPlan& plan() const { return plan_; }
+  [[nodiscard]] const std::vector<StepResult>& results() const { return results_; }
+  // The mapping that puts a step's site into the middle of the workspace, seen along the tool.
+  [[nodiscard]] static WorkspaceMapping mapping_for(const ReadyStep& step, double workspace_radius_mm);
+  // The hand of a step, physical values.
+  [[nodiscard]] static HandParams hand_for(const PlanStep& plan);
+
+ private:
+  void enter(SurgeonPhase phase) noexcept;
+  void observe(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept;
+  // Moves the target along the axis towards a depth; true when it is there.
+  bool carry_to_depth(const ReadyStep& step, double depth_mm, double speed_mm_per_s, double dt_s) noexcept;
+  void drill(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept;
+  void burr(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept;
+
+  ReadyPlan plan_;
+  std::vector<StepResult> results_;
+  std::size_t step_ = 0;
+  SurgeonPhase phase_ = SurgeonPhase::take_up;
+  double in_phase_s_ = 0;
+  HandCommand hand_;
+  double spindle_rpm_ = 0;
+  double target_depth_mm_ = 0;
+  double left_far_side_mm_ = -1;  // depth of the tip when the cone had left
+  std::size_t knot_ = 0;          // next place of a sweep
+};
+
+}  // namespace osteon::haptic

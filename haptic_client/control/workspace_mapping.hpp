@@ -1,0 +1,41 @@
+// Where the tool is for a place of the device's handle: aligned with the view, scaled, re-anchored by the clutch, so
+// that a small device reaches a large bone. Device frame: x right, y up, z towards the user; bone frame: the patient's.
+#pragma once
+#include "common/geometry/pose.hpp"
+
+namespace osteon::haptic {
+
+class WorkspaceMapping {
+ public:
+  // `view`: rotation from the device's (and screen's) frame to the bone's; `scale`: bone mm for each device mm.
+  void align(const Eigen::Quaterniond& view, double scale, const Vec3& device_mm, const Vec3& bone_mm) noexcept {
+    view_ = view;
+    scale_ = scale;
+    anchor(device_mm, bone_mm);
+  }
+  // From now on this place of the device is that place in the bone's frame: what letting go of the clutch does.
+  void anchor(const Vec3& device_mm, const Vec3& bone_mm) noexcept {
+    device_mm_ = device_mm;
+    bone_mm_ = bone_mm;
+  }
+
+  [[nodiscard]] Pose pose_bone_tool(const Pose& pose_device_tool) const noexcept {
+    return {bone_mm_ + scale_ * (view_ * (pose_device_tool.position_mm - device_mm_)),
+            (view_ * pose_device_tool.rotation).normalized()};
+  }
+  [[nodiscard]] Pose pose_device_tool(const Pose& pose_bone_tool) const noexcept {
+    const Eigen::Quaterniond back = view_.conjugate();
+    return {device_mm_ + back * (pose_bone_tool.position_mm - bone_mm_) / scale_, (back * pose_bone_tool.rotation).normalized()};
+  }
+  // Directions and forces; these are turned but not scaled.
+  [[nodiscard]] Vec3 to_device(const Vec3& bone) const noexcept { return view_.conjugate() * bone; }
+  [[nodiscard]] Vec3 to_bone(const Vec3& device) const noexcept { return view_ * device; }
+  [[nodiscard]] double scale() const noexcept { return scale_; }
+
+ private:
+  Eigen::Quaterniond view_ = Eigen::Quaterniond::Identity();
+  double scale_ = 1.0;
+  Vec3 device_mm_ = Vec3::Zero(), bone_mm_ = Vec3::Zero();
+};
+
+}  // namespace osteon::haptic

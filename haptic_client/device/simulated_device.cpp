@@ -1,0 +1,30 @@
+#include "haptic_client/device/simulated_device.hpp"
+
+namespace osteon::haptic {
+
+SimulatedDevice::SimulatedDevice(const SimulatedDeviceParams& params) : params_(params), hand_(HandParams{}, Vec3::Zero()) {}
+
+DeviceReading SimulatedDevice::read() noexcept { return {{hand_.position_mm(), rotation_}, buttons_, DeviceStatus::ok}; }
+
+void SimulatedDevice::write(const Vec3& force_n) noexcept {
+  // A real amplifier saturates too.
+  const double size_n = force_n.norm();
+  force_n_ = size_n > params_.limits.peak_n ? Vec3(force_n * (params_.limits.peak_n / size_n)) : force_n;
+}
+
+void SimulatedDevice::command(const HandCommand& command, const Eigen::Quaterniond& rotation_device_tool,
+                              std::uint32_t buttons) noexcept {
+  command_ = command;
+  rotation_ = rotation_device_tool;
+  buttons_ = buttons;
+}
+
+void SimulatedDevice::take(const HandParams& hand, const Vec3& at_mm) noexcept {
+  hand_.set_params(hand);
+  hand_.place(at_mm);
+  force_n_.setZero();
+}
+
+void SimulatedDevice::step(double dt_s) noexcept { hand_.step(command_, force_n_, dt_s); }
+
+}  // namespace osteon::haptic

@@ -1,0 +1,39 @@
+// A device of our own making with a hand on it: time passes when step() is called, and the hand really is pushed back.
+#pragma once
+#include "common/mechanics/hand.hpp"
+#include "haptic_client/device/haptic_device.hpp"
+
+namespace osteon::haptic {
+
+// As strong as the drilling of bone, so that physical force is shown unscaled.
+struct SimulatedDeviceParams {
+  DeviceLimits limits{60.0, 30.0, 60.0, 120.0};
+};
+
+class SimulatedDevice final : public HapticDevice {
+ public:
+  explicit SimulatedDevice(const SimulatedDeviceParams& params = {});
+
+  [[nodiscard]] std::string_view name() const override { return "simulated"; }
+  [[nodiscard]] DeviceLimits limits() const override { return params_.limits; }
+  [[nodiscard]] DeviceReading read() noexcept override;
+  void write(const Vec3& force_n) noexcept override;
+
+  // [haptic] What the hand means to do from now on; device frame.
+  void command(const HandCommand& command, const Eigen::Quaterniond& rotation_device_tool, std::uint32_t buttons) noexcept;
+  // [haptic] Another hand takes the handle at a place.
+  void take(const HandParams& hand, const Vec3& at_mm) noexcept;
+  // [haptic] Time passes.
+  void step(double dt_s) noexcept;
+  [[nodiscard]] const Hand& hand() const noexcept { return hand_; }
+
+ private:
+  SimulatedDeviceParams params_;
+  Hand hand_;
+  HandCommand command_;
+  Eigen::Quaterniond rotation_ = Eigen::Quaterniond::Identity();
+  std::uint32_t buttons_ = 0;
+  Vec3 force_n_ = Vec3::Zero();
+};
+
+}  // namespace osteon::haptic

@@ -1,0 +1,60 @@
+#include "common/mechanics/drilling.hpp"
+
+#include <gmock/gmock.h>
+
+namespace osteon {
+namespace {
+
+double thrust(double rpm, double feed, double density, DrillingParams params = {}) {
+  return drilling_thrust(params, RevolutionsPerMinute{rpm}, MillimetresPerSecond{feed}, GramsPerCm3{density}).value();
+}
+double feed(double rpm, double force, double density) {
+  return drilling_feed({}, RevolutionsPerMinute{rpm}, Newtons{force}, GramsPerCm3{density}).value();
+}
+
+// Points of comparison at 1000 rpm and 1 mm/s, published to one decimal.
+TEST(Drilling, GivesThePublishedThrusts) {
+  const struct { double density, newtons; } kPoints[] = {{0.3, 3.2}, {0.5, 5.9}, {1.0, 13.5}, {1.8, 27.1}, {2.0, 30.7}};
+  for (const auto& point : kPoints) EXPECT_NEAR(thrust(1000, 1, point.density), point.newtons, 0.06) << point.density;
+}
+
+TEST(Drilling, ScalesAsPublished) {
+  const double at = thrust(1000, 1, 1.0);
+  EXPECT_NEAR(thrust(2000, 1, 1.0) / at, 0.794, 5e-4);
+  EXPECT_NEAR(thrust(1000, 2, 1.0) / at, 1.433, 5e-4);
+  EXPECT_NEAR(thrust(1000, 1, 2.0) / at, 2.272, 5e-4);
+}
+
+TEST(Drilling, InverseScalesAsPublished) {
+  const double at = feed(1000, 10, 0.9);
+  EXPECT_NEAR(feed(1000, 20, 0.9) / at, 3.80, 5e-3);
+  EXPECT_NEAR(feed(2000, 10, 0.9) / at, 1.56, 5e-3);
+  EXPECT_NEAR(feed(1000, 10, 1.8) / at, 0.206, 5e-4);
+}
+
+TEST(Drilling, InverseUndoesForward) {
+  for (const double v : {0.1, 1.0, 10.0}) EXPECT_NEAR(feed(1500, thrust(1500, v, 1.4), 1.4), v, 1e-9 * v);
+}
+
+TEST(Drilling, ABluntAndAThickDrillNeedMoreThrust) {
+  EXPECT_NEAR(thrust(1000, 1, 1.9, {.wear = 2.0}), 2.0 * thrust(1000, 1, 1.9), 1e-9);
+  EXPECT_NEAR(thrust(1000, 1, 1.9, {.diameter_mm = 4.8}), 1.5 * thrust(1000, 1, 1.9), 1e-9);
+}
+
+TEST(Drilling, TorqueAtTheCorticalPoint) {
+  const Newtons t{thrust(1000, 1, 1.9)};
+  EXPECT_NEAR(drilling_torque({}, t).value(), 27.0, 0.1);
+}
+
+TEST(Drilling, HeelTouchesAtAThirdOfADiameterPerTurn) {
+  EXPECT_NEAR(heel_contact_feed({}, RevolutionsPerMinute{1000}).value(), 17.6, 1e-9);
+}
+
+TEST(Drilling, AStandingSpindleDoesNotCut) {
+  EXPECT_EQ(thrust(0, 1, 1.9), 0.0);
+  EXPECT_EQ(feed(0, 10, 1.9), 0.0);
+  EXPECT_EQ(drilling_law({}, RevolutionsPerMinute{0}, GramsPerCm3{1.9}, 1.0).max_feed_mm_per_s, 0.0);
+}
+
+}  // namespace
+}  // namespace osteon
