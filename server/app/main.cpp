@@ -67,6 +67,12 @@ nlohmann::json summary_of(const RoomServerSummary& summary, const Case& bone) {
 }
 
 Result<void> run(const Options& options, const StopSignal& stop) {
+  // An address of an earlier run must not be taken for this one's.
+  if (!options.address_file.empty()) {
+    std::error_code ignored;
+    std::filesystem::remove(options.address_file, ignored);
+  }
+  if (Result<void> usable = RoomServer::check_listen(options.listen); !usable) return usable;
   Result<Case> bone = Case::load(options.case_folder);
   if (!bone) return tl::unexpected(bone.error());
   log::info("case", {{"title", bone->info().title},

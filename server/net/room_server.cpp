@@ -1,9 +1,13 @@
 #include "server/net/room_server.hpp"
 
 #include <grpc/support/log.h>
+#include <netdb.h>
+#include <sys/socket.h>
+#include <unistd.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/impl/service_type.h>
 
+#include <cerrno>
 #include <charconv>
 #include <chrono>
 #include <utility>
@@ -45,6 +49,30 @@ bool is_ipv4_loopback(const std::string& host) {
 
 bool is_loopback(const std::string& host) { return host == "localhost" || host == "[::1]" || is_ipv4_loopback(host); }
 
+Error port_in_use(const std::string& listen) {
+  return {ErrorCode::exists, "cannot listen on " + listen +
+                                 ": the port is in use by another program; choose another with --listen, or 0 for a free one"};
+}
+
+// Whether a socket can be bound there, tried with one that is closed again.
+bool can_bind(const HostPort& at) {
+  const std::string host = at.host == "[::1]" ? "::1" : at.host;
+  addrinfo hints{}, *found = nullptr;
+  hints.ai_socktype = SOCK_STREAM;
+  if (::getaddrinfo(host.c_str(), std::to_string(at.port).c_str(), &hints, &found) != 0) return false;
+  bool bound = true;
+  for (const addrinfo* address = found; address && bound; address = address->ai_next) {
+    const int socket = ::socket(address->ai_family, address->ai_socktype | SOCK_CLOEXEC, address->ai_protocol);
+    if (socket < 0) continue;  // a family that this machine does not have
+    const int yes = 1;
+    ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+    bound = ::bind(socket, address->ai_addr, address->ai_addrlen) == 0 || errno == EADDRNOTAVAIL;
+    ::close(socket);
+  }
+  ::freeaddrinfo(found);
+  return bound;
+}
+
 std::uint64_t new_server_epoch() {
   // Without a journal that counts, the calendar is what rises from one opening to the next.
   const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
@@ -70,14 +98,20 @@ RoomServer::~RoomServer() {
   if (impl_->server) stop();
 }
 
-Result<std::unique_ptr<RoomServer>> RoomServer::start(Room room, const RoomServerOptions& options,
-                                                      const std::function<void(double)>& progress) {
-  const Result<HostPort> listen = parse_listen(options.listen);
-  if (!listen) return tl::unexpected(listen.error());
-  if (!is_loopback(listen->host))
-    return failure(ErrorCode::invalid_input, "--listen " + options.listen +
+Result<void> RoomServer::check_listen(const std::string& listen) {
+  const Result<HostPort> at = parse_listen(listen);
+  if (!at) return tl::unexpected(at.error());
+  if (!is_loopback(at->host))
+    return failure(ErrorCode::invalid_input, "--listen " + listen +
                                                  " is reachable from other machines, but this server speaks plain text; "
                                                  "use 127.0.0.1, [::1] or localhost");
+  if (!can_bind(*at)) return tl::unexpected(port_in_use(listen));
+  return {};
+}
+
+Result<std::unique_ptr<RoomServer>> RoomServer::start(Room room, const RoomServerOptions& options,
+                                                      const std::function<void(double)>& progress) {
+  if (Result<void> usable = check_listen(options.listen); !usable) return tl::unexpected(usable.error());
   // What fails is told in one sentence by the caller, not in gRPC's own lines.
   gpr_set_log_function([](gpr_log_func_args*) {});
 
@@ -102,11 +136,9 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(Room room, const RoomServe
   impl->server = builder.BuildAndStart();
   if (!impl->server || port == 0) {
     impl->host->stop();
-    return failure(ErrorCode::exists, "cannot listen on " + options.listen +
-                                          ": the port is in use by another program; choose another with --listen, or 0 "
-                                          "for a free one");
+    return tl::unexpected(port_in_use(options.listen));
   }
-  impl->address = listen->host + ":" + std::to_string(port);
+  impl->address = parse_listen(options.listen)->host + ":" + std::to_string(port);
   return std::unique_ptr<RoomServer>(new RoomServer(std::move(impl)));
 }
 
