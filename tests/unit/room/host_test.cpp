@@ -1,0 +1,147 @@
+// The host's threads with sinks in place of streams: free of gRPC, so that the thread sanitizer can look at them.
+#include "server/net/room_host.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <mutex>
+#include <thread>
+
+#include "common/wire/convert.hpp"
+#include "tests/unit/room/cuts.hpp"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+using test::strokes;
+
+// Keeps a replica from what it is told.
+class FakeSession final : public SessionSink {
+ public:
+  FakeSession(AuthorId author, const Case& bone) : author_(author), replica_(bone, BodyId{0}) {}
+
+  AuthorId author() const override { return author_; }
+  void begin(std::vector<FieldLeaf> leaves, RoomSeq contained) override {
+    const std::lock_guard lock(mutex_);
+    for (const FieldLeaf& leaf : leaves) replica_.restore(leaf);
+    seq_ = contained;
+  }
+  void offer(RoomSeq place, const Bytes& row) override {
+    const std::lock_guard lock(mutex_);
+    if (place <= seq_) return;
+    v1::SessionResponse response;
+    ASSERT_TRUE(response.ParseFromString(*row));
+    replica_.apply(wire::from_wire(response.committed().cut()).value());
+    seq_ = place;
+  }
+  void answer(const Bytes&) override {}
+  void refuse(const Error& why) override { ADD_FAILURE() << why.message; }
+  void decided() override { ++decided_; }
+  void end(const std::string&) override { ended_ = true; }
+  std::size_t waiting() const override { return 0; }
+
+  int decided_cuts() const { return decided_; }
+  bool ended() const { return ended_; }
+  Digest hash() const {
+    const std::lock_guard lock(mutex_);
+    return replica_.hash();
+  }
+
+ private:
+  const AuthorId author_;
+  mutable std::mutex mutex_;
+  CutField replica_;
+  RoomSeq seq_;
+  std::atomic<int> decided_{0};
+  std::atomic<bool> ended_{false};
+};
+
+class FakeMesh final : public MeshSink {
+ public:
+  void begin(MeshUpdate whole_surface) override { offer(whole_surface); }
+  void offer(const MeshUpdate& update) override {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [key, bytes] : update.blocks) {
+      v1::WatchMeshResponse response;
+      ASSERT_TRUE(response.ParseFromString(*bytes));
+      if (response.blocks(0).payload().empty())
+        hashes_.erase(key);
+      else
+        hashes_[key] = response.blocks(0).mesh_hash();
+    }
+  }
+  void end(const std::string&) override {}
+  std::size_t waiting() const override { return 0; }
+  std::map<BlockKey, std::string> hashes() const {
+    const std::lock_guard lock(mutex_);
+    return hashes_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<BlockKey, std::string> hashes_;
+};
+
+TEST(RoomHost, EverySinkEndsWithTheRoomsBoneAndSurface) {
+  const Case bone = test::test_block();
+  RoomHost host(Room(bone), {.tick = 1ms, .mesh = 3ms}, {});
+  std::vector<std::shared_ptr<FakeSession>> sessions;
+  for (int i = 0; i < 3; ++i) {
+    sessions.push_back(std::make_shared<FakeSession>(host.join(MemberKind::surgeon), bone));
+    ASSERT_TRUE(host.open_session(sessions.back()));
+  }
+  EXPECT_FALSE(host.open_session(sessions.front())) << "one session for each author";
+  const auto stranger = std::make_shared<FakeSession>(AuthorId{99}, bone);
+  EXPECT_FALSE(host.open_session(stranger));
+  FakeMesh early;
+  host.watch_mesh(early);
+
+  // Two hands cut at once while others come and go.
+  constexpr int kCuts = 60;
+  std::vector<std::thread> hands;
+  for (unsigned who = 0; who < 2; ++who)
+    hands.emplace_back([&, who] {
+      for (const Cut& cut : strokes(sessions[who]->author(), kCuts, who)) {
+        host.queue_cut(sessions[who], cut, RoomHost::Clock::now());
+        std::this_thread::sleep_for(500us);
+      }
+    });
+  std::vector<std::shared_ptr<FakeSession>> late;
+  for (int i = 0; i < 5; ++i) {
+    late.push_back(std::make_shared<FakeSession>(host.join(MemberKind::surgeon), bone));
+    ASSERT_TRUE(host.open_session(late.back()));
+    FakeMesh visitor;
+    host.watch_mesh(visitor);
+    std::this_thread::sleep_for(5ms);
+    (void)host.health();
+    host.leave(visitor);
+  }
+  for (std::thread& hand : hands) hand.join();
+  host.end_streams("over");
+  host.stop();
+
+  FakeMesh after;
+  host.watch_mesh(after);
+  EXPECT_EQ(early.hashes(), after.hashes());
+  const BoneStatus status = host.bone_status();
+  EXPECT_EQ(status.room_seq.value, 2u * kCuts);
+  for (unsigned who = 0; who < 2; ++who) EXPECT_EQ(sessions[who]->decided_cuts(), kCuts);
+  for (const auto& list : {sessions, late})
+    for (const auto& session : list) {
+      EXPECT_EQ(session->hash(), status.field_hash);
+      EXPECT_TRUE(session->ended());
+      host.leave(*session);
+    }
+  const HostHealth health = host.health();
+  EXPECT_EQ(health.sessions, 0u);
+  EXPECT_EQ(health.counts.committed, 2u * kCuts);
+  EXPECT_GT(health.tick.work.count(), 0u);
+  EXPECT_GT(health.mesh_update.count(), 0u);
+  EXPECT_EQ(health.queued_cuts, 0u);
+  host.leave(early);
+  host.leave(after);
+}
+
+}  // namespace
+}  // namespace osteon
