@@ -52,7 +52,9 @@ class StateLog {
     if (file.empty()) return {};
     file_.open(file);
     file_ << "state_seq,received_mono_ns,sounded_mono_ns,author\n";
-    if (!file_) return failure(ErrorCode::internal, "cannot write the state log " + file.string() + "; give --state-log a file in a folder that exists");
+    if (!file_)
+      return failure(ErrorCode::internal, "cannot write the state log " + file.string() +
+                                              "; give --state-log a file in a folder that exists");
     return {};
   }
 
@@ -144,8 +146,8 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   // The reader and this thread deliver in turns.
   std::mutex delivering;
   std::optional<Clock::time_point> heard;  // guarded: when the last message came, none while all is at rest
-  auto watch = CuttingWatch::start(
-      std::move(*room), [&](const std::vector<CuttingState>& tools, Clock::time_point received) {
+  auto watch =
+      CuttingWatch::start(std::move(*room), [&](const std::vector<CuttingState>& tools, Clock::time_point received) {
         const audio::SoundScene scene = audio::sound_scene(tools, received.time_since_epoch().count());
         const std::lock_guard lock(delivering);
         engine.deliver(scene);
@@ -168,7 +170,8 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   engine.deliver(audio::SoundScene{});
   const auto end = Clock::now() + kRunDown;
   std::this_thread::sleep_for(2 * kPoll);
-  while (!engine.silent() && (*output)->failure_reason().empty() && Clock::now() < end) std::this_thread::sleep_for(kPoll);
+  while (!engine.silent() && (*output)->failure_reason().empty() && Clock::now() < end)
+    std::this_thread::sleep_for(kPoll);
   (*output)->stop();
   states.drain(engine, **output);
 

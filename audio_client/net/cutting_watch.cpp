@@ -53,7 +53,8 @@ Error CuttingWatch::Impl::read() {
   }
   const grpc::Status status = stream->Finish();
   if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED)
-    return {ErrorCode::unsupported, "the server does not stream cutting states; it is not an Osteon server of this version"};
+    return {ErrorCode::unsupported,
+            "the server does not stream cutting states; it is not an Osteon server of this version"};
   return {ErrorCode::unavailable, "the server went away; start it again and then osteon-audio"};
 }
 

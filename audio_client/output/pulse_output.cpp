@@ -32,7 +32,8 @@ class PulseOutput final : public AudioOutput {
   Result<void> open() {
     try {
       audio_ = std::make_unique<RtAudio>(RtAudio::LINUX_PULSE);
-      if (audio_->getCurrentApi() != RtAudio::LINUX_PULSE) return no_server("this RtAudio was built without PulseAudio");
+      if (audio_->getCurrentApi() != RtAudio::LINUX_PULSE)
+        return no_server("this RtAudio was built without PulseAudio");
       audio_->showWarnings(false);
       const unsigned devices = audio_->getDeviceCount();
       if (devices == 0) return no_server("it names no device");

@@ -26,8 +26,8 @@ class SoundEngine final : public SoundSource {
   // `recorder` may be null, else it must outlive the engine.
   SoundEngine(const SynthParams& params, WavRecorder* recorder);
 
-  void deliver(const SoundScene& scene) noexcept { scenes_.store(scene); }  // one thread only
-  void render(std::span<float> mono) noexcept override;                     // [audio]
+  void deliver(const SoundScene& scene) noexcept { scenes_.store(scene); }            // one thread only
+  void render(std::span<float> mono) noexcept override;                               // [audio]
   bool next_sounded(Sounded& sounded) noexcept { return sounded_.try_pop(sounded); }  // one thread only
 
   // From the start of render() to the frame that first carries the new scene, without the output's own latency.

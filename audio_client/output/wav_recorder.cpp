@@ -58,7 +58,8 @@ WavRecorder& WavRecorder::operator=(WavRecorder&& other) noexcept {
 }
 
 WavRecorder::~WavRecorder() {
-  if (impl_) [[maybe_unused]] const Result<void> closed = close();
+  if (impl_) [[maybe_unused]]
+    const Result<void> closed = close();
 }
 
 Result<WavRecorder> WavRecorder::open(const std::filesystem::path& file, unsigned rate_hz) {
@@ -95,7 +96,8 @@ Result<void> WavRecorder::close() {
   sf_write_sync(impl_->file);
   const bool failed = sf_close(impl_->file) != 0 || impl_->write_failed;
   impl_->file = nullptr;
-  if (failed) return failure(ErrorCode::internal, "the recording " + impl_->path.string() + " could not be written whole");
+  if (failed)
+    return failure(ErrorCode::internal, "the recording " + impl_->path.string() + " could not be written whole");
   return {};
 }
 

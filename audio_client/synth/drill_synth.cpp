@@ -70,8 +70,7 @@ void DrillSynth::render_block() noexcept {
 }
 
 bool DrillSynth::silent() const noexcept {
-  return tail_blocks_ == 0 &&
-         std::none_of(voices_.begin(), voices_.end(), [](const Voice& v) { return v.sounding(); });
+  return tail_blocks_ == 0 && std::none_of(voices_.begin(), voices_.end(), [](const Voice& v) { return v.sounding(); });
 }
 
 }  // namespace osteon::audio

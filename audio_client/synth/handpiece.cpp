@@ -13,7 +13,7 @@ constexpr double kFreeLevel = 0.025;
 
 Handpiece geared_drill() {
   constexpr Gearbox gears;
-  Handpiece drill{.kind = HandpieceKind::geared_drill, .teeth = 2, .rated_rpm = 1400, .air_level = 0.12, .partials = {}};
+  Handpiece drill{.kind = HandpieceKind::geared_drill, .teeth = 2, .rated_rpm = 1400, .air_level = 1.4, .partials = {}};
   auto& p = drill.partials;
 
   // Unbalance of the three shafts.
@@ -30,10 +30,11 @@ Handpiece geared_drill() {
   for (const int side : {-1, 1}) p.push_back({3 * commutation + side * gears.motor(), Source::motor, 0.18});
 
   // Meshes with the sidebands n f_mesh +- k f_spin; low orders dominate (8.5.2).
-  const double output_levels[] = {0.45, 0.30, 0.20, 0.16, 0.06, 0.10};
+  const double output_levels[] = {0.45, 0.40, 0.25, 0.16, 0.06, 0.35};
   for (int n = 0; n < 6; ++n) p.push_back({(n + 1) * gears.output_mesh(), Source::output_mesh, output_levels[n]});
   for (const int side : {-2, -1, 1, 2}) {
-    p.push_back({gears.output_mesh() + side * gears.output_spin(), Source::output_mesh, side * side == 1 ? 0.14 : 0.06});
+    p.push_back(
+        {gears.output_mesh() + side * gears.output_spin(), Source::output_mesh, side * side == 1 ? 0.14 : 0.06});
   }
   p.push_back({gears.motor_mesh(), Source::motor_mesh, 0.72});
   p.push_back({2 * gears.motor_mesh(), Source::motor_mesh, 0.10});
@@ -47,7 +48,7 @@ Handpiece geared_drill() {
 }
 
 Handpiece direct_burr() {
-  Handpiece burr{.kind = HandpieceKind::direct_burr, .teeth = 8, .rated_rpm = 40000, .air_level = 0.20, .partials = {}};
+  Handpiece burr{.kind = HandpieceKind::direct_burr, .teeth = 8, .rated_rpm = 40000, .air_level = 1.0, .partials = {}};
   auto& p = burr.partials;
   const double shaft_levels[] = {1.00, 0.35, 0.20, 0.10};
   for (int k = 0; k < 4; ++k) p.push_back({k + 1.0, Source::shaft, shaft_levels[k]});

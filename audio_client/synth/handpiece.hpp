@@ -15,16 +15,16 @@ inline constexpr int kHandpieceKinds = 2;
 enum class Source : std::uint8_t { shaft, motor, motor_mesh, output_mesh, tooth };
 
 struct Partial {
-  double ratio = 1;     // its frequency as a multiple of the spindle's
+  double ratio = 1;  // its frequency as a multiple of the spindle's
   Source source = Source::shaft;
-  double level = 0;     // amplitude when running free; for teeth, at full drive
+  double level = 0;  // amplitude when running free; for teeth, at full drive
 };
 
 struct Handpiece {
   HandpieceKind kind = HandpieceKind::geared_drill;
-  int teeth = 2;              // cutting edges passing in one turn
-  double rated_rpm = 1400;    // speed at which the levels hold; they fall in proportion below it
-  double air_level = 0;       // RMS of the noise of bearings, brushes and fan at rated speed
+  int teeth = 2;            // cutting edges passing in one turn
+  double rated_rpm = 1400;  // speed at which the levels hold; they fall in proportion below it
+  double air_level = 0;     // noise of bearings, brushes and fan at rated speed, before its filter
   std::vector<Partial> partials;
 };
 

@@ -90,11 +90,16 @@ void Voice::advance_controls() noexcept {
 // are led by the motor's line and cancellous by the gears'.
 double Voice::source_gain(Source source) const noexcept {
   switch (source) {
-    case Source::shaft: return 1.0 + 2.0 * drive_;
-    case Source::motor: return 1.0 + 4.5 * drive_;
-    case Source::motor_mesh: return 1.0 + 4.0 * tone_drive_;
-    case Source::output_mesh: return 1.0 + 3.5 * tone_drive_;
-    case Source::tooth: return 4.0 * std::pow(drive_, 0.8);
+    case Source::shaft:
+      return 1.0 + 2.0 * drive_;
+    case Source::motor:
+      return 1.0 + 4.5 * drive_;
+    case Source::motor_mesh:
+      return 1.0 + 4.0 * tone_drive_;
+    case Source::output_mesh:
+      return 1.0 + 3.5 * tone_drive_;
+    case Source::tooth:
+      return 4.0 * std::pow(drive_, 0.8);
   }
   return 0.0;
 }
@@ -144,19 +149,20 @@ void Voice::add_partials(Block& block) noexcept {
 void Voice::add_noise(Block& block) noexcept {
   const double speed = rpm_ / handpiece_->rated_rpm;
   const auto chip_to = static_cast<float>(params_.noise * kChipLevel * chips_ * std::min(1.0, std::sqrt(speed)));
-  const auto air_to = static_cast<float>(params_.noise * handpiece_->air_level * speed * (1.0 + drive_));
+  const auto air_to = static_cast<float>(params_.noise * handpiece_->air_level * speed * (1.0 + 2.0 * drive_));
   if (chip_level_ == 0 && air_level_ == 0 && chip_to == 0 && air_to == 0) return;
 
   // The chips of hard bone are smaller and stiffer: their noise lies higher.
   chip_filter_.set(900.0 + 3600.0 * hardness_, rate_hz_, 0.9);
-  air_filter_.set(2600.0, rate_hz_, 0.6);
+  air_filter_.set(3500.0, rate_hz_, 0.45);
   const double tooth_turns = rpm_ / 60.0 * handpiece_->teeth / rate_hz_;
   const float chip_step = (chip_to - chip_level_) / kBlockFrames, air_step = (air_to - air_level_) / kBlockFrames;
   // Each tooth breaks its own chips. Below 400 Hz that is heard as a rattle, above as a tone that the partials make.
   const double rattle_hz = tooth_turns * rate_hz_;
   const auto depth = static_cast<float>(0.6 * std::clamp(2.0 - rattle_hz / 400.0, 0.0, 1.0));
   auto re = static_cast<float>(std::cos(kTurn * tooth_phase_)), im = static_cast<float>(std::sin(kTurn * tooth_phase_));
-  const auto c = static_cast<float>(std::cos(kTurn * tooth_turns)), s = static_cast<float>(std::sin(kTurn * tooth_turns));
+  const auto c = static_cast<float>(std::cos(kTurn * tooth_turns)),
+             s = static_cast<float>(std::sin(kTurn * tooth_turns));
   for (float& x : block) {
     x += chip_level_ * (1.0F + depth * im) * chip_filter_.next(noise_.next());
     x += air_level_ * air_filter_.next(noise_.next());

@@ -12,11 +12,11 @@ namespace osteon::audio {
 
 // Constants of the sound that are not the hand piece's.
 struct VoiceParams {
-  double run_up_s = 0.25;        // from rest to the speed asked for
-  double run_down_s = 0.45;      // and back
-  double smoothing_s = 0.005;    // of speed and load: hides the steps between states
-  double noise = 1.0;            // gain of all noise, 0 leaves the partials
-  double flutter = 0.12;         // slow unsteadiness of each partial's level, relative (8.5.4: sources are not stationary)
+  double run_up_s = 0.25;      // from rest to the speed asked for
+  double run_down_s = 0.45;    // and back
+  double smoothing_s = 0.005;  // of speed and load: hides the steps between states
+  double noise = 1.0;          // gain of all noise, 0 leaves the partials
+  double flutter = 0.12;  // slow unsteadiness of each partial's level, relative (8.5.4: sources are not stationary)
 };
 
 class Voice {
@@ -25,7 +25,7 @@ class Voice {
              std::uint64_t seed) noexcept;
   void aim(const ToolSound& tool) noexcept;  // what it shall sound like from now on
   void release() noexcept { target_.rpm = target_.load = target_.hardness = target_.chips = 0; }  // runs down
-  void add_to(Block& block) noexcept;        // the next kBlockFrames
+  void add_to(Block& block) noexcept;  // the next kBlockFrames
 
   [[nodiscard]] bool sounding() const noexcept { return sounding_; }
   [[nodiscard]] std::uint64_t author() const noexcept { return target_.author; }
@@ -46,20 +46,20 @@ class Voice {
   bool sounding_ = false;
   WhiteNoise noise_;
 
-  double span_rpm_ = 0;   // the highest speed of this run: sets how fast it runs up and down
+  double span_rpm_ = 0;  // the highest speed of this run: sets how fast it runs up and down
   double slewed_rpm_ = 0, rpm_ = 0;
   double load_ = 0, hardness_ = 0, chips_ = 0;
-  double drive_ = 0;      // load weighted by hardness: what makes it loud
-  double tone_drive_ = 0; // its square root, for sources that answer to small loads already
+  double drive_ = 0;       // load weighted by hardness: what makes it loud
+  double tone_drive_ = 0;  // its square root, for sources that answer to small loads already
 
-  std::array<double, kMaxPartials> phase_{};   // turns
-  std::array<float, kMaxPartials> level_{};    // at the end of the last block
+  std::array<double, kMaxPartials> phase_{};  // turns
+  std::array<float, kMaxPartials> level_{};   // at the end of the last block
   std::array<float, kMaxPartials> flutter_{};
   double tooth_phase_ = 0;
   BandPass chip_filter_, air_filter_;
   float chip_level_ = 0, air_level_ = 0;
 
-  double recent_load_ = 0;                     // falls slowly: what the tool pressed against a moment ago
+  double recent_load_ = 0;  // falls slowly: what the tool pressed against a moment ago
   std::array<float, 2> knock_re_{}, knock_im_{};
 };
 

@@ -17,10 +17,10 @@ struct Tone {
 [[nodiscard]] Tone find_tone(std::span<const float> samples, double rate_hz, double low_hz, double high_hz);
 
 struct TrackParams {
-  int window = 4096;          // samples looked at together
-  int hop = 1024;             // samples from one point of the track to the next
-  double reach = 0.03;        // largest relative change of frequency in one hop
-  double quiet_db = -90.0;    // below this level the track keeps its last frequency
+  int window = 4096;        // samples looked at together
+  int hop = 1024;           // samples from one point of the track to the next
+  double reach = 0.03;      // largest relative change of frequency in one hop
+  double quiet_db = -90.0;  // below this level the track keeps its last frequency
 };
 // Follows one tone through the signal from `start_hz`: one frequency for each hop, at the middle of its window.
 [[nodiscard]] std::vector<double> track_tone(std::span<const float> samples, double rate_hz, double start_hz,

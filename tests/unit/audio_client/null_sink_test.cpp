@@ -29,7 +29,8 @@ using Clock = std::chrono::steady_clock;
 class Monitor {
  public:
   Monitor() {
-    pipe_ = ::popen("parec --device=virt.monitor --rate=48000 --channels=2 --format=float32le --latency-msec=1 --raw", "r");
+    pipe_ =
+        ::popen("parec --device=virt.monitor --rate=48000 --channels=2 --format=float32le --latency-msec=1 --raw", "r");
     thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
   }
   ~Monitor() {
@@ -94,7 +95,8 @@ struct ToneSource final : SoundSource {
     const bool sounds = on.load();
     if (sounds && at == 0) started_ns = Clock::now().time_since_epoch().count();
     for (float& x : mono) {
-      x = sounds ? static_cast<float>(0.5 * std::cos(2 * std::numbers::pi * 1000 * static_cast<double>(at++) / 48000)) : 0.0F;
+      x = sounds ? static_cast<float>(0.5 * std::cos(2 * std::numbers::pi * 1000 * static_cast<double>(at++) / 48000))
+                 : 0.0F;
     }
     frames += mono.size();
   }
@@ -123,8 +125,8 @@ TEST(PulseOutput, RenderedToneArrivesAtTheSink) {
   EXPECT_NEAR(heard.hz, 1000, 1);
   EXPECT_NEAR(heard.level_db, 20 * std::log10(0.5), 1.0);
 
-  const double took_ms =
-      std::chrono::duration<double, std::milli>(monitor.arrival(first).time_since_epoch()).count() - static_cast<double>(source.started_ns) / 1e6;
+  const double took_ms = std::chrono::duration<double, std::milli>(monitor.arrival(first).time_since_epoch()).count() -
+                         static_cast<double>(source.started_ns) / 1e6;
   const double stated_ms = std::chrono::duration<double, std::milli>((*output)->latency()).count();
   std::printf("render to monitor %.1f ms, stated bound %.1f ms, %llu gaps\n", took_ms, stated_ms,
               static_cast<unsigned long long>((*output)->gaps()));

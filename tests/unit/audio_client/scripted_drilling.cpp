@@ -84,8 +84,10 @@ ScriptedDrilling scripted_drilling() {
   CuttingState last = off;
   const auto now_s = [&] { return static_cast<double>(script.states.size()) / 120.0; };
   for (const Step& step : steps) {
-    const int change = std::max(1, static_cast<int>(step.change_s * 120.0)), hold = static_cast<int>(step.hold_s * 120.0);
-    for (int i = 1; i <= change; ++i) script.states.push_back(between(last, step.state, static_cast<double>(i) / change));
+    const int change = std::max(1, static_cast<int>(step.change_s * 120.0)),
+              hold = static_cast<int>(step.hold_s * 120.0);
+    for (int i = 1; i <= change; ++i)
+      script.states.push_back(between(last, step.state, static_cast<double>(i) / change));
     const double from_s = now_s();
     for (int i = 0; i < hold; ++i) script.states.push_back(step.state);
     script.parts.push_back({step.name, from_s, now_s()});

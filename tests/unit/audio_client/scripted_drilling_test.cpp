@@ -118,12 +118,14 @@ TEST(ScriptedDrilling, LinesStandWhereARealGearedDrillHasThem) {
     const double line = sound::band_db(spectrum, hz - 20, hz + 20), beside = sound::band_db(spectrum, hz + 30, hz + 70);
     EXPECT_GT(line, beside + 6) << harmonic;
     // The hand's unsteady speed smears the real lines a little: 0.3 %.
-    EXPECT_TRUE(std::any_of(real_lines.begin(), real_lines.end(),
-                            [&](const sound::Peak& heard) { return std::abs(heard.hz - hz) < 0.003 * hz; }))
-        << harmonic;
+    EXPECT_TRUE(std::any_of(real_lines.begin(), real_lines.end(), [&](const sound::Peak& heard) {
+      return std::abs(heard.hz - hz) < 0.003 * hz;
+    })) << harmonic;
   }
   // Both have most of their power between 400 Hz and 12 kHz.
-  const auto middle_share_db = [](const sound::Spectrum& s) { return sound::band_db(s, 400, 12000) - sound::band_db(s, 0, 24001); };
+  const auto middle_share_db = [](const sound::Spectrum& s) {
+    return sound::band_db(s, 400, 12000) - sound::band_db(s, 0, 24001);
+  };
   EXPECT_GT(middle_share_db(spectrum), -0.5);
   EXPECT_GT(middle_share_db(sound::power_spectrum(real, rate_hz, 8192)), -1.0);
 }

@@ -65,8 +65,8 @@ TEST_P(SpindleSpeed, PartialsAreLockedToTheSpindle) {
   const double spindle_hz = GetParam() / 60.0;
   const std::vector<float> samples = steady(cortical_drill(GetParam()));
   constexpr Gearbox gears;
-  for (const double ratio : {gears.output_mesh(), 2 * gears.output_mesh(), gears.motor_mesh(),
-                             3 * kCommutatorSegments * gears.motor()}) {
+  for (const double ratio :
+       {gears.output_mesh(), 2 * gears.output_mesh(), gears.motor_mesh(), 3 * kCommutatorSegments * gears.motor()}) {
     const double hz = ratio * spindle_hz;
     // One second of a line in noise: far better than the 1 Hz of a plain spectrum.
     EXPECT_NEAR(sound::find_tone(samples, kRate_hz, hz - 15, hz + 15).hz, hz, 0.05) << "ratio " << ratio;
@@ -193,7 +193,8 @@ TEST(DrillSound, RunsUpAndDownInsteadOfJumping) {
   const std::vector<float> up = play(synth, free_drill(1400), 0.5);
   // Half way up after half of the run-up time: the mesh lies near half of its pitch, and the level is below the last.
   const auto part = [&](double from_s, double to_s) {
-    return std::vector<float>(up.begin() + static_cast<int>(from_s * kRate_hz), up.begin() + static_cast<int>(to_s * kRate_hz));
+    return std::vector<float>(up.begin() + static_cast<int>(from_s * kRate_hz),
+                              up.begin() + static_cast<int>(to_s * kRate_hz));
   };
   EXPECT_LT(sound::rms_db(part(0.0, 0.05)), sound::rms_db(part(0.4, 0.5)) - 12);
   EXPECT_LT(sound::rms_db(part(0.1, 0.15)), sound::rms_db(part(0.4, 0.5)) - 3);
@@ -273,7 +274,8 @@ TEST(DrillSound, SeveralToolsAddUpByPower) {
     synth.process(std::span(samples).subspan(at, 400));
   }
   const double together_db = sound::rms_db(std::span(samples).last(48000));
-  const double a = std::pow(10, sound::rms_db(steady(both[0])) / 10), b = std::pow(10, sound::rms_db(steady(both[1])) / 10);
+  const double a = std::pow(10, sound::rms_db(steady(both[0])) / 10),
+               b = std::pow(10, sound::rms_db(steady(both[1])) / 10);
   EXPECT_NEAR(together_db, 10 * std::log10(a + b), 0.7);
 }
 
@@ -343,8 +345,8 @@ TEST(Limiter, LeavesWhatFitsAndHoldsWhatDoesNot) {
     const double amplitude = block / 100 % 2 ? 4.0 : 0.25;
     Block frames;
     for (int i = 0; i < kBlockFrames; ++i) {
-      frames[static_cast<std::size_t>(i)] = static_cast<float>(
-          amplitude * std::sin(2 * std::numbers::pi * 440 * (block * kBlockFrames + i) / kRate_hz));
+      frames[static_cast<std::size_t>(i)] =
+          static_cast<float>(amplitude * std::sin(2 * std::numbers::pi * 440 * (block * kBlockFrames + i) / kRate_hz));
     }
     limiter.process(frames);
     loudest = std::max(loudest, sound::peak(frames));

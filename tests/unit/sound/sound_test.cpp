@@ -18,7 +18,8 @@ constexpr double kRate_hz = 48000.0;
 std::vector<float> sine(double hz, double amplitude, std::size_t count) {
   std::vector<float> samples(count);
   for (std::size_t i = 0; i < count; ++i) {
-    samples[i] = static_cast<float>(amplitude * std::sin(2.0 * std::numbers::pi * hz * static_cast<double>(i) / kRate_hz));
+    samples[i] =
+        static_cast<float>(amplitude * std::sin(2.0 * std::numbers::pi * hz * static_cast<double>(i) / kRate_hz));
   }
   return samples;
 }

@@ -1,0 +1,224 @@
+// osteon-audio as a process beside a real server: what a haptic client would send is heard, logged and recorded.
+#include <gmock/gmock.h>
+#include <grpcpp/grpcpp.h>
+#include <gtest/gtest.h>
+#include <sndfile.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "common/runtime/files.hpp"
+#include "common/sound/levels.hpp"
+#include "common/sound/tones.hpp"
+#include "common/wire/convert.hpp"
+#include "common/wire/room_client.hpp"
+#include "osteon/v1/cutting.grpc.pb.h"
+#include "tests/support/process.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/support/wait.hpp"
+#include "tests/unit/audio_client/scripted_drilling.hpp"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct Row {
+  std::uint64_t state_seq = 0;
+  std::int64_t received_ns = 0, sounded_ns = 0;
+};
+
+std::vector<Row> read_log(const std::filesystem::path& file, std::string& header) {
+  std::ifstream in(file);
+  std::getline(in, header);
+  std::vector<Row> rows;
+  for (std::string line; std::getline(in, line);) {
+    std::istringstream fields(line);
+    Row row;
+    char comma;
+    fields >> row.state_seq >> comma >> row.received_ns >> comma >> row.sounded_ns;
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+std::vector<float> read_wav(const std::filesystem::path& file) {
+  SF_INFO info{};
+  SNDFILE* in = sf_open(file.c_str(), SFM_READ, &info);
+  if (!in) return {};
+  std::vector<float> samples(static_cast<std::size_t>(info.frames * info.channels));
+  sf_readf_float(in, samples.data(), info.frames);
+  sf_close(in);
+  return samples;
+}
+
+// A server with a small phantom, ready for clients.
+class AudioProcess : public testing::Test {
+ protected:
+  void SetUp() override {
+    const test::RunResult made =
+        test::run(test::program("osteon-import"), {"phantom", "block", "--layers", "4:1.9", "--width", "8", "--pitch",
+                                                   "0.5", "--out", (temp_ / "case").string()});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+    server_.emplace(
+        test::program("osteon-server"),
+        std::vector<std::string>{"--case", (temp_ / "case").string(), "--address-file", (temp_ / "address").string()});
+    const auto address = test::wait_for_address(temp_ / "address", 30s);
+    ASSERT_TRUE(address) << server_->err();
+    address_ = *address;
+  }
+
+  std::vector<std::string> arguments() const {
+    // Run by deploy/with-null-sink with this set, the same goes through RtAudio and PulseAudio.
+    const char* output = std::getenv("OSTEON_TEST_OUTPUT");
+    return {"--server",    address_,
+            "--output",    output ? output : "none",
+            "--wav",       (temp_ / "a.wav").string(),
+            "--state-log", (temp_ / "a.csv").string(),
+            "--summary",   (temp_ / "a.json").string()};
+  }
+
+  // Sends the states at 120 Hz as a haptic client does.
+  void send(const std::vector<CuttingState>& states) {
+    auto room = wire::join_room(address_, wire::ClientKind::haptic, "hand", 5s, {});
+    ASSERT_TRUE(room) << room.error().message;
+    grpc::ClientContext context;
+    const auto stub = v1::CuttingService::NewStub(room->channel);
+    const auto stream = stub->Session(&context);
+    std::thread reader([&] {
+      v1::SessionResponse ignored;
+      while (stream->Read(&ignored)) {
+      }
+    });
+    v1::SessionRequest open;
+    open.mutable_open()->set_author(room->author.value);
+    open.mutable_open()->set_server_epoch(room->server_epoch);
+    bool sent = stream->Write(open);
+    auto due = std::chrono::steady_clock::now();
+    for (CuttingState state : states) {
+      std::this_thread::sleep_until(due += 8333us);
+      state.author = room->author;
+      v1::SessionRequest request;
+      *request.mutable_state() = wire::to_wire(state);
+      sent = sent && stream->Write(request);
+    }
+    EXPECT_TRUE(sent) << "the server closed the session";
+    stream->WritesDone();
+    context.TryCancel();
+    reader.join();
+    static_cast<void>(stream->Finish());
+  }
+
+  test::TempDir temp_;
+  std::optional<test::Process> server_;
+  std::string address_;
+};
+
+std::vector<CuttingState> numbered(const std::vector<std::pair<CuttingState, double>>& parts) {
+  std::vector<CuttingState> states;
+  for (const auto& [state, seconds] : parts) {
+    for (int i = 0; i < static_cast<int>(seconds * 120); ++i) {
+      states.push_back(state);
+      states.back().state_seq = states.size();
+    }
+  }
+  return states;
+}
+
+TEST_F(AudioProcess, StatesAreHeardLoggedAndRecorded) {
+  test::Process audio(test::program("osteon-audio"), arguments());
+  ASSERT_TRUE(test::wait_until([&] { return audio.err().find("joined") != std::string::npos; }, 20s)) << audio.err();
+  send(numbered({{test::free_drill(1200), 1.2}, {test::cortical_drill(1200), 1.2}, {test::idle_drill(), 0.8}}));
+  EXPECT_EQ(audio.terminate(), 0) << audio.err();
+
+  std::string header;
+  const std::vector<Row> rows = read_log(temp_ / "a.csv", header);
+  EXPECT_THAT(header, testing::StartsWith("state_seq,received_mono_ns,sounded_mono_ns"));
+  // The newest state wins where two come within one buffer, so not all 384 are heard; after a stall it is fewer.
+  ASSERT_GT(rows.size(), 60U);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    EXPECT_GT(rows[i].sounded_ns, rows[i].received_ns);
+    if (i > 0) {
+      EXPECT_GT(rows[i].state_seq, rows[i - 1].state_seq);
+    }
+  }
+
+  const std::vector<float> heard = read_wav(temp_ / "a.wav");
+  const nlohmann::json summary = nlohmann::json::parse(*read_file(temp_ / "a.json"));
+  EXPECT_EQ(summary["wav_frames"], heard.size());
+  EXPECT_EQ(summary["wav_frames_lost"], 0);
+  EXPECT_EQ(summary["frames"], heard.size());
+  EXPECT_EQ(summary["states_sounded"], rows.size());
+  EXPECT_GT(summary["peak"], 0.02);
+  EXPECT_LT(summary["peak"], 1.0);
+  EXPECT_GT(summary["received_to_sounded"]["p50_ms"], 0);
+
+  std::printf("%s\n", summary.dump().c_str());
+
+  // The loudest half second is cortical drilling: the output mesh at 48 x 20 Hz stands in it.
+  std::size_t loudest = 0;
+  double loudest_db = sound::kSilence_db;
+  for (std::size_t at = 0; at + 24000 <= heard.size(); at += 2400) {
+    const double db = sound::rms_db(std::span(heard).subspan(at, 24000));
+    if (db > loudest_db) loudest_db = db, loudest = at;
+  }
+  EXPECT_NEAR(sound::find_tone(std::span(heard).subspan(loudest, 24000), 48000, 940, 980).hz, 960, 0.2);
+  EXPECT_EQ(sound::peak(std::span(heard).last(2000)), 0) << "the recording ends in silence";
+}
+
+TEST_F(AudioProcess, ServerThatGoesAwayIsOneSentenceAndAFinishedRecording) {
+  test::Process audio(test::program("osteon-audio"), arguments());
+  ASSERT_TRUE(test::wait_until([&] { return audio.err().find("joined") != std::string::npos; }, 20s)) << audio.err();
+  server_->signal(SIGKILL);
+  EXPECT_EQ(audio.wait(20s), 1);
+  EXPECT_THAT(audio.err(), testing::HasSubstr("osteon-audio: the server went away"));
+  EXPECT_FALSE(read_wav(temp_ / "a.wav").empty());
+  EXPECT_TRUE(std::filesystem::exists(temp_ / "a.json"));
+}
+
+TEST_F(AudioProcess, KilledListenerDisturbsNobody) {
+  test::Process audio(test::program("osteon-audio"), arguments());
+  ASSERT_TRUE(test::wait_until([&] { return audio.err().find("joined") != std::string::npos; }, 20s)) << audio.err();
+  audio.signal(SIGKILL);
+  send(numbered({{test::free_drill(1200), 0.5}}));
+  EXPECT_TRUE(server_->running());
+  EXPECT_EQ(server_->terminate(), 0) << server_->err();
+}
+
+TEST(AudioProgram, WrongInputsAreOneSentenceEach) {
+  const test::TempDir temp;
+  struct Case {
+    std::vector<std::string> arguments;
+    std::string says;
+  };
+  const std::vector<Case> cases = {
+      {{"--server", "127.0.0.1:1", "--output", "none", "--patience", "0.2"}, "127.0.0.1:1"},
+      {{"--server", "nowhere", "--output", "none"}, "nowhere"},
+      {{"--server", "127.0.0.1:1", "--output", "tape"}, "--output none"},
+      {{"--server", "127.0.0.1:1", "--output", "none", "--wav", "/nowhere/a.wav"}, "/nowhere/a.wav"},
+      {{"--server", "127.0.0.1:1", "--output", "none", "--state-log", "/nowhere/a.csv"}, "/nowhere/a.csv"},
+      {{"--server", "127.0.0.1:1", "--output", "pulse"}, "--output none"},
+      {{"--output", "none"}, "--server"},
+  };
+  for (const Case& wrong : cases) {
+    test::ProcessOptions options;
+    options.environment = {{"PULSE_SERVER", "unix:" + (temp / "nobody").string()},
+                           {"XDG_RUNTIME_DIR", temp.path().string()}};
+    const test::RunResult result = test::run(test::program("osteon-audio"), wrong.arguments, 30s, options);
+    EXPECT_EQ(result.exit_code, 1) << wrong.says;
+    EXPECT_THAT(result.err, testing::StartsWith("osteon-audio: ")) << wrong.says;
+    EXPECT_THAT(result.err, testing::HasSubstr(wrong.says));
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  }
+}
+
+}  // namespace
+}  // namespace osteon
