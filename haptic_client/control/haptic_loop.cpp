@@ -31,10 +31,11 @@ void HapticLoop::take_up(int tool, const Pose& pose_bone_tool, const WorkspaceMa
 }
 
 LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch) noexcept {
-  const ToolModel& model = tools_[static_cast<std::size_t>(tool_)];
   LoopReport report;
   report.tool = tool_;
   report.state_seq = ++ticks_;
+  if (tools_.empty()) return report;  // a plan that only waits
+  const ToolModel& model = tools_[static_cast<std::size_t>(tool_)];
   if (input.periods > 3) report.events |= kMissedTicks;
 
   // While the clutch is held the tool stays; letting go ties the handle to the tool where it now is, without force.

@@ -6,10 +6,10 @@
 
 namespace osteon::haptic {
 
-Replica::Replica(const Case& bone, BodyId body) : bone_(bone), body_(body), committed_(bone, body), predicted_(bone, body) {}
+Replica::Replica(const Case& bone, BodyId body) : bone_(bone), body_(body), predicted_(bone, body) {}
 
 void Replica::restore(const FieldLeaf& leaf) {
-  committed_.restore(leaf);
+  joined_.push_back(leaf);
   predicted_.restore(leaf);
   changes_.push_back({leaf.level, {leaf.origin}});
 }
@@ -23,7 +23,7 @@ void Replica::add_own(const Cut& cut) {
 
 void Replica::commit(RoomSeq place, const Cut& cut, bool own) {
   room_seq_ = place;
-  committed_.apply(cut);
+  committed_cuts_.push_back(cut);
   if (own) {
     // The prediction holds it already: applying it again would change nothing.
     const auto found = std::ranges::find(pending_, cut.author_seq, &Cut::author_seq);
@@ -43,13 +43,15 @@ void Replica::reject(RoomSeq place, std::uint64_t author_seq) {
   if (found == pending_.end()) return;
   changes_.push_back({found->level, SweptTool(*found, bone_.pitch_mm()).leaves()});
   pending_.erase(found);
-  rebuild_prediction();
+  predicted_ = committed();
+  for (const Cut& cut : pending_) predicted_.apply(cut);
 }
 
-void Replica::rebuild_prediction() {
-  predicted_ = CutField(bone_, body_);
-  for (const FieldLeaf& leaf : committed_.leaves()) predicted_.restore(leaf);
-  for (const Cut& cut : pending_) predicted_.apply(cut);
+CutField Replica::committed() const {
+  CutField field(bone_, body_);
+  for (const FieldLeaf& leaf : joined_) field.restore(leaf);
+  for (const Cut& cut : committed_cuts_) field.apply(cut);
+  return field;
 }
 
 std::vector<ChangedLeaves> Replica::take_changes() { return std::exchange(changes_, {}); }

@@ -1,5 +1,7 @@
 // The haptic client's own copy of the bone: what the room has committed, and on top what this client has cut and the
-// room has not yet confirmed. Both by the same kernel, so the committed part is the server's to the last bit.
+// room has not yet confirmed. Both by the same kernel, so without unconfirmed cuts it is the server's to the last bit.
+// One field holds both: order does not matter to it, so a confirmation changes nothing; only a rejection, which is rare,
+// makes the field again from what was committed.
 #pragma once
 #include <deque>
 #include <vector>
@@ -19,7 +21,7 @@ class Replica {
   Replica(const Case& bone, BodyId body);
 
   void restore(const FieldLeaf& leaf);                          // part of the field at the time of joining
-  void joined(RoomSeq contained) { room_seq_ = contained; }
+  void joined(RoomSeq contained) { room_seq_ = contained; }     // all leaves were given
   void add_own(const Cut& cut);                                 // predicted at once
   void commit(RoomSeq place, const Cut& cut, bool own);         // in room_seq order; own ones leave the prediction
   void reject(RoomSeq place, std::uint64_t author_seq);         // of our own: what it took comes back
@@ -27,18 +29,19 @@ class Replica {
   [[nodiscard]] std::vector<ChangedLeaves> take_changes();
 
   [[nodiscard]] const CutField& predicted() const { return predicted_; }
-  [[nodiscard]] const CutField& committed() const { return committed_; }
+  // What the room has committed, made anew: slow.
+  [[nodiscard]] CutField committed() const;
   [[nodiscard]] RoomSeq room_seq() const { return room_seq_; }
   [[nodiscard]] std::uint64_t last_own() const { return last_own_; }  // newest own cut that is in predicted()
   [[nodiscard]] std::size_t unconfirmed() const { return pending_.size(); }
   [[nodiscard]] std::uint64_t rejected() const { return rejected_; }
 
  private:
-  void rebuild_prediction();
-
   Case bone_;
   BodyId body_;
-  CutField committed_, predicted_;
+  CutField predicted_;
+  std::vector<FieldLeaf> joined_;     // as the field was on joining
+  std::vector<Cut> committed_cuts_;   // since then
   std::deque<Cut> pending_;  // own, in order
   std::vector<ChangedLeaves> changes_;
   RoomSeq room_seq_;

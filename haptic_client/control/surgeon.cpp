@@ -172,11 +172,13 @@ void Surgeon::observe(const ReadyStep& step, const LoopReport& report, double dt
     }
   }
   if (step.plan.action != Action::drill) return;
-  // Past the far surface with nothing engaged: from here on the tip only plunges.
-  if (left_far_side_mm_ < 0.0 && depth > step.site.thickness_mm && report.engaged == 0.0) left_far_side_mm_ = depth;
-  if (left_far_side_mm_ >= 0.0) {
+  // The cone has left the far surface where it was last engaged; from there on the tip only plunges.
+  if (depth <= step.site.thickness_mm || phase_ == SurgeonPhase::retract) return;
+  if (report.engaged > 0.0) {
+    last_engaged_mm_ = depth;
+  } else if (last_engaged_mm_ >= 0.0) {
     result.broke_through = true;
-    result.plunge_mm = std::max(result.plunge_mm, depth - left_far_side_mm_);
+    result.plunge_mm = std::max(result.plunge_mm, depth - last_engaged_mm_);
   }
 }
 
@@ -262,7 +264,7 @@ SurgeonOrder Surgeon::act(const LoopReport& report, double dt_s) noexcept {
       const Vec3 first = step.sweep_mm.empty() ? step.site.entry_mm : step.sweep_mm.front();
       hand_ = {HandMode::carry, first - kStandOff_mm * step.site.axis, step.site.axis};
       target_depth_mm_ = depth_mm(step, hand_.target_mm);
-      left_far_side_mm_ = -1.0;
+      last_engaged_mm_ = -1.0;
       spindle_rpm_ = 0.0;
       order.take_up = true;
     } else if (!(report.events & kUncovered)) {

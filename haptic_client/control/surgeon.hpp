@@ -111,7 +111,7 @@ class Surgeon {
   HandCommand hand_;
   double spindle_rpm_ = 0;
   double target_depth_mm_ = 0;
-  double left_far_side_mm_ = -1;  // depth of the tip when the cone had left
+  double last_engaged_mm_ = -1;   // depth of the tip when the cone was last in bone, beyond the far side
   std::size_t knot_ = 0;          // next place of a sweep
 };
 

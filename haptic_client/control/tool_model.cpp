@@ -4,7 +4,7 @@ namespace osteon::haptic {
 
 ToolModel::ToolModel(const Tool& definition, double pitch_mm, double wear)
     : tool(definition), fine_pitch_mm(level_pitch_mm(pitch_mm, definition.cut_level)) {
-  constexpr int kActivePoints = 120;
+  constexpr int kActivePoints = 240;
   inset = 0.5 * fine_pitch_mm + kQuantum_mm;
   for (const SamplePoint& p : sample_points(tool, kActivePoints)) {
     const ContactPoint point{p.position_mm, p.position_mm + inset * p.inward, -p.inward, p.area_mm2,

@@ -1,0 +1,366 @@
+#include "haptic_client/app/client.hpp"
+
+#include <array>
+#include <atomic>
+#include <condition_variable>
+#include <cstdio>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <variant>
+
+#include "common/runtime/event_queue.hpp"
+#include "common/runtime/latest_value.hpp"
+#include "common/runtime/log.hpp"
+#include "common/runtime/periodic.hpp"
+#include "haptic_client/control/patch_builder.hpp"
+#include "haptic_client/control/replica.hpp"
+
+namespace osteon::haptic {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kTick = 1ms;
+constexpr auto kSpin = 150us;
+constexpr int kPriority = 80;
+constexpr auto kConfirmPatience = 20s;
+constexpr std::size_t kTickTimes = 8192;  // ticks whose wake-up time is remembered
+
+std::int64_t ns(Clock::time_point t) { return std::chrono::duration_cast<std::chrono::nanoseconds>(t.time_since_epoch()).count(); }
+
+// What the room sends, on its way to the replica's thread.
+struct Committed {
+  RoomSeq place;
+  Cut cut;
+};
+struct Rejected {
+  RoomSeq place;
+  std::uint64_t author_seq;
+  std::string reason;
+};
+struct Complete {
+  RoomSeq contained;
+};
+using FromRoom = std::variant<FieldLeaf, Complete, Committed, Rejected>;
+
+// Where the tool is, for the replica's thread.
+struct ToolPlace {
+  Pose pose_bone_tool;
+  int tool = 0;
+  std::uint32_t step = 0;
+  bool taken_up = false;
+};
+
+class Client {
+ public:
+  Client(RoomSession& room, ReadyPlan plan, const SimulatedDeviceParams& device, const ClientOptions& options,
+         const StopSignal& stop)
+      : room_(room), options_(options), stop_(stop), session_(std::move(plan), device, options.force_scale),
+        replica_(room.bone(), BodyId{}) {
+    for (auto& time : tick_times_) time.store(0, std::memory_order_relaxed);
+    for (const ToolModel& model : session_.surgeon().plan().tools) tool_names_.push_back(model.tool.name);
+    if (tool_names_.empty()) tool_names_.emplace_back("none");
+    outcome_.limits = session_.device().limits();
+    outcome_.loop = session_.loop().params();
+    outcome_.removed_mm3.resize(session_.surgeon().plan().steps.size());
+  }
+
+  Result<ClientOutcome> run() {
+    if (Result<void> opened = log_.open(options_.session_log); !opened) return tl::unexpected(opened.error());
+    open_room();
+    std::thread replica([this] { replica_thread(); });
+    std::thread reporter([this] { reporter_thread(); });
+    if (wait_joined()) {
+      std::thread haptic([this] { haptic_thread(); });
+      haptic.join();
+    }
+    touching_over_ = true;
+    replica.join();
+    all_over_ = true;
+    reporter.join();
+    room_.close();
+    if (Result<void> written = log_.finish(); !written) return tl::unexpected(written.error());
+    {
+      const std::lock_guard lock(mutex_);
+      if (lost_why_) return tl::unexpected(*lost_why_);
+    }
+    outcome_.stopped = stop_.requested() && !session_.done();
+    if (!outcome_.stopped && replica_.unconfirmed() > 0)
+      return failure(ErrorCode::unavailable, "the server has not confirmed the last " + std::to_string(replica_.unconfirmed()) +
+                                                 " cuts within " + std::to_string(kConfirmPatience.count()) + " s; look at the server's log");
+    outcome_.steps = session_.surgeon().results();
+    outcome_.field_hash = replica_.predicted().hash();
+    outcome_.removed_total_mm3 = replica_.predicted().removed_mm3();
+    outcome_.room_seq = replica_.room_seq();
+    outcome_.rejected = replica_.rejected();
+    outcome_.patch_p50_us = patch_times_.percentile_us(50);
+    outcome_.patch_p99_us = patch_times_.percentile_us(99);
+    return std::move(outcome_);
+  }
+
+ private:
+  void open_room() {
+    const auto pass = [this](FromRoom event) {
+      const std::lock_guard lock(mutex_);
+      from_room_.push_back(std::move(event));
+      wake_.notify_one();
+    };
+    RoomEvents events;
+    events.leaf = [pass](const FieldLeaf& leaf) { pass(leaf); };
+    events.complete = [pass](RoomSeq contained) { pass(Complete{contained}); };
+    events.committed = [pass](RoomSeq place, const Cut& cut) { pass(Committed{place, cut}); };
+    events.rejected = [pass](RoomSeq place, std::uint64_t seq, const std::string& why) { pass(Rejected{place, seq, why}); };
+    events.lost = [this](const Error& why) {
+      const std::lock_guard lock(mutex_);
+      lost_why_ = why;
+      link_ok_ = false;
+      wake_.notify_one();
+    };
+    room_.open(std::move(events));
+  }
+
+  bool wait_joined() {
+    while (!joined_ && link_ok_ && !stop_.wait_for(2ms)) {
+    }
+    return joined_ && link_ok_;
+  }
+
+  // [haptic] Nothing here allocates, locks, logs or waits, its own sleep apart.
+  void haptic_thread() {
+    outcome_.realtime = try_realtime(kPriority);
+    PeriodicTimer timer(kTick, kSpin);
+    constexpr int kRunDownTicks = 500;  // after the link is lost
+    int down = 0;
+    while (!session_.done() && !stop_.requested() && down < kRunDownTicks) {
+      const int periods = timer.wait(outcome_.ticks);
+      const bool link_ok = link_ok_.load(std::memory_order_relaxed);
+      if (!link_ok) ++down;
+      patches_.refresh();
+      const SessionTick now = session_.tick(patches_.value(), link_ok, periods);
+
+      const std::int64_t woke_ns = ns(timer.woke());
+      tick_times_[now.report.state_seq % kTickTimes].store(woke_ns, std::memory_order_relaxed);
+      const bool idle = now.order.phase == SurgeonPhase::wait || now.order.phase == SurgeonPhase::done;
+      ToolPlace& place = places_.writable();
+      place = {now.report.pose_bone_proxy, now.report.tool, static_cast<std::uint32_t>(now.order.step), taken_up_ |= !idle};
+      places_.publish();
+      if (now.report.events & kUncovered && !idle && now.order.phase != SurgeonPhase::take_up) ++outcome_.uncovered_ticks;
+      if (now.report.events & kCutsWaiting) ++outcome_.cuts_waiting_ticks;
+
+      row_.mono_ns = woke_ns;
+      row_.tick = static_cast<std::int64_t>(now.report.state_seq);
+      row_.phase = now.order.phase;
+      row_.step = static_cast<std::uint32_t>(now.order.step);
+      row_.idle = idle;
+      row_.report = now.report;
+      if (!idle) site_ = &session_.surgeon().plan().steps[now.order.step].site;
+      if (site_) {
+        row_.depth_mm = (now.report.pose_bone_proxy.position_mm - site_->entry_mm).dot(site_->axis);
+        row_.device_depth_mm = (now.report.pose_bone_device.position_mm - site_->entry_mm).dot(site_->axis);
+      }
+      row_.force_rendered_n = now.report.force_device_n.norm();
+      if (!rows_.try_push(row_)) ++outcome_.rows_dropped;
+      timer.done(outcome_.ticks);
+    }
+  }
+
+  void replica_thread() {
+    std::deque<FromRoom> events;
+    std::optional<Clock::time_point> waiting_since;
+    while (true) {
+      {
+        std::unique_lock lock(mutex_);
+        wake_.wait_for(lock, 2ms, [&] { return !from_room_.empty(); });
+        events.swap(from_room_);
+      }
+      // Before the queues are looked at: what was closed up to here must still be taken.
+      const bool over = touching_over_;
+      take_own_cuts();
+      for (FromRoom& event : events) std::visit([this](auto& e) { take(e); }, event);
+      events.clear();
+      build_patch();
+      if (!over) continue;
+      if (!waiting_since) waiting_since = Clock::now();
+      const bool settled = replica_.unconfirmed() == 0 && unsent_.empty();
+      if (settled || !link_ok_ || stop_.requested() || Clock::now() - *waiting_since > kConfirmPatience) break;
+    }
+    note_removed(outcome_.removed_mm3.size());
+  }
+
+  void take_own_cuts() {
+    CutPiece piece;
+    while (session_.loop().take_piece(piece)) {
+      const Tool& tool = session_.loop().tool(piece.tool).tool;
+      Cut cut;
+      cut.author = room_.room().author;
+      cut.author_seq = piece.author_seq;
+      cut.lease_epoch = room_.room().lease_epoch;
+      cut.tool = tool.hash();
+      cut.shape = tool.cut_shape();
+      cut.level = tool.cut_level;
+      cut.path.assign(piece.path.begin(), piece.path.begin() + piece.knots);
+      cut.spindle_rpm = piece.spindle_rpm;
+      unsent_.push_back(cut);
+      const std::int64_t closed_ns = tick_times_[static_cast<std::size_t>(piece.closed_tick) % kTickTimes].load(std::memory_order_relaxed);
+      outcome_.cuts.push_back({piece.author_seq, 0, closed_ns, 0});
+      // Sent before it is felt: the room's answer is what takes longest.
+      send_waiting();
+      replica_.add_own(cut);
+    }
+    send_waiting();
+  }
+
+  void send_waiting() {
+    while (!unsent_.empty() && room_.send(unsent_.front())) unsent_.pop_front();
+  }
+
+  void confirm(std::uint64_t author_seq, RoomSeq place) {
+    if (author_seq == 0 || author_seq > outcome_.cuts.size()) return;
+    CutRow& row = outcome_.cuts[author_seq - 1];
+    row.room_seq = place.value;
+    row.confirmed_mono_ns = ns(Clock::now());
+  }
+
+  void take(const FieldLeaf& leaf) { replica_.restore(leaf); }
+  void take(const Complete& complete) {
+    replica_.joined(complete.contained);
+    joined_ = true;
+  }
+  void take(const Committed& committed) {
+    const bool own = committed.cut.author == room_.room().author;
+    if (own) confirm(committed.cut.author_seq, committed.place);
+    replica_.commit(committed.place, committed.cut, own);
+  }
+  void take(const Rejected& rejected) {
+    confirm(rejected.author_seq, RoomSeq{});
+    replica_.reject(rejected.place, rejected.author_seq);
+    log::warn("cut rejected", {{"author_seq", rejected.author_seq}, {"reason", rejected.reason}});
+  }
+
+  void build_patch() {
+    places_.refresh();
+    const ToolPlace& place = places_.value();
+    if (!place.taken_up) return;
+    note_removed(place.step);
+    const std::vector<ChangedLeaves> changes = replica_.take_changes();
+    const double moved_mm = (place.pose_bone_tool.position_mm - built_at_.position_mm).norm();
+    if (changes.empty() && moved_mm < 0.05 && place.tool == built_tool_) return;
+
+    const auto began = Clock::now();
+    for (const ChangedLeaves& change : changes) builder_.changed(room_.bone().pitch_mm(), change.level, change.origins);
+    Patch& patch = patches_.writable();
+    builder_.build(replica_.predicted(), session_.loop().tool(place.tool), place.pose_bone_tool, patch);
+    patch.own_cuts = replica_.last_own();
+    patch.room_seq = replica_.room_seq();
+    patches_.publish();
+    built_at_ = place.pose_bone_tool;
+    built_tool_ = place.tool;
+    ++outcome_.patches;
+    patch_times_.record(Clock::now() - began);
+  }
+
+  // Bone removed by the steps before this one, as far as it was not noted yet.
+  void note_removed(std::size_t step) {
+    for (; noted_steps_ < step && noted_steps_ < outcome_.removed_mm3.size(); ++noted_steps_) {
+      const double removed = replica_.predicted().removed_mm3();
+      outcome_.removed_mm3[noted_steps_] = removed - noted_mm3_;
+      noted_mm3_ = removed;
+    }
+  }
+
+  void reporter_thread() {
+    auto next_status = Clock::now() + 1s;
+    TickRow row;
+    while (true) {
+      const bool over = all_over_;
+      bool any = false;
+      while (rows_.try_pop(row)) {
+        any = true;
+        log_.write(row, tool_name(row));
+      }
+      if (any && link_ok_) room_.send(state_of(row));
+      if (over) break;
+      if (options_.status && any && Clock::now() >= next_status) {
+        next_status += 1s;
+        print_status(row);
+      }
+      std::this_thread::sleep_for(4ms);
+    }
+  }
+
+  [[nodiscard]] const std::string& tool_name(const TickRow& row) const { return tool_names_[static_cast<std::size_t>(row.report.tool)]; }
+
+  [[nodiscard]] CuttingState state_of(const TickRow& row) const {
+    const LoopReport& r = row.report;
+    CuttingState state;
+    state.author = room_.room().author;
+    state.state_seq = r.state_seq;
+    state.pose_bone_tool = r.pose_bone_proxy;
+    state.pose_bone_device = r.pose_bone_device;
+    state.tool_name = tool_name(row);
+    state.spindle_rpm = r.spindle_rpm;
+    state.feed_mm_per_s = r.feed_mm_per_s;
+    state.density_g_cm3 = r.density_g_cm3;
+    state.engaged_fraction = r.engaged;
+    state.force_physical_N = r.force_physical_n;
+    state.torque_Nmm = r.torque_nmm;
+    state.depth_mm = row.depth_mm;
+    state.phase = r.phase;
+    return state;
+  }
+
+  void print_status(const TickRow& row) const {
+    const LoopReport& r = row.report;
+    std::printf("%s %s: depth %.1f mm, force %.1f N, feed %.2f mm/s, %.0f rpm (%s)\n", tool_name(row).c_str(), name(row.phase),
+                row.depth_mm, r.force_physical_n.norm(), r.feed_mm_per_s, r.spindle_rpm, name(r.phase));
+    std::fflush(stdout);
+  }
+
+  RoomSession& room_;
+  const ClientOptions& options_;
+  const StopSignal& stop_;
+  SimulatedSession session_;   // haptic thread; its queue of cuts is emptied by the replica's thread
+  Replica replica_;            // replica thread, until it is joined
+  PatchBuilder builder_;       // replica thread
+  SessionLog log_;             // reporter thread
+  std::vector<std::string> tool_names_;  // never changes
+
+  LatestValue<Patch> patches_;     // replica → haptic
+  LatestValue<ToolPlace> places_;  // haptic → replica
+  EventQueue<TickRow, 2048> rows_; // haptic → reporter
+  std::array<std::atomic<std::int64_t>, kTickTimes> tick_times_;
+
+  std::mutex mutex_;               // guards the two below; never taken by the haptic thread
+  std::deque<FromRoom> from_room_;
+  std::optional<Error> lost_why_;
+  std::condition_variable wake_;
+  std::atomic<bool> link_ok_{true}, joined_{false}, touching_over_{false}, all_over_{false};
+
+  // Haptic thread.
+  TickRow row_;
+  const Site* site_ = nullptr;
+  bool taken_up_ = false;
+  // Replica thread.
+  std::deque<Cut> unsent_;
+  Pose built_at_;
+  int built_tool_ = -1;
+  std::size_t noted_steps_ = 0;
+  double noted_mm3_ = 0;
+  DurationHistogram patch_times_;
+
+  ClientOutcome outcome_;
+};
+
+}  // namespace
+
+Result<ClientOutcome> run_client(RoomSession& room, ReadyPlan plan, const SimulatedDeviceParams& device,
+                                 const ClientOptions& options, const StopSignal& stop) {
+  // Large: its queues are part of it.
+  const auto client = std::make_unique<Client>(room, std::move(plan), device, options, stop);
+  return client->run();
+}
+
+}  // namespace osteon::haptic

@@ -1,0 +1,43 @@
+// The running haptic client: the 1 kHz thread, the thread of the replica and its patches, and the one that reports.
+// They share no lock with the haptic thread; data crosses by LatestValue and fixed queues.
+#pragma once
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/runtime/stop_signal.hpp"
+#include "common/runtime/tick_stats.hpp"
+#include "haptic_client/app/record.hpp"
+#include "haptic_client/net/room_session.hpp"
+
+namespace osteon::haptic {
+
+struct ClientOptions {
+  double force_scale = 0;  // 0: from the device
+  std::filesystem::path session_log;
+  bool status = false;     // a line each second on standard output
+};
+
+struct ClientOutcome {
+  bool stopped = false;                  // by a signal, before the plan was done
+  std::vector<StepResult> steps;
+  std::vector<double> removed_mm3;       // of each step, by the cut field
+  std::vector<CutRow> cuts;
+  TickStats ticks;
+  bool realtime = false;                 // the haptic thread had SCHED_FIFO
+  Digest field_hash;
+  RoomSeq room_seq;
+  double removed_total_mm3 = 0;
+  std::uint64_t rejected = 0, patches = 0, uncovered_ticks = 0, cuts_waiting_ticks = 0, rows_dropped = 0;
+  double patch_p50_us = 0, patch_p99_us = 0;
+  DeviceLimits limits;
+  LoopParams loop;
+};
+
+// Runs a plan to its end and waits until the room has confirmed every cut. Errors: unavailable (the server went away;
+// force and spindle are down by then, or it stopped confirming), internal (the log cannot be written).
+[[nodiscard]] Result<ClientOutcome> run_client(RoomSession& room, ReadyPlan plan, const SimulatedDeviceParams& device,
+                                               const ClientOptions& options, const StopSignal& stop);
+
+}  // namespace osteon::haptic

@@ -1,0 +1,137 @@
+#include "haptic_client/app/plan_file.hpp"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <stdexcept>
+
+#include "common/runtime/files.hpp"
+
+namespace osteon::haptic {
+namespace {
+
+using nlohmann::json;
+
+// Thrown and caught within this file only: the sentence for a field that is wrong.
+struct Wrong : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+double number(const json& object, const char* field, double otherwise, double low, double high) {
+  if (!object.contains(field)) return otherwise;
+  const json& value = object.at(field);
+  if (!value.is_number() || !(value.get<double>() >= low && value.get<double>() <= high))
+    throw Wrong(std::string("\"") + field + "\" must be a number from " + json(low).dump() + " to " + json(high).dump());
+  return value.get<double>();
+}
+
+template <std::size_t N>
+std::array<double, N> numbers(const json& object, const char* field) {
+  const json& value = object.at(field);
+  std::array<double, N> result{};
+  bool right = value.is_array() && value.size() == N;
+  for (std::size_t i = 0; right && i < N; ++i) {
+    right = value[i].is_number() && std::isfinite(value[i].get<double>());
+    if (right) result[i] = value[i].get<double>();
+  }
+  if (!right) throw Wrong(std::string("\"") + field + "\" must be a list of " + std::to_string(N) + " numbers");
+  return result;
+}
+
+Vec3 vector(const json& object, const char* field) {
+  const auto v = numbers<3>(object, field);
+  return {v[0], v[1], v[2]};
+}
+
+std::string text(const json& object, const char* field, const char* otherwise) {
+  if (!object.contains(field)) return otherwise;
+  if (!object.at(field).is_string()) throw Wrong(std::string("\"") + field + "\" must be a text");
+  return object.at(field).get<std::string>();
+}
+
+void only(const json& object, const std::set<std::string>& known) {
+  for (const auto& [key, value] : object.items())
+    if (!known.contains(key)) throw Wrong("\"" + key + "\" is not known here; remove it or correct its spelling");
+}
+
+PlanEntry read_entry(const json& step) {
+  if (!step.contains("entry") || !step.at("entry").is_object())
+    throw Wrong("\"entry\" is missing; give {\"toward\": [x, y, z]} or {\"point_mm\": [x, y, z], \"axis\": [x, y, z]}");
+  const json& entry = step.at("entry");
+  only(entry, {"toward", "point_mm", "axis", "beside_last_mm"});
+  PlanEntry result;
+  if (entry.contains("toward")) result.toward = vector(entry, "toward");
+  if (entry.contains("point_mm") != entry.contains("axis")) throw Wrong("\"entry\" needs \"point_mm\" and \"axis\" together");
+  if (entry.contains("point_mm")) {
+    result.point_mm = vector(entry, "point_mm");
+    result.axis = vector(entry, "axis");
+  }
+  if (entry.contains("beside_last_mm")) result.beside_last_mm = numbers<2>(entry, "beside_last_mm");
+  if (result.toward.has_value() + result.point_mm.has_value() + result.beside_last_mm.has_value() != 1)
+    throw Wrong("\"entry\" needs exactly one of \"toward\", \"point_mm\" with \"axis\", and \"beside_last_mm\"");
+  return result;
+}
+
+PlanStep read_step(const json& object) {
+  if (!object.is_object()) throw Wrong("it must be an object with an \"action\"");
+  PlanStep step;
+  const std::string action = text(object, "action", "");
+  if (action == "wait") {
+    only(object, {"action", "seconds"});
+    step.action = Action::wait;
+    step.seconds = number(object, "seconds", 0.0, 0.0, 3600.0);
+    return step;
+  }
+  if (action != "drill" && action != "burr")
+    throw Wrong("\"action\" is \"" + action + "\"; choose \"drill\", \"burr\" or \"wait\"");
+  const bool drill = action == "drill";
+  only(object, {"action", "tool", "spindle_rpm", "hand", "feed_mm_per_s", "push_n", "entry", "beyond_mm", "window_mm",
+                "depth_mm", "sweep_mm_per_s", "wear"});
+  step.action = drill ? Action::drill : Action::burr;
+  step.tool = text(object, "tool", drill ? "drill-3.2" : "burr-round-5");
+  if (const Result<Tool> known = find_tool(step.tool); !known) throw Wrong("\"tool\": " + known.error().message);
+  const std::string hand = text(object, "hand", "expert");
+  if (hand == "expert") step.hand = HandKind::expert;
+  else if (hand == "novice") step.hand = HandKind::novice;
+  else if (hand == "rig") step.hand = HandKind::rig;
+  else throw Wrong("\"hand\" is \"" + hand + "\"; choose \"expert\", \"novice\" or \"rig\"");
+  step.spindle_rpm = number(object, "spindle_rpm", 0.0, 100.0, 100000.0);
+  step.feed_mm_per_s = number(object, "feed_mm_per_s", step.feed_mm_per_s, 0.01, 20.0);
+  step.push_n = number(object, "push_n", step.push_n, 1.0, 200.0);
+  step.beyond_mm = number(object, "beyond_mm", step.beyond_mm, 0.0, 40.0);
+  step.depth_mm = number(object, "depth_mm", step.depth_mm, 0.1, 20.0);
+  step.sweep_mm_per_s = number(object, "sweep_mm_per_s", step.sweep_mm_per_s, 0.5, 60.0);
+  step.wear = number(object, "wear", step.wear, 1.0, 5.0);
+  if (object.contains("window_mm")) {
+    const auto window = numbers<2>(object, "window_mm");
+    if (!(window[0] > 0.0 && window[1] > 0.0 && window[0] <= 100.0 && window[1] <= 100.0))
+      throw Wrong("\"window_mm\" must be two lengths from 0 to 100");
+    step.window_u_mm = window[0];
+    step.window_v_mm = window[1];
+  }
+  step.entry = read_entry(object);
+  return step;
+}
+
+}  // namespace
+
+Result<std::vector<PlanStep>> read_plan(const std::filesystem::path& file) {
+  const Result<std::string> content = read_file(file);
+  if (!content) return tl::unexpected(content.error());
+  const json plan = json::parse(*content, nullptr, false);
+  const std::string name = "the plan " + file.string();
+  if (plan.is_discarded()) return failure(ErrorCode::invalid_input, name + " is not JSON; see the plans that deploy/demo writes");
+  if (!plan.is_object() || !plan.contains("steps") || !plan.at("steps").is_array() || plan.at("steps").empty())
+    return failure(ErrorCode::invalid_input, name + " needs \"steps\", a list with at least one step");
+  std::vector<PlanStep> steps;
+  for (const json& object : plan.at("steps")) {
+    try {
+      steps.push_back(read_step(object));
+    } catch (const std::exception& wrong) {
+      return failure(ErrorCode::invalid_input, name + ", step " + std::to_string(steps.size() + 1) + ": " + wrong.what());
+    }
+  }
+  return steps;
+}
+
+}  // namespace osteon::haptic

@@ -1,0 +1,58 @@
+#include "haptic_client/app/record.hpp"
+
+#include <cstdio>
+
+#include "common/runtime/files.hpp"
+
+namespace osteon::haptic {
+
+const char* name(CuttingPhase phase) {
+  switch (phase) {
+    case CuttingPhase::idle: return "idle";
+    case CuttingPhase::free: return "free";
+    case CuttingPhase::cutting: return "cutting";
+    case CuttingPhase::rubbing: return "rubbing";
+  }
+  return "unknown";
+}
+
+Result<void> SessionLog::open(const std::filesystem::path& file) {
+  path_ = file;
+  if (file.empty()) return {};
+  file_.open(file, std::ios::trunc);
+  if (!file_) return failure(ErrorCode::internal, "the session log " + file.string() + " cannot be written; choose another place");
+  file_ << "time_s,mono_ns,state_seq,phase,tool,tip_x_mm,tip_y_mm,tip_z_mm,depth_mm,device_depth_mm,force_physical_n,"
+           "force_rendered_n,feed_mm_per_s,density_g_cm3,engaged,rpm,torque_nmm\n";
+  return {};
+}
+
+void SessionLog::write(const TickRow& row, const std::string& tool) {
+  if (!file_.is_open()) return;
+  const LoopReport& r = row.report;
+  const Vec3& tip = r.pose_bone_proxy.position_mm;
+  char line[384];
+  const int size = std::snprintf(
+      line, sizeof line, "%.3f,%lld,%llu,%s,%s,%.5f,%.5f,%.5f,%.5f,%.5f,%.4f,%.4f,%.5f,%.4f,%.4f,%.2f,%.3f\n",
+      1e-3 * static_cast<double>(row.tick), static_cast<long long>(row.mono_ns), static_cast<unsigned long long>(r.state_seq),
+      name(r.phase), tool.c_str(), tip.x(), tip.y(), tip.z(), row.depth_mm, row.device_depth_mm, r.force_physical_n.norm(),
+      row.force_rendered_n, r.feed_mm_per_s, r.density_g_cm3, r.engaged, r.spindle_rpm, r.torque_nmm);
+  file_.write(line, size);
+}
+
+Result<void> SessionLog::finish() {
+  if (!file_.is_open()) return {};
+  file_.close();
+  if (!file_) return failure(ErrorCode::internal, "the session log " + path_.string() + " could not be written whole; is the disk full?");
+  return {};
+}
+
+Result<void> write_cut_log(const std::filesystem::path& file, const std::vector<CutRow>& rows) {
+  if (file.empty()) return {};
+  std::string text = "author_seq,room_seq,closed_mono_ns,confirmed_mono_ns\n";
+  for (const CutRow& row : rows)
+    text += std::to_string(row.author_seq) + ',' + std::to_string(row.room_seq) + ',' + std::to_string(row.closed_mono_ns) + ',' +
+            std::to_string(row.confirmed_mono_ns) + '\n';
+  return write_file(file, text);
+}
+
+}  // namespace osteon::haptic

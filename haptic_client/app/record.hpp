@@ -1,0 +1,47 @@
+// What a session leaves behind: a row for each tick, a row for each cut, a summary.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <vector>
+
+#include "common/core/result.hpp"
+#include "haptic_client/control/session.hpp"
+
+namespace osteon::haptic {
+
+// One tick, as it crosses from the haptic thread.
+struct TickRow {
+  std::int64_t mono_ns = 0;
+  std::int64_t tick = 0;
+  SurgeonPhase phase = SurgeonPhase::done;
+  std::uint32_t step = 0;
+  double depth_mm = 0, device_depth_mm = 0;  // along the axis of the step's site
+  double force_rendered_n = 0;
+  bool idle = false;  // no step was under way: waiting
+  LoopReport report;
+};
+
+struct CutRow {
+  std::uint64_t author_seq = 0, room_seq = 0;  // room_seq 0: rejected
+  std::int64_t closed_mono_ns = 0, confirmed_mono_ns = 0;
+};
+
+[[nodiscard]] const char* name(CuttingPhase phase);
+
+// Rows are written as they come; a disk that is full shows at finish().
+class SessionLog {
+ public:
+  // Without a path everything is dropped. Error internal: the file cannot be made.
+  [[nodiscard]] Result<void> open(const std::filesystem::path& file);
+  void write(const TickRow& row, const std::string& tool);
+  [[nodiscard]] Result<void> finish();
+
+ private:
+  std::filesystem::path path_;
+  std::ofstream file_;
+};
+
+[[nodiscard]] Result<void> write_cut_log(const std::filesystem::path& file, const std::vector<CutRow>& rows);
+
+}  // namespace osteon::haptic
