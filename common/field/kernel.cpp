@@ -158,10 +158,11 @@ int cut_samples(const SweptTool::Sweep& sweep, Coord origin, double pitch, float
     const float px = static_cast<float>((origin.x + x) * pitch - sweep.start_mm[0]);
     for (int y = 0; y < kLeafSize; ++y, value += kLeafSize) {
       const float py = static_cast<float>((origin.y + y) * pitch - sweep.start_mm[1]);
+      float cut[kLeafSize];
+      for (int z = 0; z < kLeafSize; ++z) cut[z] = to_quantum(clamp(distance(px, py, pz[z]), -band, band));
       for (int z = 0; z < kLeafSize; ++z) {
-        const float cut = to_quantum(clamp(distance(px, py, pz[z]), -band, band));
-        modified += cut < value[z];
-        value[z] = low(value[z], cut);
+        modified += cut[z] < value[z] ? 1 : 0;
+        value[z] = low(value[z], cut[z]);
       }
     }
   }
@@ -296,17 +297,18 @@ int SweptTool::cut_leaf(Coord origin, std::span<float, kLeafVoxels> values) cons
   int modified = 0;
   for (const Sweep& sweep : sweeps_) {
     if (centre_distance(body_, sweep, origin, pitch) >= reach) continue;  // every sample would be at the band
+    // Copies: a compiler that knows that no value written can be one of them keeps them in registers.
     if (body_.kind == ToolKind::round_burr) {
-      modified += cut_samples(sweep, origin, pitch, band, values, [&](float x, float y, float z) {
-        return sphere_sweep_distance(body_, sweep, x, y, z);
+      modified += cut_samples(sweep, origin, pitch, band, values, [body = body_, sweep](float x, float y, float z) {
+        return sphere_sweep_distance(body, sweep, x, y, z);
       });
     } else if (sweep.search_steps == 0) {
-      modified += cut_samples(sweep, origin, pitch, band, values, [&](float x, float y, float z) {
-        return axial_sweep_distance(body_, sweep, x, y, z);
+      modified += cut_samples(sweep, origin, pitch, band, values, [body = body_, sweep](float x, float y, float z) {
+        return axial_sweep_distance(body, sweep, x, y, z);
       });
     } else {
-      modified += cut_samples(sweep, origin, pitch, band, values, [&](float x, float y, float z) {
-        return oblique_sweep_distance(body_, sweep, x, y, z);
+      modified += cut_samples(sweep, origin, pitch, band, values, [body = body_, sweep](float x, float y, float z) {
+        return oblique_sweep_distance(body, sweep, x, y, z);
       });
     }
   }

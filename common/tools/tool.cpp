@@ -116,7 +116,10 @@ const std::array<Tool, 3>& builtins() {
 CutShape Tool::cut_shape() const {
   const std::int32_t radius = quanta(0.5 * diameter_mm);
   if (kind == ToolKind::round_burr) return {kind, radius, radius, 2 * radius};
-  return {kind, radius, quanta(tip_height_mm(*this)), quanta(cutting_length_mm)};
+  // Only the lips and the land behind them cut: the flutes above run in the hole that these have made. So a cut costs
+  // what is new, however deep the hole is.
+  const std::int32_t tip_height = quanta(tip_height_mm(*this));
+  return {kind, radius, tip_height, tip_height + radius};
 }
 
 Digest Tool::hash() const {

@@ -28,7 +28,7 @@ struct CutShape {
   ToolKind kind = ToolKind::drill;
   std::int32_t radius = 0;
   std::int32_t tip_height = 0;  // drill: from the point to the full radius; round burr: the radius
-  std::int32_t length = 0;      // from the tip to the end of the cutting part
+  std::int32_t length = 0;      // from the tip to the end of what cuts; a drill's flutes only clear the hole
   friend auto operator<=>(const CutShape&, const CutShape&) = default;
 };
 
@@ -36,7 +36,7 @@ struct Tool {
   std::string name;
   ToolKind kind = ToolKind::drill;
   double diameter_mm = 0;
-  double cutting_length_mm = 0;    // flutes of a drill; diameter of a round burr
+  double cutting_length_mm = 0;    // point and flutes of a drill; diameter of a round burr
   double point_angle_rad = 0;      // full angle of a drill's point; unused by a burr
   double shank_diameter_mm = 0;
   double shank_length_mm = 0;
