@@ -51,6 +51,7 @@ nlohmann::json summary_of(const RoomServerSummary& summary, const Case& bone) {
   const HostHealth& health = summary.health;
   return {{"case_hash", to_hex(bone.hash())},
           {"field_hash", to_hex(summary.bone.field_hash)},
+          {"mesh_hash", to_hex(summary.surface_hash)},
           {"room_seq", summary.bone.room_seq.value},
           {"removed_mm3", summary.bone.removed_mm3},
           {"committed", health.counts.committed},

@@ -16,6 +16,8 @@
 #include <string>
 #include <vector>
 
+#include "server/import/isolated_reader.hpp"
+
 namespace osteon::import {
 namespace {
 
@@ -99,7 +101,7 @@ Result<std::optional<Header>> read_header(const fs::path& file) {
   return std::optional<Header>(std::move(h));
 }
 
-Result<std::vector<Header>> read_headers(const fs::path& folder, const KeepGoing& keep_going) {
+Result<std::vector<Header>> read_headers(const fs::path& folder, const AtFile& at_file, const KeepGoing& keep_going) {
   std::vector<fs::path> files;
   bool subfolders = false;
   std::error_code error;
@@ -115,6 +117,7 @@ Result<std::vector<Header>> read_headers(const fs::path& folder, const KeepGoing
   std::vector<Header> headers;
   for (const fs::path& file : files) {
     if (!keep_going(0.0)) return failure(ErrorCode::cancelled, "stopped while reading " + folder.string());
+    at_file(file);
     auto header = read_header(file);
     if (!header) return tl::unexpected(header.error());
     if (*header) headers.push_back(std::move(**header));
@@ -222,15 +225,20 @@ Result<imaging::HuVolume> arrange(std::vector<Header>& headers, const fs::path& 
   std::vector<double> sorted = gaps;
   std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
   const double usual_mm = sorted[sorted.size() / 2];
-  for (std::size_t i = 0; i < headers.size(); ++i) {
-    const bool even_gap = i == 0 || std::abs(gaps[i - 1] - usual_mm) <= 0.2 * usual_mm;
-    const double drift_mm = std::abs(headers[i].along_mm - (headers.front().along_mm + static_cast<double>(i) * step_mm));
-    if (step_mm > 1e-3 && even_gap && drift_mm <= 0.1 * step_mm) continue;
-    const std::size_t at = std::max<std::size_t>(i, 1);
-    std::snprintf(text, sizeof text, " are %.3g mm apart where %.3g mm is usual; add the missing slices or remove the doubled ones",
-                  gaps[at - 1], usual_mm);
-    return failure(ErrorCode::invalid_input, folder.string() + ": the slices " + headers[at - 1].file.filename().string() + " and " +
-                                                 headers[at].file.filename().string() + text);
+  // The worst gap, or else the first slice that has drifted from where even steps would put it.
+  std::size_t at = headers.size();
+  double worst_mm = 0.2 * usual_mm;
+  for (std::size_t i = 0; i < gaps.size(); ++i)
+    if (std::abs(gaps[i] - usual_mm) > worst_mm || gaps[i] < 1e-3) {
+      worst_mm = std::max(worst_mm, std::abs(gaps[i] - usual_mm));
+      at = i;
+    }
+  for (std::size_t i = 0; at == headers.size() && i < gaps.size(); ++i)
+    if (std::abs(headers[i + 1].along_mm - (headers.front().along_mm + static_cast<double>(i + 1) * step_mm)) > 0.1 * step_mm) at = i;
+  if (at < headers.size()) {
+    std::snprintf(text, sizeof text, " are %.3g mm apart where %.3g mm is usual; add the missing slices or remove the doubled ones", gaps[at], usual_mm);
+    return failure(ErrorCode::invalid_input, folder.string() + ": the slices " + headers[at].file.filename().string() + " and " +
+                                                 headers[at + 1].file.filename().string() + text);
   }
 
   volume.dims = {first.columns, first.rows, static_cast<int>(headers.size())};
@@ -271,14 +279,12 @@ Result<void> read_pixels(const Header& h, std::int16_t* out) {
   return {};
 }
 
-}  // namespace
-
-Result<CtScan> read_dicom_series(const fs::path& folder, const KeepGoing& keep_going) try {
+Result<CtScan> read_series(const fs::path& folder, const AtFile& at_file, const KeepGoing& keep_going) try {
   gdcm::Trace::DebugOff();
   gdcm::Trace::WarningOff();
   gdcm::Trace::ErrorOff();
 
-  auto found = read_headers(folder, keep_going);
+  auto found = read_headers(folder, at_file, keep_going);
   if (!found) return tl::unexpected(found.error());
   auto series = one_ct_series(std::move(*found), folder);
   if (!series) return tl::unexpected(series.error());
@@ -291,6 +297,7 @@ Result<CtScan> read_dicom_series(const fs::path& folder, const KeepGoing& keep_g
   for (std::size_t i = 0; i < series->size(); ++i) {
     if (!keep_going(static_cast<double>(i) / static_cast<double>(series->size())))
       return failure(ErrorCode::cancelled, "stopped while reading " + folder.string());
+    at_file((*series)[i].file);
     if (auto read = read_pixels((*series)[i], volume->values.data() + volume->index(0, 0, static_cast<int>(i))); !read)
       return tl::unexpected(read.error());
   }
@@ -299,6 +306,13 @@ Result<CtScan> read_dicom_series(const fs::path& folder, const KeepGoing& keep_g
   return scan;
 } catch (const std::exception& error) {
   return failure(ErrorCode::invalid_input, folder.string() + " cannot be read as DICOM: " + error.what());
+}
+
+}  // namespace
+
+Result<CtScan> read_dicom_series(const fs::path& folder, const KeepGoing& keep_going) {
+  // Debian builds GDCM with its assertions, which abort on some damaged files.
+  return read_isolated([&](const AtFile& at_file, const KeepGoing& progress) { return read_series(folder, at_file, progress); }, keep_going);
 }
 
 }  // namespace osteon::import

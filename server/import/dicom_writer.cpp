@@ -39,11 +39,8 @@ bool write_slice(const imaging::HuVolume& volume, int slice, const Uids& uids, c
   image.SetSpacing(0, volume.spacing_mm.x());
   image.SetSpacing(1, volume.spacing_mm.y());
   const Vec3 origin = volume.position_mm(Vec3(0, 0, slice));
-  for (unsigned int i = 0; i < 3; ++i) {
-    image.SetOrigin(i, origin[i]);
-    image.SetDirectionCosines(i, volume.directions(i, 0));
-    image.SetDirectionCosines(3 + i, volume.directions(i, 1));
-  }
+  for (unsigned int i = 0; i < 3; ++i) image.SetOrigin(i, origin[i]);
+  image.SetDirectionCosines(volume.directions.data());  // by columns: along a row, then down the rows
   image.SetIntercept(kIntercept_hu);
   image.SetSlope(1.0);
   gdcm::DataElement data(gdcm::Tag(0x7fe0, 0x0010));

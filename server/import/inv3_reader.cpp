@@ -25,6 +25,10 @@ struct CloseArchive {
 };
 using Archive = std::unique_ptr<archive, CloseArchive>;
 
+Error no_project(const fs::path& file) {
+  return {ErrorCode::invalid_input, file.string() + " is not an InVesalius project (.inv3); give one, or a folder with a DICOM CT series"};
+}
+
 Error damaged(const fs::path& file, archive* a) {
   const char* reason = archive_error_string(a);
   return {ErrorCode::invalid_input, file.string() + " is truncated or damaged (" + (reason != nullptr ? reason : "unknown reason") +
@@ -39,10 +43,9 @@ Result<archive_entry*> find_entry(archive* a, const fs::path& file, const std::s
     const int status = archive_read_next_header(a, &entry);
     if (status == ARCHIVE_EOF) return nullptr;
     if (status != ARCHIVE_OK && status != ARCHIVE_WARN) {
-      if (any) return tl::unexpected(damaged(file, a));
-      if (archive_filter_count(a) > 1 && archive_filter_code(a, 0) == ARCHIVE_FILTER_GZIP) return tl::unexpected(damaged(file, a));
-      return failure(ErrorCode::invalid_input,
-                     file.string() + " is not an InVesalius project (.inv3); give one, or a folder with a DICOM CT series");
+      // What begins as a gzip archive and goes on as nothing is a damaged one.
+      if (any || archive_filter_code(a, 0) == ARCHIVE_FILTER_GZIP) return tl::unexpected(damaged(file, a));
+      return tl::unexpected(no_project(file));
     }
     any = true;
     const char* path = archive_entry_pathname(entry);
@@ -54,10 +57,7 @@ Result<Archive> open_archive(const fs::path& file) {
   Archive a(archive_read_new());
   archive_read_support_filter_gzip(a.get());
   archive_read_support_format_tar(a.get());
-  if (archive_read_open_filename(a.get(), file.c_str(), kChunk) != ARCHIVE_OK) {
-    const char* reason = archive_error_string(a.get());
-    return failure(ErrorCode::invalid_input, "cannot open " + file.string() + " as an InVesalius project: " + (reason != nullptr ? reason : ""));
-  }
+  if (archive_read_open_filename(a.get(), file.c_str(), kChunk) != ARCHIVE_OK) return tl::unexpected(no_project(file));
   return a;
 }
 
@@ -120,7 +120,7 @@ Result<Project> read_project(const fs::path& file) {
   const auto entry = find_entry(a->get(), file, "main.plist");
   if (!entry) return tl::unexpected(entry.error());
   if (*entry == nullptr)
-    return failure(ErrorCode::invalid_input, file.string() + " is not an InVesalius project: it has no main.plist");
+    return failure(ErrorCode::invalid_input, file.string() + " is not an InVesalius project: it has no main.plist; give one, or a folder with a DICOM CT series");
   std::string text;
   std::string chunk(1 << 16, '\0');
   for (;;) {
@@ -138,7 +138,7 @@ Result<Project> read_project(const fs::path& file) {
 
 Result<CtScan> read_inv3(const fs::path& file, const KeepGoing& keep_going) {
   std::error_code error;
-  if (!fs::exists(file, error)) return failure(ErrorCode::not_found, "there is no file " + file.string());
+  if (!fs::exists(file, error)) return failure(ErrorCode::not_found, "there is no file " + file.string() + "; give an InVesalius project or a DICOM folder");
   // Two passes, since the matrix may come before the list that says its shape.
   const auto project = read_project(file);
   if (!project) return tl::unexpected(project.error());

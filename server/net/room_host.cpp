@@ -385,6 +385,11 @@ AuthorId RoomHost::join(MemberKind kind) {
   return author;
 }
 
+Digest RoomHost::surface_hash() const {
+  const std::lock_guard lock(impl_->mesh_mutex);
+  return impl_->store.hash();
+}
+
 BoneStatus RoomHost::bone_status() {
   std::vector<FieldLeaf> leaves;
   BoneStatus status;

@@ -79,6 +79,7 @@ class RoomHost {
   [[nodiscard]] std::uint64_t lease_epoch() const;
   [[nodiscard]] bool knows(AuthorId author) const;
   [[nodiscard]] HostHealth health() const;
+  [[nodiscard]] Digest surface_hash() const;  // of the newest blocks
 
   // Runs `job` on the thread for slow requests, in order; it may call the functions below.
   void run_slowly(std::function<void()> job);

@@ -152,7 +152,7 @@ RoomServerSummary RoomServer::stop() {
   impl_->server->Wait();
   impl_->host->stop();
   impl_->server.reset();
-  return {impl_->host->bone_status(), impl_->host->health()};
+  return {impl_->host->bone_status(), impl_->host->health(), impl_->host->surface_hash()};
 }
 
 }  // namespace osteon

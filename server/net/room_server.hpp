@@ -19,6 +19,7 @@ struct RoomServerOptions {
 struct RoomServerSummary {
   BoneStatus bone;
   HostHealth health;
+  Digest surface_hash;  // equal to every viewer's that has shown room_seq
 };
 
 class RoomServer {

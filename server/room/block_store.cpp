@@ -18,4 +18,11 @@ const StoredBlock* BlockStore::put(const BlockKey& key, BlockPayload payload) {
   return &block;
 }
 
+Digest BlockStore::hash() const {
+  std::map<BlockKey, Digest> hashes;
+  for (const auto& [key, block] : blocks_)
+    if (!block.payload.bytes.empty()) hashes[key] = block.mesh_hash;
+  return surface_hash(hashes);
+}
+
 }  // namespace osteon

@@ -31,6 +31,7 @@ class BlockStore {
   // has none.
   const StoredBlock* put(const BlockKey& key, BlockPayload payload);
   [[nodiscard]] const std::map<BlockKey, StoredBlock>& blocks() const { return blocks_; }
+  [[nodiscard]] Digest hash() const;  // surface_hash of the newest versions
 
  private:
   std::map<BlockKey, StoredBlock> blocks_;

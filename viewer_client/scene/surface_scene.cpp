@@ -1,6 +1,7 @@
 #include "viewer_client/scene/surface_scene.hpp"
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 namespace osteon {
@@ -94,25 +95,12 @@ std::size_t SurfaceScene::regions() const {
 }
 
 Digest SurfaceScene::hash() const {
-  // The regions are a grouping of this program; the hash is over blocks in the order of their own keys.
-  std::vector<std::pair<BlockKey, const Block*>> all;
-  for (const auto& [region, blocks] : regions_) {
-    for (const auto& [key, block] : blocks) {
-      if (!block.mesh.triangles.empty()) all.emplace_back(key, &block);
-    }
-  }
-  std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-
-  Hasher hasher;
-  for (const auto& [key, block] : all) {
-    hasher.integer(key.body.value);
-    hasher.integer(static_cast<std::uint64_t>(key.level));
-    for (const std::int32_t i : {key.index.x, key.index.y, key.index.z}) {
-      hasher.integer(static_cast<std::uint64_t>(std::int64_t{i}));
-    }
-    hasher.bytes(std::as_bytes(std::span(block->mesh_hash.bytes)));
-  }
-  return hasher.finish();
+  // The regions are a grouping of this program only.
+  std::map<BlockKey, Digest> hashes;
+  for (const auto& [region, blocks] : regions_)
+    for (const auto& [key, block] : blocks)
+      if (!block.mesh.triangles.empty()) hashes[key] = block.mesh_hash;
+  return surface_hash(hashes);
 }
 
 }  // namespace osteon
