@@ -89,6 +89,8 @@ nlohmann::json summary_of(const Options& options, const audio::SoundEngine& engi
   nlohmann::json summary = {
       {"output", options.output},
       {"frames", engine.frames()},
+      // With the session log's mono_ns, the place of a moment of the work in the recording.
+      {"first_frame_mono_ns", engine.first_frame_ns() + output.latency().count()},
       {"seconds", static_cast<double>(engine.frames()) / 48000.0},
       // PulseAudio's own underruns do not reach RtAudio 5.2; these are the calls that came too late to fill in time.
       {"gaps", output.gaps()},

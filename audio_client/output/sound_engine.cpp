@@ -19,6 +19,7 @@ SoundEngine::SoundEngine(const SynthParams& params, WavRecorder* recorder)
 
 void SoundEngine::render(std::span<float> mono) noexcept {
   const std::int64_t start_ns = now_ns();
+  if (frames() == 0) first_frame_ns_.store(start_ns, std::memory_order_relaxed);
   take_scene(start_ns);
   synth_.process(mono);
   if (recorder_) recorder_->push(mono);

@@ -34,6 +34,8 @@ class SoundEngine final : public SoundSource {
   [[nodiscard]] std::chrono::nanoseconds latency() const noexcept;
   [[nodiscard]] bool silent() const noexcept { return silent_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_.load(std::memory_order_relaxed); }
+  // When the first frame was rendered, steady clock; 0 before. A recording begins with that frame.
+  [[nodiscard]] std::int64_t first_frame_ns() const noexcept { return first_frame_ns_.load(std::memory_order_relaxed); }
   [[nodiscard]] float peak() const noexcept { return peak_.load(std::memory_order_relaxed); }
   // Work of one render(). Only after the output was stopped.
   [[nodiscard]] const DurationHistogram& work() const noexcept { return work_; }
@@ -48,6 +50,7 @@ class SoundEngine final : public SoundSource {
   EventQueue<Sounded, 1024> sounded_;
   SoundScene last_;  // what was noted last, to note each state once
   std::atomic<std::uint64_t> frames_{0};
+  std::atomic<std::int64_t> first_frame_ns_{0};
   std::atomic<float> peak_{0};
   std::atomic<bool> silent_{true};
   DurationHistogram work_;
