@@ -88,8 +88,9 @@ Parsed parse_look(const std::vector<std::string_view>& words) {
         view.up = up->normalized();
         return Command(LookFrom{view});
       }
-      return failure(ErrorCode::invalid_input, "`look` needs an eye away from its target and an `up` across the line "
-                                               "of sight");
+      return failure(ErrorCode::invalid_input,
+                     "`look` needs an eye away from its target and an `up` across the line "
+                     "of sight");
     }
   }
   return expected("look overview`, `look tool DISTANCE_MM` or `look at X Y Z from X Y Z up X Y Z");

@@ -13,13 +13,25 @@
 namespace osteon {
 
 struct WaitForSurface {};
-struct WaitForSeq { RoomSeq room_seq; };
+struct WaitForSeq {
+  RoomSeq room_seq;
+};
 struct LookAtWhole {};
-struct LookFrom { CameraView view; };
-struct LookAtTool { double distance_mm = 0; };
-struct ShowTool { bool on = true; };
-struct SaveScreenshot { std::filesystem::path file; };
-struct SaveStatus { std::filesystem::path file; };
+struct LookFrom {
+  CameraView view;
+};
+struct LookAtTool {
+  double distance_mm = 0;
+};
+struct ShowTool {
+  bool on = true;
+};
+struct SaveScreenshot {
+  std::filesystem::path file;
+};
+struct SaveStatus {
+  std::filesystem::path file;
+};
 struct Quit {};
 
 using Command = std::variant<WaitForSurface, WaitForSeq, LookAtWhole, LookFrom, LookAtTool, ShowTool, SaveScreenshot,

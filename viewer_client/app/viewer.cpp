@@ -38,8 +38,8 @@ Result<Viewer> Viewer::make(const ViewerOptions& options, BoneWindow& window, In
     viewer.frame_log_.open(options.frame_log);
     viewer.frame_log_ << "room_seq,received_mono_ns,rendered_mono_ns\n" << std::flush;
     if (!viewer.frame_log_) {
-      return failure(ErrorCode::internal, "the frame log " + options.frame_log.string() + " cannot be written: " +
-                                              std::strerror(errno));
+      return failure(ErrorCode::internal,
+                     "the frame log " + options.frame_log.string() + " cannot be written: " + std::strerror(errno));
     }
   }
   window.look(overview(options.bounds));
@@ -132,8 +132,8 @@ void Viewer::draw_now() {
 
   dirty_ = false;
   ++frames_;
-  // Where drawing is slow, other programs of this machine still get half of the time.
-  next_draw_ = std::max(begin + kFramePeriod, end + (end - begin) / 2);
+  // Where drawing is slow, the other programs of this machine still get a fifth of the time.
+  next_draw_ = std::max(begin + kFramePeriod, end + (end - begin) / 4);
   if (!surface_complete_) return;
   frame_times_.record(end - begin);
   surface_shown_ = true;
@@ -177,8 +177,10 @@ Result<Viewer::State> Viewer::obey_script() {
     const auto outcome = obey(pending_->command);
     if (!outcome) return State::running;
     if (options_.answers) {
-      if (*outcome) std::printf("ok %s\n", pending_->line.c_str());
-      else std::printf("error %s\n", outcome->error().message.c_str());
+      if (*outcome)
+        std::printf("ok %s\n", pending_->line.c_str());
+      else
+        std::printf("error %s\n", outcome->error().message.c_str());
       std::fflush(stdout);
     }
     pending_.reset();

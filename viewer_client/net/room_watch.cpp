@@ -84,8 +84,8 @@ struct RoomWatch::Impl {
 };
 
 Result<void> RoomWatch::Impl::join(std::chrono::milliseconds patience) {
-  auto answer = wire::join_room(options.address, wire::ClientKind::viewer, options.name, patience,
-                                [this] { return stopping(); });
+  auto answer =
+      wire::join_room(options.address, wire::ClientKind::viewer, options.name, patience, [this] { return stopping(); });
   if (!answer) return tl::unexpected(answer.error());
   const std::lock_guard lock(mutex);
   joined = std::move(*answer);
@@ -101,8 +101,8 @@ Result<void> RoomWatch::Impl::rejoin() {
     auto again = join(options.patience);
     if (again) {
       if (joined.case_hash == case_before) return {};
-      return failure(ErrorCode::unsupported, "the server at " + options.address +
-                                                 " now has another case: start the viewer anew to see it");
+      return failure(ErrorCode::unsupported,
+                     "the server at " + options.address + " now has another case: start the viewer anew to see it");
     }
     if (again.error().code != ErrorCode::unavailable || !options.keep_trying) return again;
   } while (!stopping());

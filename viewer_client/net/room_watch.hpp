@@ -13,10 +13,10 @@
 namespace osteon {
 
 struct RoomWatchOptions {
-  std::string address;                   // host:port
-  std::string name = "viewer";           // shown to others
+  std::string address;          // host:port
+  std::string name = "viewer";  // shown to others
   std::chrono::milliseconds patience{5000};
-  bool keep_trying = false;              // after the connection was lost: until it is back, not just for `patience`
+  bool keep_trying = false;  // after the connection was lost: until it is back, not just for `patience`
 };
 
 struct WatchedRoom {

@@ -35,9 +35,9 @@ struct Image {
 // What the user did in the window since it was last asked.
 struct WindowEvents {
   bool closed = false;
-  bool redraw = false;         // the camera moved or the window was uncovered or resized
-  bool wants_overview = false; // key O
-  bool wants_tool = false;     // key T
+  bool redraw = false;          // the camera moved or the window was uncovered or resized
+  bool wants_overview = false;  // key O
+  bool wants_tool = false;      // key T
 };
 
 class BoneWindow {

@@ -19,7 +19,7 @@ CameraView overview(const Box& bone) {
   view.target_mm = 0.5 * (bone.min_mm + bone.max_mm);
   // The sphere round the box fits the vertical angle; bones are seldom boxes, so come a little closer than that.
   const double radius_mm = 0.5 * (bone.max_mm - bone.min_mm).norm();
-  const double distance_mm = 0.85 * radius_mm / std::sin(0.5 * view.view_angle_rad);
+  const double distance_mm = 0.72 * radius_mm / std::sin(0.5 * view.view_angle_rad);
   const Vec3 towards_eye = Vec3(0.62, -0.72, 0.30).normalized();
   view.eye_mm = view.target_mm + distance_mm * towards_eye;
   view.up = Vec3::UnitZ();

@@ -10,10 +10,14 @@ namespace {
 
 std::string_view word(CuttingPhase phase) {
   switch (phase) {
-    case CuttingPhase::idle: return "idle";
-    case CuttingPhase::free: return "running free";
-    case CuttingPhase::cutting: return "cutting";
-    case CuttingPhase::rubbing: return "rubbing";
+    case CuttingPhase::idle:
+      return "idle";
+    case CuttingPhase::free:
+      return "running free";
+    case CuttingPhase::cutting:
+      return "cutting";
+    case CuttingPhase::rubbing:
+      return "rubbing";
   }
   return "";
 }

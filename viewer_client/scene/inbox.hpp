@@ -25,8 +25,8 @@ struct Delivery {
   bool snapshot_complete = false;  // the whole surface has come
   std::uint32_t snapshot_blocks = 0;
   std::map<BlockKey, ReceivedBlock> blocks;
-  std::vector<Arrival> arrivals;   // oldest first
-  RoomSeq room_seq;                // null: no mesh message came
+  std::vector<Arrival> arrivals;  // oldest first
+  RoomSeq room_seq;               // null: no mesh message came
   bool any_mesh = false;
   bool any_states = false;
   std::vector<CuttingState> states;

@@ -51,7 +51,7 @@ class SurfaceScene {
 
   [[nodiscard]] std::size_t blocks() const { return drawn_blocks_; }  // with triangles
   [[nodiscard]] std::size_t triangles() const { return triangles_; }
-  [[nodiscard]] std::size_t regions() const;                          // with triangles
+  [[nodiscard]] std::size_t regions() const;  // with triangles
   // SHA-256 over the sorted (key, mesh_hash) of all blocks with triangles: equal in every viewer of one surface.
   [[nodiscard]] Digest hash() const;
 

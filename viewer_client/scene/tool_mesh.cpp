@@ -75,7 +75,8 @@ void add_drill(ToolMesh& mesh, const Tool& tool) {
     return full_radius * (1.0 - 0.38 * faded * flute_depth(a - helix * back_mm, 2, 0.42));
   };
   const int steps = std::clamp(static_cast<int>(end * 6.0), 24, 400);
-  add_strip(mesh, [=](double u, double a) { return ring_point(carved(u * radius, a, u * tip), a, -u * tip); }, 8, true);
+  add_strip(
+      mesh, [=](double u, double a) { return ring_point(carved(u * radius, a, u * tip), a, -u * tip); }, 8, true);
   add_strip(
       mesh,
       [=](double u, double a) {

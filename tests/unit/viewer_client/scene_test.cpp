@@ -222,7 +222,8 @@ TEST_P(ToolMeshes, IsClosedAndTurnsOutwards) {
   const double radius = 0.5 * tool.diameter_mm, shank = 0.5 * tool.shank_diameter_mm;
   const double shank_mm3 = std::numbers::pi * shank * shank * tool.shank_length_mm;
   const double head_mm3 = tool.kind == ToolKind::drill
-                              ? std::numbers::pi * radius * radius * (tool.cutting_length_mm - 2.0 / 3.0 * radius / std::tan(0.5 * tool.point_angle_rad))
+                              ? std::numbers::pi * radius * radius *
+                                    (tool.cutting_length_mm - 2.0 / 3.0 * radius / std::tan(0.5 * tool.point_angle_rad))
                               : 4.0 / 3.0 * std::numbers::pi * radius * radius * radius;
   EXPECT_GT(volume_mm3, shank_mm3 + 0.5 * head_mm3);
   EXPECT_LT(volume_mm3, 1.02 * (shank_mm3 + head_mm3));
@@ -233,7 +234,8 @@ TEST_P(ToolMeshes, IsClosedAndTurnsOutwards) {
 INSTANTIATE_TEST_SUITE_P(Builtin, ToolMeshes, testing::ValuesIn(builtin_tools().begin(), builtin_tools().end()),
                          [](const auto& param) {
                            std::string name = param.param.name;
-                           std::ranges::replace_if(name, [](char c) { return !std::isalnum(c); }, '_');
+                           std::ranges::replace_if(
+                               name, [](char c) { return !std::isalnum(c); }, '_');
                            return name;
                          });
 

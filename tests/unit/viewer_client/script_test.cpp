@@ -39,10 +39,10 @@ TEST(Script, SkipsEmptyLinesAndComments) {
 }
 
 TEST(Script, SaysWhatItExpected) {
-  for (const char* line : {"wait", "wait seq", "wait seq -1", "wait seq 1x", "look", "look tool 0", "look tool nan",
-                           "look at 1 2 3 from 1 2 3 up 0 0 1", "look at 0 0 0 from 0 0 5 up 0 0 1",
-                           "look at 0 0 0 from 0 0 5 up 0 0 0", "tool", "tool maybe", "screenshot", "status ",
-                           "quit now", "dance"}) {
+  for (const char* line :
+       {"wait", "wait seq", "wait seq -1", "wait seq 1x", "look", "look tool 0", "look tool nan",
+        "look at 1 2 3 from 1 2 3 up 0 0 1", "look at 0 0 0 from 0 0 5 up 0 0 1", "look at 0 0 0 from 0 0 5 up 0 0 0",
+        "tool", "tool maybe", "screenshot", "status ", "quit now", "dance"}) {
     const auto command = parse_command(line);
     ASSERT_FALSE(command) << line;
     EXPECT_EQ(command.error().code, ErrorCode::invalid_input);
