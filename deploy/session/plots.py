@@ -10,7 +10,7 @@ import matplotlib  # noqa: E402  (its backend is chosen above)
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
-from record import read_wav  # noqa: E402
+import record  # noqa: E402
 
 BONE, STEEL, ACCENT, INK = "#b08d57", "#4a6fa5", "#c8553d", "#2b2b2b"
 plt.rcParams.update({
@@ -26,8 +26,9 @@ def thinned(table, most=6000):
     return {name: values[::step] for name, values in table.items()}
 
 
-def force_and_depth(session, sites, file: Path):
+def force_and_depth(session, file: Path):
     """Over time: force, feed, depth. Beside it, for each tool, force over depth."""
+    stretches = record.stretches(session)
     rows = thinned(session)
     time = rows["time_s"]
     figure = plt.figure(figsize=(12, 7.2), constrained_layout=True)
@@ -36,7 +37,7 @@ def force_and_depth(session, sites, file: Path):
     above = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.1, "ncols": 2}
 
     force.plot(time, rows["force_physical_n"], color=ACCENT, lw=0.9, label="physical: bone on tool")
-    force.plot(time, rows["force_rendered_n"], color=STEEL, lw=0.9, label="rendered: device on hand")
+    force.plot(time, rows["force_rendered_n"], color=STEEL, lw=1.1, label="rendered: device on hand")
     force.set_ylabel("force, N")
     force.legend(**above)
     feed.plot(time, rows["feed_mm_per_s"], color=BONE, lw=0.8)
@@ -44,27 +45,27 @@ def force_and_depth(session, sites, file: Path):
     depth.plot(time, rows["depth_mm"], color=ACCENT, lw=1.0, label="tool")
     depth.plot(time, rows["device_depth_mm"], color=STEEL, lw=0.8, ls="--", label="hand")
     bottom, top = (-5.0, 5.0)
-    if sites:
-        bottom, top = -8.0, max(s["depth_mm"] for s in sites) + 8.0
+    if stretches:
+        bottom, top = -8.0, float(session["depth_mm"].max()) + 4.0
     depth.set_ylim(bottom, top)
     depth.invert_yaxis()
     depth.axhline(0.0, color="#aaaaaa", lw=0.8)
     depth.set_ylabel("depth below the\nbone's surface, mm")
     depth.set_xlabel("time, s")
     depth.legend(**above)
-    for site in sites:
+    for tool, first, last in stretches:
         for axes in (force, feed, depth):
-            axes.axvspan(session["time_s"][site["first"]], session["time_s"][site["last"]], color=BONE, alpha=0.12, lw=0)
-        feed.annotate(site["tool"], (session["time_s"][site["first"]], 1.0), xycoords=("data", "axes fraction"),
-                       xytext=(2, 3), textcoords="offset points", fontsize=9)
+            axes.axvspan(session["time_s"][first], session["time_s"][last], color=BONE, alpha=0.12, lw=0)
+        feed.annotate(tool, (session["time_s"][first], 1.0), xycoords=("data", "axes fraction"), xytext=(2, 3),
+                      textcoords="offset points", fontsize=9)
 
-    shown = sites[:2]
-    for i, site in enumerate(shown):
+    shown = stretches[:2]
+    for i, (tool, first, last) in enumerate(shown):
         axes = right.add_subplot(len(shown), 1, i + 1)
-        part = slice(site["first"], site["last"] + 1)
-        axes.plot(session["force_physical_n"][part], session["depth_mm"][part], ".", ms=1.5, color=ACCENT, alpha=0.6)
+        axes.plot(session["force_physical_n"][first:last + 1], session["depth_mm"][first:last + 1], ".", ms=1.5,
+                  color=ACCENT, alpha=0.6)
         axes.invert_yaxis()
-        axes.set_title(f"{site['tool']}: force over depth", fontsize=10, loc="left")
+        axes.set_title(f"{tool}: force over depth", fontsize=10, loc="left")
         axes.set_xlabel("physical force, N")
         axes.set_ylabel("depth, mm")
     figure.savefig(file, dpi=110)
@@ -73,7 +74,7 @@ def force_and_depth(session, sites, file: Path):
 
 def spectrogram(wav: Path, file: Path):
     """The session's sound: its level over time and which frequencies it has."""
-    rate, samples = read_wav(wav)
+    rate, samples = record.read_wav(wav)
     figure, (level, spectrum) = plt.subplots(2, 1, figsize=(12, 5), sharex=True, height_ratios=[1, 2.4],
                                              constrained_layout=True)
     block = max(1, rate // 50)

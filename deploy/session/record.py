@@ -84,28 +84,15 @@ def latencies(folder: Path):
     return result
 
 
-def sites(session):
-    """Where each tool cut: [{tool, entry_mm, axis, deepest_mm, seconds}] in order of use."""
+def stretches(session):
+    """Where in the session's rows each tool was cutting, from its first to its last cut: [(tool, first, last)]."""
     result = []
     tools = session["tool"]
-    tips = np.stack([session[f"tip_{axis}_mm"] for axis in "xyz"], axis=1)
     changes = np.flatnonzero(np.r_[True, tools[1:] != tools[:-1]])
     for start, end in zip(changes, np.r_[changes[1:], len(tools)]):
-        cutting = np.flatnonzero(session["feed_mm_per_s"][start:end] > 0) + start
-        cutting = cutting[session["engaged"][cutting] > 0]
-        if len(cutting) == 0:
-            continue
-        depths = session["depth_mm"][cutting]
-        result.append({
-            "tool": str(tools[start]), "first": int(cutting[0]), "last": int(cutting[-1]),
-            "entry_mm": tips[cutting[0]], "deepest_mm": tips[cutting[int(np.argmax(depths))]],
-            "centre_mm": 0.5 * (tips[cutting].min(axis=0) + tips[cutting].max(axis=0)),
-            "depth_mm": float(depths.max()),
-            "cutting_s": len(cutting) * 1e-3,
-            "force_peak_n": float(session["force_physical_n"][cutting].max()),
-            "force_mean_n": float(session["force_physical_n"][cutting].mean()),
-            "rendered_peak_n": float(session["force_rendered_n"][cutting].max()),
-        })
+        cutting = np.flatnonzero(session["phase"][start:end] == "cutting") + start
+        if len(cutting) > 0:
+            result.append((str(tools[start]), int(cutting[0]), int(cutting[-1])))
     return result
 
 

@@ -28,7 +28,7 @@ audio { width: 100%; margin: 12px 0 0; }
 table { border-collapse: collapse; width: 100%; background: white; border: 1px solid var(--line); margin-top: 10px; }
 th, td { text-align: left; padding: 6px 12px; border-bottom: 1px solid var(--line); font-size: 14px; vertical-align: top; }
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-details { margin-top: 14px; } pre { overflow: auto; font-size: 12.5px; background: white; border: 1px solid var(--line);
+.scroll { overflow-x: auto; } details { margin-top: 14px; } pre { overflow: auto; font-size: 12.5px; background: white; border: 1px solid var(--line);
   padding: 12px; border-radius: 8px; }
 """
 
@@ -54,12 +54,21 @@ def ms(value):
     return "–" if value is None else f"{value:.1f} ms"
 
 
-def site_rows(numbers):
+def cutting_steps(numbers):
+    """The steps of the plan that cut bone, as the haptic client reports them."""
+    return [step for step in numbers["programs"]["haptic"]["steps"] if "while_cutting" in step]
+
+
+def step_rows(numbers):
     rows = []
-    for site in numbers["cut_sites"]:
-        rows.append(f"<tr><td>{text(site['tool'])}</td><td class=n>{site['depth_mm']:.1f}</td>"
-                    f"<td class=n>{site['cutting_s']:.1f}</td><td class=n>{site['force_mean_n']:.1f}</td>"
-                    f"<td class=n>{site['force_peak_n']:.1f}</td><td class=n>{site['rendered_peak_n']:.2f}</td></tr>")
+    scale = numbers["programs"]["haptic"]["force_scale"]
+    for step in cutting_steps(numbers):
+        mean = step["while_cutting"]
+        plunge = f"{step['plunge_mm']:.1f}" if step.get("broke_through") else "–"
+        cells = (f"{step['thickness_mm']:.1f}", f"{step['deepest_mm']:.1f}", f"{mean['seconds']:.1f}",
+                 f"{mean['feed_mm_per_s']:.1f}", f"{mean['density_g_cm3']:.2f}", f"{mean['force_n']:.1f}",
+                 f"{step['peak_force_n']:.1f}", f"{scale * step['peak_force_n']:.2f}", plunge, f"{step['removed_mm3']:.0f}")
+        rows.append(f"<tr><td>{text(step['tool'])}</td>" + "".join(f"<td class=n>{cell}</td>" for cell in cells) + "</tr>")
     return "".join(rows)
 
 
@@ -102,12 +111,12 @@ def program_tables(numbers):
 
 def write(folder: Path, numbers, title):
     """Writes report.html into the session's folder; pictures are inside the page, the sound lies beside it."""
-    latency, agreement, sites = numbers["latency_ms"], numbers["agreement"], numbers["cut_sites"]
+    latency, agreement = numbers["latency_ms"], numbers["agreement"]
     removed = numbers["programs"]["server"].get("removed_mm3")
     same = "identical" if agreement["field_hash_equal"] else "NOT identical"
     facts = [
         fact(f"{removed:.0f} mm³" if isinstance(removed, (int, float)) else "–", "bone removed"),
-        fact(f"{max((s['force_peak_n'] for s in sites), default=0):.1f} N", "largest force of the bone on a tool"),
+        fact(f"{max((step['peak_force_n'] for step in cutting_steps(numbers)), default=0):.1f} N", "largest force of the bone on a tool"),
         fact(ms(latency.get("cut_to_picture", {}).get("p50")), "from a cut to its picture (median)"),
         fact(ms(latency.get("cut_to_sound", {}).get("p50")), "from the cutting to its sound (median)"),
         fact(same, "bone in server and haptic client at the end (hash)"),
@@ -118,7 +127,8 @@ def write(folder: Path, numbers, title):
 <title>{text(title)} – Osteon session</title><style>{STYLE}</style></head><body><main>
 <h1>{text(title)}</h1>
 <p class=lead>One session of Osteon, a distributed simulator of bone surgery: four programs on one machine shared one
-bone, and a simulated surgeon worked on it for {numbers['seconds_of_work']:.0f} seconds.</p>
+bone, and a simulated surgeon worked on it for {numbers['seconds_of_work']:.0f} seconds.<br>
+{text(numbers['case'].get('source', ''))}; sampled at {numbers['case'].get('pitch_mm', 0):.2f} mm.</p>
 <span class=badge>simulated device: no person and no haptic hardware took part</span>
 <div class=facts>{''.join(facts)}</div>
 
@@ -132,13 +142,16 @@ receives only the blocks of surface that changed. Cut faces have a colour of the
 {picture(folder, 'during.png', 'At work: the tool where the bone lets it be, as the viewer showed it', wide=True)}
 
 <h2>Force, feed and depth</h2>
-<p>Pushing harder drills faster, and denser bone takes more force: when the tool meets the outer table of the skull the
-force rises, in the spongy layer below it falls, at the inner table it rises again, and when that gives way the tool
-plunges until the hand reacts. <b>Physical</b> force is what the bone does to the tool; <b>rendered</b> force is what a
-device would put on the hand, scaled to what the device can do. Shaded: the tool was cutting.</p>
+<p>Pushing harder drills faster, and dense bone takes more force than spongy bone. The hand pushes with about the same
+force all the while, so the <b>feed</b> tells where the drill is: slow in the dense outer table of the skull, faster in
+the spongy layer below it, slow again in the inner table. When that gives way nothing holds the tool back, and it plunges
+until the hand has reacted. <b>Physical</b> force is what the bone does to the tool; <b>rendered</b> force is what a device
+puts on the hand: the same, scaled by {numbers['programs']['haptic']['force_scale']:g} to what the device can do. Shaded:
+between a tool's first and last cut.</p>
 {picture(folder, 'force_depth.png', 'Force, feed and depth over time; force over depth for each tool', wide=True)}
-<table><tr><th>tool</th><th class=n>deepest, mm</th><th class=n>cutting, s</th><th class=n>mean force, N</th>
-<th class=n>peak force, N</th><th class=n>peak rendered, N</th></tr>{site_rows(numbers)}</table>
+<div class=scroll><table><tr><th>tool</th><th class=n>bone here, mm</th><th class=n>deepest, mm</th><th class=n>cutting, s</th>
+<th class=n>feed, mm/s</th><th class=n>density, g/cm³</th><th class=n>mean force, N</th><th class=n>peak, N</th>
+<th class=n>peak rendered, N</th><th class=n>plunge, mm</th><th class=n>removed, mm³</th></tr>{step_rows(numbers)}</table></div>
 
 <h2>Sound</h2>
 <p>The sound is made from the same cutting states: its pitch follows the spindle and drops under load, its level and

@@ -48,9 +48,9 @@ class Session:
     """What one session needs; `say` gets its live status. Results lie in `out`."""
 
     def __init__(self, programs: Path, case: Path, plan, out: Path, say=print, pictures=True, late_viewer=False,
-                 size="1280x720"):
+                 scale=None, size="1280x720"):
         self.programs, self.case, self.plan, self.out, self.say = programs, case, plan, out, say
-        self.pictures, self.late_viewer, self.size = pictures, late_viewer, size
+        self.pictures, self.late_viewer, self.scale, self.size = pictures, late_viewer, scale, size
         self.started = time.monotonic()
         self.info = case_info(programs, case)
 
@@ -127,22 +127,23 @@ class Session:
         haptic = self.household.start("osteon-haptic", [
             self.programs / "osteon-haptic", "--server", address, "--plan", plan_file, "--device", "simulated",
             "--session-log", self.out / "session.csv", "--cut-log", self.out / "cuts.csv",
-            "--summary", self.out / "haptic.json", "--cache", cache, "--status", *self.haptic_options])
+            "--summary", self.out / "haptic.json", "--cache", cache, "--status",
+            *(["--scale", str(self.scale)] if self.scale else [])])
         haptic.may_end = True
         began = time.monotonic()
         cutting_lines, photographed = 0, False
         while haptic.exit_code is None:
             self.household.check()
-            for line in haptic.new_lines():
+            lines = haptic.new_lines()
+            for line in lines:
                 self.say(f"{time.monotonic() - self.started:5.0f} s  {line}")
                 cutting_lines += "cutting" in line
-            if self.pictures and cutting_lines >= 2 and not photographed:
+            if self.pictures and lines and cutting_lines > 0:
                 viewer.do("look tool 70")
+            if self.pictures and cutting_lines >= 2 and not photographed:
                 viewer.do(f"screenshot {self.out / 'during.png'}")
                 photographed = True
-            elif self.pictures and photographed:
-                viewer.do("look tool 70")
-            time.sleep(0.2)
+            time.sleep(0.1)
         for line in haptic.new_lines():
             self.say(f"{time.monotonic() - self.started:5.0f} s  {line}")
         if haptic.exit_code != 0:
@@ -158,9 +159,9 @@ class Session:
         if not self.pictures:
             return
         viewer.do("tool off")
-        sites = record.sites(record.read_table(self.out / "session.csv"))
-        for site, name in zip(sites, ("hole.png", "window.png")):
-            viewer.do(close_up(site, sites[0]))
+        steps = [step for step in record.read_json(self.out / "haptic.json")["steps"] if "entry_mm" in step]
+        for step, name in zip(steps, ("hole.png", "window.png")):
+            viewer.do(close_up(step))
             viewer.do(f"screenshot {self.out / name}")
         viewer.do(self._overview())
         viewer.do(f"screenshot {self.out / 'after.png'}")
@@ -182,8 +183,6 @@ class Session:
 
     def _numbers(self, codes):
         summaries = {name: record.read_json(self.out / f"{name}.json") for name in ("server", "haptic", "viewer", "audio")}
-        session = record.read_table(self.out / "session.csv")
-        sites = record.sites(session)
         statuses = [record.read_json(file) for file in sorted(self.out.glob("*viewer_status.json"))]
         numbers = {
             "device": "simulated",
@@ -191,8 +190,6 @@ class Session:
             "case": self.info,
             "seconds_of_work": round(self.worked_s, 1),
             "latency_ms": record.latencies(self.out),
-            "cut_sites": [{key: rounded(value) for key, value in site.items() if key not in ("first", "last")}
-                          for site in sites],
             "exit_codes": codes,
             "mesh_hashes": [summaries["server"].get("mesh_hash"), *(status.get("scene_mesh_hash") for status in statuses)],
             "programs": summaries,
@@ -203,12 +200,6 @@ class Session:
         return numbers
 
 
-def rounded(value):
-    if isinstance(value, np.ndarray):
-        return [round(float(x), 3) for x in value]
-    return round(value, 4) if isinstance(value, float) else value
-
-
 def unit(vector):
     return vector / max(1e-9, float(np.linalg.norm(vector)))
 
@@ -217,14 +208,12 @@ def look(target, eye, up):
     return "look at {} from {} up {}".format(*(" ".join(f"{v:.3f}" for v in point) for point in (target, eye, up)))
 
 
-def close_up(site, hole):
-    """The camera command for a look at a site from outside, along the first hole's axis and a little from the side, so
-    that walls can be seen."""
-    axis = unit(hole["deepest_mm"] - hole["entry_mm"])
-    target = hole["entry_mm"] if site is hole else site["centre_mm"]
+def close_up(step):
+    """The camera command for a look at a step's site from outside, a little from the side, so that walls can be seen."""
+    axis, target = unit(np.array(step["axis"])), np.array(step["entry_mm"])
     aside = np.cross(axis, [0.0, 0.0, 1.0])
     aside = unit(aside) if np.linalg.norm(aside) > 0.1 else np.array([1.0, 0.0, 0.0])
-    return look(target, target - 42.0 * axis + 14.0 * aside, np.cross(aside, axis))
+    return look(target, target - 36.0 * axis + 16.0 * aside, np.cross(aside, axis))
 
 
 def case_info(programs, case):
