@@ -153,8 +153,7 @@ def hand(run, who):
     folder, _ = run.session(who, plans.drill(who))
     session = record.read_table(folder / "session.csv")
     feeds = {layer: float(np.mean(session["feed_mm_per_s"][inside(session, layer)])) for layer in INSIDE}
-    # The plunge begins where the drill's lips reach the far face.
-    plunge = float(np.max(session["depth_mm"])) - (THICKNESS_MM + POINT_HEIGHT_MM)
+    plunge = float(np.max(session["depth_mm"])) - THICKNESS_MM
     run.plunges[who] = plunge
     return feeds, plunge
 
@@ -163,6 +162,7 @@ def expert(run):
     feeds, plunge = hand(run, "expert")
     return {
         "feed_medullary_over_cortical": (feeds["medulla"] / feeds["near cortex"], REFERENCE_FEED_RATIO),
+        "plunge_expert": (plunge, REFERENCE_PLUNGE_MM["expert"]),
         "plunge_expert_error": (error_percent(plunge, REFERENCE_PLUNGE_MM["expert"]), REFERENCE_PLUNGE_MM["expert"]),
     }
 
@@ -172,6 +172,7 @@ def novice(run):
     if "expert" not in run.plunges:
         hand(run, "expert")
     return {
+        "plunge_novice": (plunge, REFERENCE_PLUNGE_MM["novice"]),
         "plunge_novice_error": (error_percent(plunge, REFERENCE_PLUNGE_MM["novice"]), REFERENCE_PLUNGE_MM["novice"]),
         "plunge_novice_over_expert": (plunge / run.plunges["expert"],
                                       REFERENCE_PLUNGE_MM["novice"] / REFERENCE_PLUNGE_MM["expert"]),
