@@ -50,8 +50,9 @@ void Voice::start(const Handpiece& handpiece, const VoiceParams& params, double 
 }
 
 void Voice::aim(const ToolSound& tool) noexcept {
-  // A layer gives way: the load is gone although the tool still goes forward. Drawn back, it leaves without a knock.
-  if (tool.advancing && recent_load_ > kKnockLoad && tool.load < 0.5 * recent_load_) {
+  // A layer gives way: the load is gone from a tool that goes forward, or did so a state ago and is through. Drawn
+  // back, a tool stops first and leaves without a knock.
+  if ((tool.advancing || target_.advancing) && recent_load_ > kKnockLoad && tool.load < 0.5 * recent_load_) {
     const auto released = static_cast<float>(recent_load_ - tool.load);
     // Adding to the real part leaves the sounding imaginary part continuous.
     for (std::size_t m = 0; m < kKnock.size(); ++m) knock_re_[m] += released * static_cast<float>(kKnock[m].level);

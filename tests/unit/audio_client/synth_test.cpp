@@ -204,6 +204,22 @@ TEST(DrillSound, RunsUpAndDownInsteadOfJumping) {
   EXPECT_TRUE(synth.silent());
 }
 
+TEST(DrillSound, KnocksWhenBoneGivesWayAndNotWhenDrawnBack) {
+  // 8.5.4: perforation is a burst of energy round 200 Hz, here against the running drill alone.
+  const auto low_after_db = [](const CuttingState& last) {
+    DrillSynth synth = make_synth(1, kPure);
+    static_cast<void>(play(synth, cortical_drill(1345), 0.75));
+    if (last.phase != CuttingPhase::cutting) static_cast<void>(play(synth, last, 1.0));
+    const std::vector<float> after = play(synth, free_drill(1345), 0.1);
+    // Past the fall of the load itself, within the knock's decay.
+    return sound::band_db(sound::power_spectrum(std::span(after).subspan(1200, 2048), kRate_hz, 2048), 100, 300);
+  };
+  CuttingState drawn_back = cortical_drill(1345);
+  drawn_back.phase = CuttingPhase::rubbing;
+  drawn_back.feed_mm_per_s = 0;
+  EXPECT_GT(low_after_db(cortical_drill(1345)), low_after_db(drawn_back) + 10);
+}
+
 TEST(DrillSound, SilentAtRest) {
   DrillSynth synth = make_synth();
   EXPECT_TRUE(synth.silent());
