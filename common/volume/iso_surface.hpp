@@ -11,7 +11,7 @@ namespace osteon {
 using KeepGoing = std::function<bool(double fraction)>;
 
 // Inside is where field >= iso. Millimetres, negative inside, clipped to ±4 pitches. The crossing is interpolated
-// linearly along lattice edges, so a plane comes out exact and a sphere of radius r voxels within about 0.1 / r voxel.
+// linearly along lattice edges, so a plane comes out exact and a sphere of radius r voxels within about 0.7 / r voxel.
 // The field goes on beyond its box as at the box's edge. Equal input gives equal bytes for any number of threads.
 // Errors: cancelled, internal.
 [[nodiscard]] Result<DenseVolume<float>> signed_distance_mm(const DenseVolume<float>& field, float iso, double pitch_mm,

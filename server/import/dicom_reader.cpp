@@ -265,14 +265,14 @@ Result<void> read_pixels(const Header& h, std::int16_t* out) {
   std::vector<char> buffer(image.GetBufferLength());
   if (!image.GetBuffer(buffer.data())) return broken("has pixel data that cannot be decompressed");
 
-  // Bits above the stored ones may hold overlays; they are shifted out, which also extends the sign.
-  const int unused = 16 - static_cast<int>(image.GetPixelFormat().GetBitsStored());
+  // Signed values may lack their sign in the bits above the stored ones. Unsigned ones keep those bits: some scanners
+  // write metal beyond the range that BitsStored promises, and the library has taken out declared overlays.
   const bool is_signed = image.GetPixelFormat().GetPixelRepresentation() == 1;
+  const int unused = is_signed ? 16 - static_cast<int>(image.GetPixelFormat().GetBitsStored()) : 0;
   for (std::size_t i = 0; i < pixels; ++i) {
     std::uint16_t raw = static_cast<std::uint8_t>(buffer[i]);
     if (width == 2) std::memcpy(&raw, buffer.data() + 2 * i, 2);
-    const auto shifted = static_cast<std::uint16_t>(raw << unused);
-    const int stored = is_signed ? static_cast<std::int16_t>(shifted) >> unused : shifted >> unused;
+    const int stored = is_signed ? static_cast<std::int16_t>(static_cast<std::uint16_t>(raw << unused)) >> unused : raw;
     const double hu = stored * h.slope[0] + h.intercept[0];
     out[i] = static_cast<std::int16_t>(std::lround(std::clamp(hu, -32768.0, 32767.0)));
   }

@@ -1,0 +1,58 @@
+#include "common/imaging/resample.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace osteon::imaging {
+namespace {
+
+bool always(double) { return true; }
+
+TEST(Resample, ReproducesALinearFieldOnAnObliqueGrid) {
+  HuVolume volume;
+  volume.dims = {30, 30, 20};
+  volume.spacing_mm = {1.0, 1.0, 1.5};
+  volume.origin_mm = {-14.3, -15.2, 90.7};
+  volume.directions = Eigen::AngleAxisd(0.3, Vec3(0.3, 1.0, 0.2).normalized()).toRotationMatrix();
+  const Vec3 gradient(40.0, -25.0, 60.0);  // HU per mm
+  const auto truth = [&](const Vec3& p) { return gradient.dot(p - Vec3(0.0, 0.0, 104.0)); };
+  volume.values.resize(volume.count());
+  for (int k = 0; k < 20; ++k)
+    for (int j = 0; j < 30; ++j)
+      for (int i = 0; i < 30; ++i) volume.values[volume.index(i, j, k)] = static_cast<std::int16_t>(std::lround(truth(volume.position_mm(Vec3(i, j, k)))));
+
+  // Around the middle of the volume, at a pitch that fits the grid nowhere.
+  const double pitch_mm = 0.37;
+  const Vec3 middle = volume.position_mm(Vec3(14.5, 14.5, 9.5));
+  const CoordBox box = covering_samples(Box{middle.array() - 3.0, middle.array() + 3.0}, pitch_mm);
+  const auto out = resample(volume, box, pitch_mm, always);
+  ASSERT_TRUE(out);
+  double worst = 0.0;
+  for (int x = box.min.x; x <= box.max.x; ++x)
+    for (int y = box.min.y; y <= box.max.y; ++y)
+      for (int z = box.min.z; z <= box.max.z; ++z)
+        worst = std::max(worst, std::abs(static_cast<double>(out->at({x, y, z})) - truth(position_mm({x, y, z}, pitch_mm))));
+  EXPECT_LT(worst, 0.5 + 1e-3);  // the source is rounded to whole HU; interpolation adds nothing
+}
+
+TEST(Resample, GoesOnWithTheEdgeBeyondTheScan) {
+  HuVolume volume;
+  volume.dims = {2, 2, 2};
+  volume.values = {0, 100, 0, 100, 0, 100, 0, 100};
+  const auto out = resample(volume, {{-3, 0, 0}, {4, 0, 0}}, 1.0, always);
+  ASSERT_TRUE(out);
+  EXPECT_EQ(out->values, (std::vector<float>{0, 0, 0, 0, 100, 100, 100, 100}));
+}
+
+TEST(Resample, StopsWhenAsked) {
+  HuVolume volume;
+  volume.dims = {2, 2, 2};
+  volume.values.assign(8, 0);
+  const auto out = resample(volume, {{0, 0, 0}, {1, 1, 1}}, 1.0, [](double) { return false; });
+  ASSERT_FALSE(out);
+  EXPECT_EQ(out.error().code, ErrorCode::cancelled);
+}
+
+}  // namespace
+}  // namespace osteon::imaging

@@ -1,0 +1,173 @@
+#include "server/import/ct_import.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "server/import/dicom_reader.hpp"
+#include "server/import/dicom_writer.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/unit/import/fixtures.hpp"
+
+namespace osteon::import {
+namespace {
+
+// Through the phantom's DICOM files and back, at the scan's own pitch unless another is given.
+Result<Case> round_trip(const Phantom& phantom, double spacing_mm, double threshold_hu, std::optional<double> pitch_mm = {}) {
+  const test::TempDir folder;
+  auto scan = scan_phantom(phantom, spacing_mm, keep_going);
+  if (!scan) return tl::unexpected(scan.error());
+  if (auto written = write_dicom_series(*scan, folder / "series", keep_going); !written) return tl::unexpected(written.error());
+  auto read = read_dicom_series(folder / "series", keep_going);
+  if (!read) return tl::unexpected(read.error());
+  return import_ct(std::move(*read), {.pitch_mm = pitch_mm, .threshold_hu = threshold_hu}, keep_going);
+}
+
+// Largest |S| at points that lie exactly on the phantom's surface, in voxels of the scan; edges are left out by 2 mm,
+// since a scanner rounds them.
+double surface_error(const Case& bone, const Phantom& phantom, double spacing_mm) {
+  double worst = 0.0;
+  const double half = 0.5 * phantom.width_mm;
+  const double deep = phantom.thickness_mm();
+  const auto at = [&](const Vec3& p) { worst = std::max(worst, std::abs(bone.surface_mm(p)) / spacing_mm); };
+  for (double u = -half + 2.0; u <= half - 2.0; u += 0.31) {
+    if (phantom.kind == PhantomKind::block) {
+      for (double v = -half + 2.0; v <= half - 2.0; v += 0.31) {
+        at({u, v, 0.0});
+        at({u, v, -deep});
+      }
+      for (double v = 2.0; v <= deep - 2.0; v += 0.31)
+        for (const double side : {-half, half}) {
+          at({side, u, -v});
+          at({u, side, -v});
+        }
+    } else {
+      for (double angle = 0.0; angle < 2.0 * std::numbers::pi; angle += 0.05) at({deep * std::cos(angle), deep * std::sin(angle), u});
+      for (double r = 0.0; r < deep - 2.0; r += 0.5)
+        for (const double end : {-half, half}) at({r, 0.3, end});
+    }
+  }
+  return worst;
+}
+
+TEST(CtImport, BlockThroughDicomIsTheBlock) {
+  const Phantom phantom{.kind = PhantomKind::block, .layers = {{4.0, 1.9}, {6.0, 1.4}, {4.0, 1.9}}, .width_mm = 12.0};
+  const double spacing_mm = 0.5;
+  const auto bone = round_trip(phantom, spacing_mm, suitable_threshold_hu(phantom));
+  ASSERT_TRUE(bone) << bone.error().message;
+  EXPECT_LT(surface_error(*bone, phantom, spacing_mm), 0.15);
+  EXPECT_NEAR(bone->volume_mm3(), phantom.volume_mm3(), 0.01 * phantom.volume_mm3());
+  // In the middle of the layers nothing is blurred in.
+  EXPECT_NEAR(bone->density_g_cm3({0.1, 0.2, -2.0}), 1.9, 0.02 * 1.9);
+  EXPECT_NEAR(bone->density_g_cm3({0.1, 0.2, -7.0}), 1.4, 0.02 * 1.4);
+  EXPECT_NEAR(bone->density_g_cm3({0.1, 0.2, -12.0}), 1.9, 0.02 * 1.9);
+}
+
+TEST(CtImport, TubeThroughDicomIsTheTube) {
+  const Phantom phantom{.kind = PhantomKind::tube, .layers = {{3.0, 1.9}, {5.0, 0.3}}, .width_mm = 14.0};
+  const double spacing_mm = 0.5;
+  // Only the shell lies on the round surface, so its own half height is the right threshold there.
+  const Phantom shell{.kind = PhantomKind::tube, .layers = {{3.0, 1.9}}, .width_mm = 14.0};
+  const double threshold_hu = suitable_threshold_hu(shell);
+  const auto bone = round_trip(phantom, spacing_mm, threshold_hu);
+  ASSERT_TRUE(bone) << bone.error().message;
+  for (double angle = 0.0; angle < 6.28; angle += 0.03)
+    for (const double z : {-4.3, 0.0, 3.1})
+      EXPECT_NEAR(bone->surface_mm({8.0 * std::cos(angle), 8.0 * std::sin(angle), z}) / spacing_mm, 0.0, 0.15) << angle;
+  EXPECT_NEAR(bone->density_g_cm3({6.5, 0.0, 0.0}), 1.9, 0.02 * 1.9);
+  // The medulla lies below that threshold: no bone there, but its density is kept for what lies at the edge.
+  EXPECT_GT(bone->surface_mm({0.0, 0.0, 0.0}), 0.0);
+}
+
+TEST(CtImport, MedullaAboveTheThresholdIsBone) {
+  const Phantom phantom{.kind = PhantomKind::tube, .layers = {{3.0, 1.9}, {5.0, 0.3}}, .width_mm = 14.0};
+  const auto bone = round_trip(phantom, 0.5, suitable_threshold_hu(phantom));
+  ASSERT_TRUE(bone) << bone.error().message;
+  EXPECT_LT(bone->surface_mm({0.0, 0.0, 0.0}), 0.0);
+  EXPECT_NEAR(bone->density_g_cm3({0.0, 0.0, 0.0}), 0.3, 0.02 * 0.3);
+  EXPECT_EQ(bone->tissue({12, 0, 0}), Tissue::cortical);
+  EXPECT_EQ(bone->tissue({2, 0, 0}), Tissue::trabecular);
+}
+
+TEST(CtImport, AFinerPitchSeesTheSameSurface) {
+  const Phantom phantom{.kind = PhantomKind::block, .layers = {{8.0, 1.7}}, .width_mm = 10.0};
+  const double spacing_mm = 0.6;
+  const auto bone = round_trip(phantom, spacing_mm, suitable_threshold_hu(phantom), 0.25);
+  ASSERT_TRUE(bone) << bone.error().message;
+  EXPECT_EQ(bone->pitch_mm(), 0.25);
+  EXPECT_LT(surface_error(*bone, phantom, spacing_mm), 0.15);
+}
+
+TEST(CtImport, BoneThatReachesTheEndOfTheScanEndsWithTheLastVoxel) {
+  CtScan scan;
+  scan.volume.dims = {12, 12, 10};
+  scan.volume.spacing_mm = {1.0, 1.0, 2.0};
+  scan.volume.values.assign(scan.volume.count(), -1000);
+  for (int k = 0; k < 10; ++k)
+    for (int j = 3; j < 9; ++j)
+      for (int i = 3; i < 9; ++i) scan.volume.values[scan.volume.index(i, j, k)] = 1452;  // 226 is half way to air
+  const auto bone = import_ct(std::move(scan), {}, keep_going);
+  ASSERT_TRUE(bone) << bone.error().message;
+  EXPECT_EQ(bone->pitch_mm(), 1.0);
+  EXPECT_NEAR(bone->surface_mm({5.5, 5.5, -1.0}), 0.0, 0.01);
+  EXPECT_NEAR(bone->surface_mm({5.5, 5.5, 19.0}), 0.0, 0.01);
+  EXPECT_NEAR(bone->surface_mm({5.5, 5.5, 0.0}), -1.0, 0.01);
+  EXPECT_NEAR(bone->surface_mm({2.5, 5.5, 10.0}), 0.0, 0.01);
+  EXPECT_NEAR(bone->volume_mm3(), 6.0 * 6.0 * 20.0, 0.02 * 720.0);
+}
+
+TEST(CtImport, OtherIslandsAreGone) {
+  CtScan scan;
+  scan.volume.dims = {30, 20, 20};
+  scan.volume.values.assign(scan.volume.count(), -1000);
+  const auto fill = [&](int from, int to, std::int16_t hu) {
+    for (int k = 6; k < 14; ++k)
+      for (int j = 6; j < 14; ++j)
+        for (int i = from; i < to; ++i) scan.volume.values[scan.volume.index(i, j, k)] = hu;
+  };
+  fill(4, 14, 1452);
+  fill(20, 24, 3000);
+  const auto bone = import_ct(std::move(scan), {}, keep_going);
+  ASSERT_TRUE(bone);
+  EXPECT_NEAR(bone->volume_mm3(), 10.0 * 8.0 * 8.0, 0.03 * 640.0);
+  EXPECT_GT(bone->surface_mm({22.0, 10.0, 10.0}), 0.0);
+}
+
+TEST(CtImport, SameScanSameHash) {
+  const auto phantom = small_block();
+  const auto first = round_trip(phantom, 0.4, suitable_threshold_hu(phantom));
+  const auto second = round_trip(phantom, 0.4, suitable_threshold_hu(phantom));
+  const auto other = round_trip(phantom, 0.4, suitable_threshold_hu(phantom) + 40.0);
+  ASSERT_TRUE(first && second && other);
+  EXPECT_EQ(to_hex(first->hash()), to_hex(second->hash()));
+  EXPECT_NE(to_hex(first->hash()), to_hex(other->hash()));
+}
+
+TEST(CtImport, NoBoneNamesTheThreshold) {
+  const auto bone = round_trip(small_block(), 1.0, 3900.0);
+  ASSERT_FALSE(bone);
+  expect_one_sentence(bone.error(), "3900 HU");
+  EXPECT_NE(bone.error().message.find("--threshold"), std::string::npos);
+}
+
+TEST(CtImport, TooFineAPitchIsRefusedBeforeTheMemoryIsFull) {
+  CtScan scan;
+  scan.volume.dims = {200, 200, 200};
+  scan.volume.values.assign(scan.volume.count(), 1000);
+  const auto bone = import_ct(std::move(scan), {.pitch_mm = 0.1}, keep_going);
+  ASSERT_FALSE(bone);
+  expect_one_sentence(bone.error(), "--pitch");
+}
+
+TEST(CtImport, StopsAtEveryStage) {
+  // However late the stop comes, nothing but `cancelled` may follow.
+  for (const double until : {0.0, 0.05, 0.2, 0.5, 0.84}) {
+    auto scan = scan_phantom(small_block(), 0.25, keep_going);
+    ASSERT_TRUE(scan);
+    const auto bone = import_ct({std::move(*scan), "test"}, {}, [&](double done) { return done < until; });
+    ASSERT_FALSE(bone) << until;
+    EXPECT_EQ(bone.error().code, ErrorCode::cancelled);
+  }
+}
+
+}  // namespace
+}  // namespace osteon::import

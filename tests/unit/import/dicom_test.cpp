@@ -1,0 +1,256 @@
+#include "server/import/dicom_reader.hpp"
+
+#include <fstream>
+
+#include "server/import/dicom_writer.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/unit/import/fixtures.hpp"
+
+namespace osteon::import {
+namespace {
+
+namespace fs = std::filesystem;
+
+imaging::HuVolume numbered_volume() {
+  imaging::HuVolume volume;
+  volume.dims = {7, 5, 4};
+  volume.spacing_mm = {0.5, 0.75, 1.25};
+  volume.origin_mm = {-100.5, 20.25, -1300.0};
+  volume.values.resize(volume.count());
+  for (std::size_t i = 0; i < volume.values.size(); ++i) volume.values[i] = static_cast<std::int16_t>(static_cast<int>(17 * i) % 4000 - 1024);
+  return volume;
+}
+
+void expect_same(const imaging::HuVolume& a, const imaging::HuVolume& b) {
+  EXPECT_EQ(a.dims, b.dims);
+  EXPECT_LT((a.spacing_mm - b.spacing_mm).norm(), 1e-6);
+  EXPECT_LT((a.origin_mm - b.origin_mm).norm(), 1e-6);
+  EXPECT_LT((a.directions - b.directions).norm(), 1e-6);
+  EXPECT_EQ(a.values, b.values);
+}
+
+TEST(DicomSeries, ReturnsWhatWasWritten) {
+  const test::TempDir folder;
+  const auto volume = numbered_volume();
+  ASSERT_TRUE(write_dicom_series(volume, folder / "series", keep_going));
+  const auto scan = read_dicom_series(folder / "series", keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  expect_same(scan->volume, volume);
+}
+
+TEST(DicomSeries, KeepsAnObliqueGeometry) {
+  const test::TempDir folder;
+  auto volume = numbered_volume();
+  volume.directions = Eigen::AngleAxisd(0.35, Vec3(1.0, 0.2, 0.1).normalized()).toRotationMatrix();
+  ASSERT_TRUE(write_dicom_series(volume, folder / "series", keep_going));
+  const auto scan = read_dicom_series(folder / "series", keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  EXPECT_EQ(scan->volume.values, volume.values);
+  // Positions are decimal text of at most 16 characters.
+  for (const Vec3& voxel : {Vec3(0, 0, 0), Vec3(6, 0, 3), Vec3(6, 4, 3)})
+    EXPECT_LT((scan->volume.position_mm(voxel) - volume.position_mm(voxel)).norm(), 1e-4);
+}
+
+TEST(DicomSeries, OrderOfFileNamesDoesNotMatter) {
+  const test::TempDir folder;
+  const auto volume = numbered_volume();
+  ASSERT_TRUE(write_dicom_series(volume, folder / "series", keep_going));
+  const auto files = files_of(folder / "series");
+  for (std::size_t i = 0; i < files.size(); ++i) fs::rename(files[i], folder / "series" / (std::string(1, "qdza"[i]) + "-renamed"));
+  const auto scan = read_dicom_series(folder / "series", keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  expect_same(scan->volume, volume);
+}
+
+TEST(DicomSeries, FilesBesideItThatAreNotDicomArePassedOver) {
+  const test::TempDir folder;
+  ASSERT_NO_FATAL_FAILURE(write_small_series(folder / "series"));
+  std::ofstream(folder / "series" / "README.md") << "# Notes\n";
+  EXPECT_TRUE(read_dicom_series(folder / "series", keep_going));
+}
+
+TEST(DicomSeries, TheSourceSaysNothingOfThePatient) {
+  const test::TempDir folder;
+  ASSERT_NO_FATAL_FAILURE(write_small_series(folder / "Surname^Forename"));
+  for (const fs::path& file : files_of(folder / "Surname^Forename")) set_tag(file, 0x0010, 0x0010, "Surname^Forename");
+  const auto scan = read_dicom_series(folder / "Surname^Forename", keep_going);
+  ASSERT_TRUE(scan);
+  EXPECT_EQ(scan->source.find("name"), std::string::npos) << scan->source;
+}
+
+TEST(DicomSeries, WritingOverAFolderIsRefused) {
+  const test::TempDir folder;
+  const auto written = write_dicom_series(numbered_volume(), folder.path(), keep_going);
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().code, ErrorCode::exists);
+}
+
+TEST(DicomSeries, AStoppedWriteLeavesNothing) {
+  const test::TempDir folder;
+  int asked = 0;
+  const auto written = write_dicom_series(numbered_volume(), folder / "series", [&](double) { return ++asked < 3; });
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().code, ErrorCode::cancelled);
+  EXPECT_TRUE(files_of(folder.path()).empty());
+}
+
+TEST(DicomSeries, AStoppedReadSaysSo) {
+  const test::TempDir folder;
+  ASSERT_NO_FATAL_FAILURE(write_small_series(folder / "series"));
+  const auto scan = read_dicom_series(folder / "series", [](double done) { return done < 0.5; });
+  ASSERT_FALSE(scan);
+  EXPECT_EQ(scan.error().code, ErrorCode::cancelled);
+}
+
+// Each of these breaks a good series in one way.
+class BrokenSeries : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_NO_FATAL_FAILURE(write_small_series(series_));
+    files_ = files_of(series_);
+    ASSERT_GE(files_.size(), 8u);
+  }
+  void expect_refused(const std::string& named, const std::string& why) {
+    const auto scan = read_dicom_series(series_, keep_going);
+    ASSERT_FALSE(scan);
+    expect_one_sentence(scan.error(), named);
+    EXPECT_NE(scan.error().message.find(why), std::string::npos) << scan.error().message;
+    EXPECT_NE(scan.error().message.find(';'), std::string::npos) << "no remedy: " << scan.error().message;
+  }
+  test::TempDir folder_;
+  fs::path series_ = folder_ / "series";
+  std::vector<fs::path> files_;
+};
+
+TEST_F(BrokenSeries, EmptyFolder) {
+  for (const fs::path& file : files_) fs::remove(file);
+  expect_refused(series_.string(), "is empty");
+}
+
+TEST_F(BrokenSeries, NoDicomFiles) {
+  for (const fs::path& file : files_) std::ofstream(file, std::ios::trunc) << "text\n";
+  expect_refused(series_.string(), "no DICOM files");
+}
+
+TEST_F(BrokenSeries, SeriesInASubfolder) {
+  for (const fs::path& file : files_) fs::remove(file);
+  fs::create_directory(series_ / "CT");
+  expect_refused(series_.string(), "subfolders");
+}
+
+TEST_F(BrokenSeries, TwoSeries) {
+  ASSERT_NO_FATAL_FAILURE(write_small_series(folder_ / "other"));
+  for (const fs::path& file : files_of(folder_ / "other")) fs::copy(file, series_ / ("other-" + file.filename().string()));
+  expect_refused(series_.string(), "2 series");
+}
+
+TEST_F(BrokenSeries, SingleSlice) {
+  for (std::size_t i = 1; i < files_.size(); ++i) fs::remove(files_[i]);
+  expect_refused(series_.string(), "single slice");
+}
+
+TEST_F(BrokenSeries, MissingSlice) {
+  fs::remove(files_[4]);
+  expect_refused(series_.string(), "2 mm apart where 1 mm is usual");
+}
+
+TEST_F(BrokenSeries, MissingSlicesOfAShortSeries) {
+  for (std::size_t i = 0; i < files_.size(); ++i)
+    if (i != 0 && i != 1 && i != 4) fs::remove(files_[i]);
+  expect_refused(series_.string(), "apart where");
+}
+
+TEST_F(BrokenSeries, DoubledSlice) {
+  fs::copy(files_[4], series_ / "copy.dcm");
+  expect_refused(series_.string(), "0 mm apart");
+}
+
+TEST_F(BrokenSeries, TiltedGantry) {
+  // Every slice 0.3 mm farther to the back than the one below: shear by atan(0.3).
+  for (std::size_t i = 0; i < files_.size(); ++i)
+    set_tag(files_[i], 0x0020, 0x0032, "0\\" + std::to_string(0.3 * static_cast<double>(i)) + "\\" + std::to_string(i));
+  expect_refused(series_.string(), "16.7 degrees");
+}
+
+TEST_F(BrokenSeries, AnotherModality) {
+  for (const fs::path& file : files_) set_tag(file, 0x0008, 0x0060, "MR");
+  expect_refused(files_[0].string(), "is MR, not CT");
+}
+
+TEST_F(BrokenSeries, OnlyScouts) {
+  for (const fs::path& file : files_) set_tag(file, 0x0008, 0x0008, "ORIGINAL\\PRIMARY\\LOCALIZER");
+  expect_refused(series_.string(), "scout");
+}
+
+TEST_F(BrokenSeries, AScoutBesideTheSeriesIsNotStacked) {
+  set_tag(files_.back(), 0x0008, 0x0008, "ORIGINAL\\PRIMARY\\LOCALIZER");
+  const auto scan = read_dicom_series(series_, keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  EXPECT_EQ(scan->volume.dims[2], static_cast<int>(files_.size()) - 1);
+}
+
+TEST_F(BrokenSeries, NoPixelData) {
+  remove_tag(files_[3], 0x7fe0, 0x0010);
+  expect_refused(files_[3].string(), "no pixel data");
+}
+
+TEST_F(BrokenSeries, NoPixelDataAnywhere) {
+  for (const fs::path& file : files_) remove_tag(file, 0x7fe0, 0x0010);
+  expect_refused(files_[0].string(), "no pixel data");
+}
+
+TEST_F(BrokenSeries, TruncatedFile) {
+  truncate_file(files_[2], 0.6);
+  const auto scan = read_dicom_series(series_, keep_going);
+  ASSERT_FALSE(scan);
+  expect_one_sentence(scan.error(), files_[2].string());
+}
+
+TEST_F(BrokenSeries, NoSpacing) {
+  remove_tag(files_[0], 0x0028, 0x0030);
+  expect_refused(files_[0].string(), "PixelSpacing (0028,0030)");
+}
+
+TEST_F(BrokenSeries, SpacingThatIsNoNumber) {
+  set_tag(files_[0], 0x0028, 0x0030, "wide\\wide");
+  expect_refused(files_[0].string(), "PixelSpacing (0028,0030)");
+}
+
+TEST_F(BrokenSeries, NoPosition) {
+  remove_tag(files_[5], 0x0020, 0x0032);
+  expect_refused(files_[5].string(), "ImagePositionPatient (0020,0032)");
+}
+
+TEST_F(BrokenSeries, NoOrientation) {
+  remove_tag(files_[5], 0x0020, 0x0037);
+  expect_refused(files_[5].string(), "ImageOrientationPatient (0020,0037)");
+}
+
+TEST_F(BrokenSeries, NoRescaling) {
+  remove_tag(files_[5], 0x0028, 0x1052);
+  expect_refused(files_[5].string(), "RescaleIntercept");
+}
+
+TEST_F(BrokenSeries, SeveralFrames) {
+  set_tag(files_[1], 0x0028, 0x0008, "2");
+  expect_refused(files_[1].string(), "2 frames");
+}
+
+TEST_F(BrokenSeries, AnotherPixelSpacingInOneSlice) {
+  set_tag(files_[1], 0x0028, 0x0030, "2\\2");
+  expect_refused(series_.string(), "another pixel spacing");
+}
+
+TEST_F(BrokenSeries, AnotherOrientationInOneSlice) {
+  set_tag(files_[1], 0x0020, 0x0037, "1\\0\\0\\0\\0.8\\0.6");
+  expect_refused(series_.string(), "another orientation");
+}
+
+TEST(DicomSeriesFolder, ThatIsNotThere) {
+  const auto scan = read_dicom_series("/no/such/folder", keep_going);
+  ASSERT_FALSE(scan);
+  expect_one_sentence(scan.error(), "/no/such/folder");
+}
+
+}  // namespace
+}  // namespace osteon::import

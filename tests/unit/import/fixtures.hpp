@@ -1,0 +1,47 @@
+// Small scans and projects that the tests of the importer break in one way each.
+#pragma once
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/core/result.hpp"
+#include "server/import/phantom.hpp"
+
+namespace osteon::import {
+
+inline bool keep_going(double) { return true; }
+
+// 4 x 4 x 6 mm of 1.5 g/cm³.
+[[nodiscard]] Phantom small_block();
+
+// A DICOM series of the small block: about 20 slices of 1 mm, sorted by name and position alike.
+void write_small_series(const std::filesystem::path& folder);
+[[nodiscard]] std::vector<std::filesystem::path> files_of(const std::filesystem::path& folder);
+
+// Sets an attribute of a DICOM file, or takes it out; the file stays valid otherwise.
+void set_tag(const std::filesystem::path& file, std::uint16_t group, std::uint16_t element, const std::string& value);
+void remove_tag(const std::filesystem::path& file, std::uint16_t group, std::uint16_t element);
+
+// An InVesalius project of `columns` x `rows` x `slices` whose voxel value is column + 100 row + 1000 slice.
+struct Inv3 {
+  int columns = 4, rows = 5, slices = 6;
+  std::string modality = "CT";
+  std::string dtype = "int16";
+  std::string orientation = "1";
+  std::string spacing = "<real>0.5</real><real>0.75</real><real>2.0</real>";
+  bool with_list = true;
+  bool with_matrix = true;
+  std::size_t missing_bytes = 0;  // of the matrix
+};
+void write_inv3(const std::filesystem::path& file, const Inv3& project);
+
+// Keeps the first bytes of a file.
+void truncate_file(const std::filesystem::path& file, double part);
+
+// The message is one sentence that names `what` and, after it, says what to do.
+void expect_one_sentence(const Error& error, const std::string& what);
+
+}  // namespace osteon::import

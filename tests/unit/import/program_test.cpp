@@ -1,0 +1,187 @@
+// osteon-import as its users meet it: what it prints, what it leaves behind and how it exits.
+#include <csignal>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <thread>
+
+#include "common/volume/case.hpp"
+#include "tests/support/process.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/unit/import/fixtures.hpp"
+
+namespace osteon::import {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+
+const fs::path kProgram = OSTEON_IMPORT_PROGRAM;
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  return lines;
+}
+
+// Exit code 1, one sentence on standard error and nothing but it, nothing on standard output, no new file.
+void expect_refused(const std::vector<std::string>& arguments, const std::string& named, const test::TempDir& folder) {
+  const auto before = files_of(folder.path());
+  const auto result = test::run(kProgram, arguments);
+  EXPECT_FALSE(result.timed_out);
+  EXPECT_NE(result.exit_code, 0);
+  EXPECT_LT(result.exit_code, 128) << "ended by a signal";
+  EXPECT_EQ(result.out, "");
+  const auto lines = lines_of(result.err);
+  ASSERT_EQ(lines.size(), 1u) << result.err;
+  EXPECT_TRUE(lines[0].starts_with("osteon-import: ")) << lines[0];
+  EXPECT_NE(lines[0].find(named), std::string::npos) << lines[0] << "\nshould name " << named;
+  EXPECT_EQ(files_of(folder.path()), before);
+}
+
+class Program : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::string path(const char* name) const { return (folder_ / name).string(); }
+  test::TempDir folder_;
+};
+
+TEST_F(Program, HelpNamesTheCommands) {
+  const auto result = test::run(kProgram, {"--help"});
+  EXPECT_EQ(result.exit_code, 0);
+  for (const char* command : {"ct", "phantom", "info"}) EXPECT_NE(result.out.find(command), std::string::npos);
+}
+
+TEST_F(Program, MakesAPhantomAndReportsIt) {
+  const auto made = test::run(kProgram, {"phantom", "block", "--layers", "3:1.9,4:0.5", "--width", "8", "--pitch", "0.5", "--out", path("case"), "--title", "Plate"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const auto info = test::run(kProgram, {"info", path("case"), "--json"});
+  ASSERT_EQ(info.exit_code, 0) << info.err;
+  EXPECT_EQ(info.err, "");
+  const auto report = nlohmann::json::parse(info.out);
+  EXPECT_EQ(report.at("title"), "Plate");
+  EXPECT_EQ(report.at("pitch_mm"), 0.5);
+  EXPECT_NEAR(report.at("bone_volume_mm3").get<double>(), 8.0 * 8.0 * 7.0, 0.02 * 448.0);  // edges are sampled
+  const std::string hash = report.at("hash");
+  EXPECT_EQ(hash.size(), 64u);
+  EXPECT_NE(made.out.find(hash), std::string::npos);
+  const auto loaded = Case::load(path("case"));
+  ASSERT_TRUE(loaded);
+  EXPECT_EQ(to_hex(loaded->hash()), hash);
+  const auto text = test::run(kProgram, {"info", path("case")});
+  EXPECT_EQ(text.out, made.out);
+}
+
+TEST_F(Program, ImportsThePhantomsDicomSeries) {
+  ASSERT_EQ(test::run(kProgram, {"phantom", "tube", "--layers", "3:1.9,2:1.5", "--width", "12", "--pitch", "0.5", "--out", path("truth"), "--dicom", path("series")}).exit_code, 0);
+  const auto imported = test::run(kProgram, {"ct", path("series"), "--out", path("case"), "--pitch", "0.4"});
+  ASSERT_EQ(imported.exit_code, 0) << imported.err;
+  const auto truth = Case::load(path("truth"));
+  const auto bone = Case::load(path("case"));
+  ASSERT_TRUE(truth && bone);
+  EXPECT_EQ(bone->pitch_mm(), 0.4);
+  EXPECT_NEAR(bone->volume_mm3(), truth->volume_mm3(), 0.03 * truth->volume_mm3());  // no threshold was fitted
+  EXPECT_EQ(files_of(folder_.path()).size(), 3u);
+}
+
+TEST_F(Program, WrongInputsAreOneSentence) {
+  std::ofstream(folder_ / "letter.txt") << "Dear reader\n";
+  expect_refused({"ct", path("letter.txt"), "--out", path("case")}, path("letter.txt"), folder_);
+  expect_refused({"ct", path("absent"), "--out", path("case")}, path("absent"), folder_);
+  fs::create_directory(folder_ / "empty");
+  expect_refused({"ct", path("empty"), "--out", path("case")}, path("empty"), folder_);
+  ASSERT_NO_FATAL_FAILURE(write_inv3(folder_ / "cut.inv3", {.columns = 100, .rows = 100}));
+  truncate_file(folder_ / "cut.inv3", 0.7);
+  expect_refused({"ct", path("cut.inv3"), "--out", path("case")}, path("cut.inv3"), folder_);
+}
+
+TEST_F(Program, WrongSeriesAreOneSentence) {
+  ASSERT_NO_FATAL_FAILURE(write_small_series(folder_ / "series"));
+  const auto files = files_of(folder_ / "series");
+  for (const fs::path& file : files) remove_tag(file, 0x7fe0, 0x0010);
+  expect_refused({"ct", path("series"), "--out", path("case")}, "no pixel data", folder_);
+  for (const fs::path& file : files) set_tag(file, 0x0008, 0x0060, "MR");
+  expect_refused({"ct", path("series"), "--out", path("case")}, "not CT", folder_);
+}
+
+TEST_F(Program, WrongUsageIsOneSentence) {
+  expect_refused({}, "--help", folder_);
+  expect_refused({"paint"}, "subcommand", folder_);
+  expect_refused({"ct", path("x")}, "--out", folder_);
+  expect_refused({"ct", path("x"), "--out", path("case"), "--pitch", "wide"}, "--pitch", folder_);
+  expect_refused({"ct", path("x"), "--out", path("case"), "--pitch", "-1"}, "--pitch", folder_);
+  expect_refused({"phantom", "cube", "--layers", "5:1", "--out", path("case")}, "cube", folder_);
+  expect_refused({"phantom", "block", "--layers", "5=1", "--out", path("case")}, "--layers 5=1", folder_);
+  expect_refused({"phantom", "block", "--layers", "5:1", "--pitch", "7", "--out", path("case")}, "--pitch", folder_);
+}
+
+TEST_F(Program, NothingIsOverwritten) {
+  fs::create_directory(folder_ / "mine");
+  std::ofstream(folder_ / "mine" / "letter.txt") << "keep me\n";
+  expect_refused({"phantom", "block", "--layers", "5:1", "--out", path("mine")}, path("mine"), folder_);
+  expect_refused({"phantom", "block", "--layers", "5:1", "--out", path("case"), "--dicom", path("mine")}, path("mine"), folder_);
+  expect_refused({"ct", path("mine"), "--out", path("mine")}, path("mine"), folder_);
+  EXPECT_EQ(files_of(folder_ / "mine").size(), 1u);
+}
+
+TEST_F(Program, AFolderThatCannotBeMadeIsOneSentence) {
+  std::ofstream(folder_ / "file") << "x";
+  const auto result = test::run(kProgram, {"phantom", "block", "--layers", "5:1", "--out", path("file/case")});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_NE(result.err.find(path("file")), std::string::npos) << result.err;
+}
+
+TEST_F(Program, InfoOfABrokenCaseIsOneSentence) {
+  ASSERT_EQ(test::run(kProgram, {"phantom", "block", "--layers", "3:1.9", "--width", "4", "--pitch", "0.5", "--out", path("case")}).exit_code, 0);
+  expect_refused({"info", path("absent")}, path("absent"), folder_);
+  fs::create_directory(folder_ / "empty");
+  expect_refused({"info", path("empty")}, path("empty"), folder_);
+
+  nlohmann::json description;
+  std::ifstream(folder_ / "case" / "case.json") >> description;
+  const auto describe = [&](const nlohmann::json& j) { std::ofstream(folder_ / "case" / "case.json", std::ios::trunc) << j.dump(2); };
+  auto newer = description;
+  newer["schema_version"] = 99;
+  describe(newer);
+  expect_refused({"info", path("case")}, "99", folder_);
+  auto incomplete = description;
+  incomplete.erase("pitch_mm");
+  describe(incomplete);
+  expect_refused({"info", path("case")}, "pitch_mm", folder_);
+  std::ofstream(folder_ / "case" / "case.json", std::ios::trunc) << "{";
+  expect_refused({"info", path("case")}, "case.json", folder_);
+  auto renamed = description;
+  renamed["title"] = "Another";
+  describe(renamed);
+  expect_refused({"info", path("case")}, path("case"), folder_);
+  describe(description);
+  truncate_file(folder_ / "case" / "bone.vdb", 0.5);
+  expect_refused({"info", path("case")}, path("case"), folder_);
+}
+
+// Starts a command, waits for the moment and presses Ctrl-C: 130, and only what was there before is there.
+void expect_stopped(const std::vector<std::string>& arguments, const std::string& at, const test::TempDir& folder) {
+  const auto before = files_of(folder.path());
+  test::Process process(kProgram, arguments);
+  const auto end = std::chrono::steady_clock::now() + 60s;
+  while (process.err().find(at) == std::string::npos && process.running() && std::chrono::steady_clock::now() < end) std::this_thread::sleep_for(2ms);
+  ASSERT_TRUE(process.running()) << "too quick to be stopped: " << process.err();
+  process.signal(SIGINT);
+  EXPECT_EQ(process.wait(60s), 130);
+  EXPECT_NE(process.err().find("osteon-import: stopped"), std::string::npos) << process.err();
+  EXPECT_EQ(process.out(), "");
+  EXPECT_EQ(files_of(folder.path()), before);
+}
+
+TEST_F(Program, CtrlCLeavesNothing) {
+  ASSERT_EQ(test::run(kProgram, {"phantom", "tube", "--layers", "4:1.9,6:0.9", "--width", "30", "--pitch", "0.4", "--out", path("case"), "--dicom", path("series")}).exit_code, 0);
+  const std::vector<std::string> import{"ct", path("series"), "--out", path("imported"), "--threshold", "0", "--pitch", "0.12"};
+  expect_stopped(import, "20 %", folder_);
+  expect_stopped(import, "50 %", folder_);
+  const std::vector<std::string> phantom{"phantom", "block", "--layers", "40:1.9", "--width", "50", "--pitch", "0.25", "--out", path("p"), "--dicom", path("d")};
+  expect_stopped(phantom, "10 %", folder_);
+  expect_stopped(phantom, "60 %", folder_);  // while it writes the DICOM files
+}
+
+}  // namespace
+}  // namespace osteon::import

@@ -1,0 +1,178 @@
+// Real scans: the skull of Debian's invesalius-examples and what lies in the shared data folder, where they are there.
+#include "server/import/ct_import.hpp"
+#include "server/import/dicom_reader.hpp"
+#include "server/import/inv3_reader.hpp"
+#include "tests/support/shared_data.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/unit/import/fixtures.hpp"
+
+namespace osteon::import {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(Skull, LiesInThePatientFrame) {
+  const auto file = test::find_skull();
+  if (!file) GTEST_SKIP() << "Cranium.inv3 of the package invesalius-examples is not there";
+  auto scan = read_inv3(*file, keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  EXPECT_EQ(scan->volume.dims, (std::array<int, 3>{256, 256, 108}));
+  const auto bone = import_ct(std::move(*scan), {.pitch_mm = {}, .title = "Skull"}, keep_going);
+  ASSERT_TRUE(bone) << bone.error().message;
+
+  // InVesalius' own mesh of everything above 226 HU holds 657.7 cm³ (surface_0.plist), the headrest and loose pieces
+  // included; the largest island is most of it.
+  EXPECT_LT(bone->volume_mm3(), 657.7e3);
+  EXPECT_GT(bone->volume_mm3(), 0.88 * 657.7e3);
+
+  // Enamel is the densest thing in a head, and teeth are low and in front: -z and -y of the middle.
+  const Vec3 middle = bone->bounds().centre_mm();
+  Vec3 sum = Vec3::Zero();
+  int enamel = 0;
+  const CoordBox box = bone->bounds_samples();
+  for (int x = box.min.x; x <= box.max.x; ++x)
+    for (int y = box.min.y; y <= box.max.y; ++y)
+      for (int z = box.min.z; z <= box.max.z; ++z) {
+        const Vec3 p = position_mm({x, y, z}, bone->pitch_mm());
+        if (bone->density_g_cm3(p) < 2.6) continue;
+        sum += p;
+        ++enamel;
+      }
+  ASSERT_GT(enamel, 50);
+  const Vec3 teeth = sum / enamel;
+  EXPECT_LT(teeth.z(), middle.z() - 40.0);
+  EXPECT_LT(teeth.y(), middle.y() - 40.0);
+  EXPECT_NEAR(teeth.x(), middle.x(), 15.0);
+
+  // A line from above meets the vault, then the cavity of the brain.
+  double vault_z = 1e9;
+  for (double z = bone->bounds().max_mm.z(); z > middle.z(); z -= 0.25)
+    if (bone->surface_mm({middle.x(), middle.y(), z}) < 0.0) {
+      vault_z = z;
+      break;
+    }
+  EXPECT_LT(vault_z, 1e9);
+  EXPECT_GT(vault_z, middle.z() + 50.0);
+  EXPECT_GT(bone->surface_mm({middle.x(), middle.y(), vault_z - 30.0}), 0.0);
+}
+
+TEST(Skull, ImportsToOneHash) {
+  const auto file = test::find_skull();
+  if (!file) GTEST_SKIP() << "Cranium.inv3 of the package invesalius-examples is not there";
+  std::string hash;
+  for (int i = 0; i < 2; ++i) {
+    auto scan = read_inv3(*file, keep_going);
+    ASSERT_TRUE(scan);
+    const auto bone = import_ct(std::move(*scan), {.pitch_mm = 2.0}, keep_going);
+    ASSERT_TRUE(bone);
+    if (i > 0) {
+      EXPECT_EQ(to_hex(bone->hash()), hash);
+    }
+    hash = to_hex(bone->hash());
+  }
+}
+
+class SharedScans : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto shared = test::find_shared();
+    if (!shared || !fs::is_directory(*shared / "data")) GTEST_SKIP() << "no shared/data beside the checkout";
+    data_ = *shared / "data";
+  }
+  void expect_refused(const fs::path& folder, const std::string& why) const {
+    const auto scan = read_dicom_series(folder, keep_going);
+    ASSERT_FALSE(scan) << folder;
+    expect_one_sentence(scan.error(), why);
+  }
+  fs::path data_;
+};
+
+TEST_F(SharedScans, TibiaWithoutDicomPreamble) {
+  auto scan = read_dicom_series(data_ / "tibia-dicom", keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  EXPECT_EQ(scan->volume.dims, (std::array<int, 3>{512, 512, 46}));
+  EXPECT_NEAR(scan->volume.spacing_mm.z(), 3.0, 1e-6);
+  const auto [least, most] = std::ranges::minmax(scan->volume.values);
+  EXPECT_EQ(least, -1000);
+  EXPECT_EQ(most, 3173);
+  // README: 0.41 % of the voxels lie above 300 HU.
+  const auto bright = std::ranges::count_if(scan->volume.values, [](int hu) { return hu > 300; });
+  EXPECT_NEAR(static_cast<double>(bright) / static_cast<double>(scan->volume.count()), 0.0041, 0.00005);
+
+  const imaging::HuVolume grid = scan->volume;
+  const auto bone = import_ct(std::move(*scan), {}, keep_going);
+  ASSERT_TRUE(bone);
+  // One of the two tibiae, whose places README gives; a closed tube with a canal of 20 to 80 HU.
+  const Vec3 middle = grid.voxel(bone->bounds().centre_mm());
+  const bool first = middle.x() > 85 && middle.x() < 127 && middle.y() > 290 && middle.y() < 337;
+  const bool second = middle.x() > 342 && middle.x() < 388 && middle.y() > 297 && middle.y() < 342;
+  EXPECT_TRUE(first || second) << middle.transpose();
+}
+
+TEST_F(SharedScans, Jpeg2000InAnyFileOrder) {
+  const auto scan = read_dicom_series(data_ / "body-j2k-dicom", keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  EXPECT_EQ(scan->volume.dims, (std::array<int, 3>{512, 512, 20}));
+  EXPECT_NEAR(scan->volume.spacing_mm.z(), 2.0, 1e-6);  // by position; SliceThickness says 3
+  const auto [least, most] = std::ranges::minmax(scan->volume.values);
+  EXPECT_EQ(least, -1024);
+  EXPECT_EQ(most, 1839);
+}
+
+TEST_F(SharedScans, TiltedGantryBesideAScout) { expect_refused(data_ / "dicom-tricky" / "tilt-and-localizer", "18.5 degrees"); }
+
+// Two copies of one slice, the second 2 mm higher: a series in that file's encoding.
+Result<CtScan> read_pair(const fs::path& file) {
+  const test::TempDir folder;
+  fs::copy(file, folder / "a.dcm");
+  fs::copy(file, folder / "b.dcm");
+  fs::permissions(folder / "b.dcm", fs::perms::owner_write, fs::perm_options::add);
+  set_tag(folder / "b.dcm", 0x0020, 0x0032, "-161.399994\\-148.800003\\6.7");
+  return read_dicom_series(folder.path(), keep_going);
+}
+
+TEST_F(SharedScans, EveryTransferSyntaxGivesTheReferencesValuesOrIsRefused) {
+  const auto reference = read_pair(data_ / "dicom-tricky" / "transfer-syntaxes" / "CTImage.dcm");
+  ASSERT_TRUE(reference) << reference.error().message;
+  // README: stored -2000..2402 with intercept -1024.
+  const auto [least, most] = std::ranges::minmax(reference->volume.values);
+  EXPECT_EQ(least, -3024);
+  EXPECT_EQ(most, 1378);
+  int compared = 0;
+  for (const auto& entry : fs::directory_iterator(data_ / "dicom-tricky" / "transfer-syntaxes")) {
+    const std::string name = entry.path().filename().string();
+    const auto ends = [&](const char* syntax) { return name.ends_with(std::string(syntax) + ".dcm"); };
+    const auto scan = read_pair(entry.path());
+    if (ends("4.53") || ends("4.55")) {
+      ASSERT_FALSE(scan) << name;
+      expect_one_sentence(scan.error(), "retired");
+      continue;
+    }
+    ASSERT_TRUE(scan) << name << ": " << scan.error().message;
+    // Largest differences by README: lossy JPEG-LS 1, lossy JPEG 2000 5, 12-bit JPEG 36, 8-bit JPEG by its slope.
+    const int allowed = ends("4.81") ? 1 : ends("4.91") ? 5 : ends("4.51") ? 36 : ends("4.50") ? 400 : 0;
+    int worst = 0;
+    // Below -1024 is outside of the scanned circle, which the lossy ones clip.
+    for (std::size_t i = 0; i < scan->volume.values.size(); ++i)
+      if (reference->volume.values[i] >= -1024) worst = std::max(worst, std::abs(scan->volume.values[i] - reference->volume.values[i]));
+    EXPECT_LE(worst, allowed) << name;
+    ++compared;
+  }
+  EXPECT_GE(compared, 12);
+}
+
+TEST_F(SharedScans, EachOddFileAloneIsOneSentence) {
+  int refused = 0;
+  for (const auto& entry : fs::directory_iterator(data_ / "dicom-tricky" / "structure")) {
+    const test::TempDir folder;
+    fs::copy(entry.path(), folder / entry.path().filename());
+    const auto scan = read_dicom_series(folder.path(), keep_going);
+    ASSERT_FALSE(scan) << entry.path();
+    expect_one_sentence(scan.error(), folder.path().string());
+    ++refused;
+  }
+  EXPECT_GE(refused, 12);
+}
+
+}  // namespace
+}  // namespace osteon::import
