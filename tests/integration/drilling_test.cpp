@@ -128,10 +128,11 @@ class DrillingRoom : public testing::Test {
   static double medulla(const Hole& hole, const std::string& column) { return mean(hole, column, 6.5, 24.5); }
   static double far_cortex(const Hole& hole, const std::string& column) { return mean(hole, column, 26.5, 29.5); }
 
+  // How far the tip goes beyond the far face.
   static double plunge_mm(const Hole& hole) {
     double deepest = 0.0;
     for (const double depth : hole.log["depth_mm"]) deepest = std::max(deepest, depth);
-    return deepest - (kThickness_mm + kCone_mm);
+    return deepest - kThickness_mm;
   }
 
   static std::unique_ptr<Results> results_;
