@@ -96,8 +96,8 @@ def inside(session, layer):
 def loop_figures(run, numbers):
     loop, haptic = run.empty_loop(), numbers["programs"]["haptic"]["loop"]
     return {
-        "haptic_work_p50": (haptic["work_p50_us"], loop["late_p50_us"]),
-        "haptic_work_p99": (haptic["work_p99_us"], loop["late_p99_us"]),
+        "haptic_work_p50": (haptic["work_p50_us"], loop["work_p50_us"]),
+        "haptic_work_p99": (haptic["work_p99_us"], loop["work_p99_us"]),
         "haptic_late_p50": (haptic["late_p50_us"], loop["late_p50_us"]),
         "haptic_late_p99": (haptic["late_p99_us"], loop["late_p99_us"]),
         "haptic_missed_ticks": (1e4 * haptic["missed"] / max(1, haptic["ticks"]),

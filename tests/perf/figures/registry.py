@@ -31,7 +31,7 @@ COMPARISONS = {
     "==": lambda value, bound: value == bound,
 }
 
-EMPTY_LOOP = "lateness of an empty 1 kHz loop, same percentile"
+EMPTY_LOOP = "the same of an empty 1 kHz loop"
 
 FIGURES = [
     # The haptic loop, in the rig session: all four programs on this machine.
@@ -40,7 +40,7 @@ FIGURES = [
     Figure("haptic_late_p50", "us", "lateness of the haptic loop's ticks, median", "rig", baseline=EMPTY_LOOP),
     Figure("haptic_late_p99", "us", "lateness of the haptic loop's ticks, 99th percentile", "rig", baseline=EMPTY_LOOP),
     Figure("haptic_missed_ticks", "per_10000", "ticks that began a whole period late, per 10000", "rig",
-           baseline="the same of an empty loop"),
+           baseline=EMPTY_LOOP),
     # How quickly the others learn of a cut.
     Figure("cut_to_commit_p50", "ms", "from a cut's end until its confirmation, median", "rig"),
     Figure("mesh_update_p50", "ms", "from a cut's end until the viewer has the new surface, median", "rig",
