@@ -65,6 +65,7 @@ json step_summary(const ReadyStep& step, const StepResult& result, double remove
     out["far_cortex"] = means(result.far_cortex);
     out["broke_through"] = result.broke_through;
     out["plunge_mm"] = result.plunge_mm;
+    out["plunge_after_exit_mm"] = result.after_exit_mm;
   }
   return out;
 }

@@ -21,7 +21,7 @@ double segment_distance_mm(const Vec3& p, const Vec3& a, const Vec3& b) noexcept
   return (p - a - t * ab).norm();
 }
 
-Vec3 sphere_centre(const Tool& tool, const Pose& pose) noexcept { return pose.point({0, 0, -0.5 * tool.diameter_mm}); }
+Vec3 sphere_centre(const Pose& pose, double radius_mm) noexcept { return pose.point({0, 0, -radius_mm}); }
 
 }  // namespace
 
@@ -33,59 +33,76 @@ void Proxy::place(const Pose& pose_bone_tool) noexcept {
 
 bool Proxy::begin_sweep(const ToolModel& model) noexcept {
   if (sweep_count_ >= kMostSweeps) return false;
-  tool_ = &model.tool;
   sweeping_ = true;
+  const Tool& tool = model.tool;
   Sweep& sweep = sweeps_[static_cast<std::size_t>(sweep_count_++)];
-  sweep.kind = model.tool.kind;
-  sweep.radius_mm = 0.5 * model.tool.diameter_mm;
+  sweep.kind = tool.kind;
+  sweep.radius_mm = 0.5 * tool.diameter_mm;
+  sweep.length_mm = tool.cutting_length_mm;
+  if (tool.kind == ToolKind::drill) sweep.cone_height_mm = sweep.radius_mm / std::tan(0.5 * tool.point_angle_rad);
+  sweep.cone_slant_mm = std::hypot(sweep.radius_mm, sweep.cone_height_mm);
   sweep.own_cut = 0;
-  sweep.pose_from_bone = sweep.pose_to_bone = pose_.inverse();
-  sweep.from_mm = sweep.to_mm = sphere_centre(model.tool, pose_);
+  sweep.open = true;
+  sweep.deepest = pose_;
+  sweep.pose_deepest_bone = pose_.inverse();
+  sweep.from_mm = sweep.to_mm = sphere_centre(pose_, sweep.radius_mm);
   return true;
 }
 
 void Proxy::closed(const ToolModel& model, std::uint64_t own_cut) noexcept {
   if (!sweeping_) return;
-  sweeps_[static_cast<std::size_t>(sweep_count_ - 1)].own_cut = own_cut;
+  Sweep& sweep = sweeps_[static_cast<std::size_t>(sweep_count_ - 1)];
+  sweep.own_cut = own_cut;
+  constexpr double kSameAxis_rad = 1e-6, kSameAxis_mm = 0.02;
+  const Vec3 away_mm = pose_.position_mm - sweep.deepest.position_mm;
+  const Vec3 axis = pose_.direction(Vec3::UnitZ());
+  if (sweep.kind == ToolKind::drill && pose_.rotation.angularDistance(sweep.deepest.rotation) < kSameAxis_rad &&
+      (away_mm - away_mm.dot(axis) * axis).norm() < kSameAxis_mm)
+    return;
+  sweep.open = false;
   sweeping_ = begin_sweep(model);
 }
 
 void Proxy::end_sweep() noexcept {
-  if (sweeping_) --sweep_count_;
+  if (!sweeping_) return;
+  Sweep& sweep = sweeps_[static_cast<std::size_t>(sweep_count_ - 1)];
+  sweep.open = false;
+  if (sweep.own_cut == 0) --sweep_count_;
   sweeping_ = false;
 }
 
 void Proxy::update_sweep() noexcept {
   if (!sweeping_) return;
   Sweep& sweep = sweeps_[static_cast<std::size_t>(sweep_count_ - 1)];
-  sweep.pose_to_bone = pose_.inverse();
-  sweep.to_mm = sphere_centre(*tool_, pose_);
+  sweep.to_mm = sphere_centre(pose_, sweep.radius_mm);
+  if ((pose_.position_mm - sweep.deepest.position_mm).dot(pose_.direction(Vec3::UnitZ())) <= 0.0) return;
+  sweep.deepest = pose_;
+  sweep.pose_deepest_bone = pose_.inverse();
 }
 
 void Proxy::forget_contained(const Patch& patch) noexcept {
   int kept = 0;
   for (int i = 0; i < sweep_count_; ++i) {
     const Sweep& sweep = sweeps_[static_cast<std::size_t>(i)];
-    if (sweep.own_cut == 0 || sweep.own_cut > patch.own_cuts) sweeps_[static_cast<std::size_t>(kept++)] = sweep;
+    if (sweep.open || sweep.own_cut > patch.own_cuts) sweeps_[static_cast<std::size_t>(kept++)] = sweep;
   }
   sweep_count_ = kept;
+}
+
+double Proxy::distance_mm(const Sweep& sweep, const Vec3& point_mm) noexcept {
+  if (sweep.kind == ToolKind::round_burr) return segment_distance_mm(point_mm, sweep.from_mm, sweep.to_mm) - sweep.radius_mm;
+  // Exact inside and before faces; too small before edges, where only the sign is asked for.
+  const Vec3 p = sweep.pose_deepest_bone.point(point_mm);
+  const double r = std::sqrt(p.x() * p.x() + p.y() * p.y());
+  return std::max({(r * sweep.cone_height_mm + p.z() * sweep.radius_mm) / sweep.cone_slant_mm, r - sweep.radius_mm,
+                   -p.z() - sweep.length_mm});
 }
 
 bool Proxy::solid(const Patch& patch, const Vec3& point_mm, double& solid_mm) const noexcept {
   if (!patch.solid(point_mm, solid_mm)) return false;
   if (solid_mm > 0.3) return true;
-  for (int i = 0; i < sweep_count_; ++i) {
-    const Sweep& sweep = sweeps_[static_cast<std::size_t>(i)];
-    double distance_mm = 0.0;
-    if (sweep.kind == ToolKind::round_burr) {
-      distance_mm = segment_distance_mm(point_mm, sweep.from_mm, sweep.to_mm) - sweep.radius_mm;
-    } else {
-      // A drill cuts along its axis, so the sweep is the union of its ends.
-      distance_mm = std::min(signed_distance_mm(*tool_, sweep.pose_from_bone.point(point_mm)),
-                             signed_distance_mm(*tool_, sweep.pose_to_bone.point(point_mm)));
-    }
-    solid_mm = std::max(solid_mm, -distance_mm);
-  }
+  for (int i = 0; i < sweep_count_; ++i)
+    solid_mm = std::max(solid_mm, -distance_mm(sweeps_[static_cast<std::size_t>(i)], point_mm));
   return true;
 }
 

@@ -44,14 +44,18 @@ class Proxy {
   [[nodiscard]] const Pose& pose() const noexcept { return pose_; }
 
  private:
-  // The cutting part between two poses.
+  // What the cutting part has taken away since a patch was built. A sphere: from one place to another. A drill cuts
+  // along its axis, so its deepest place holds all others, and one sweep goes on for as long as it is not turned.
   struct Sweep {
     ToolKind kind = ToolKind::drill;
-    double radius_mm = 0;
-    Pose pose_from_bone, pose_to_bone;  // inverse poses of the tool, for distances
-    Vec3 from_mm, to_mm;                // centres of a sphere
-    std::uint64_t own_cut = 0;          // 0: not closed yet
+    double radius_mm = 0, cone_height_mm = 0, cone_slant_mm = 0, length_mm = 0;
+    Pose deepest;                // drill, pose_bone_tool
+    Pose pose_deepest_bone;      // its inverse
+    Vec3 from_mm, to_mm;         // sphere: its centre
+    std::uint64_t own_cut = 0;   // newest cut that holds it all; 0: none yet
+    bool open = false;
   };
+  [[nodiscard]] static double distance_mm(const Sweep& sweep, const Vec3& point_mm) noexcept;
   struct Engagement {
     double area_mm2 = 0, engaged_mm2 = 0, density = 0, milling = 0, nearest_mm = 0;
     bool covered = true;
@@ -72,7 +76,6 @@ class Proxy {
   void forget_contained(const Patch& patch) noexcept;
 
   static constexpr int kMostSweeps = 48;
-  const Tool* tool_ = nullptr;  // that the open sweep is made with
   Pose pose_;
   std::array<Sweep, kMostSweeps> sweeps_;
   int sweep_count_ = 0;

@@ -178,7 +178,8 @@ void Surgeon::observe(const ReadyStep& step, const LoopReport& report, double dt
     last_engaged_mm_ = depth;
   } else if (last_engaged_mm_ >= 0.0) {
     result.broke_through = true;
-    result.plunge_mm = std::max(result.plunge_mm, depth - last_engaged_mm_);
+    result.plunge_mm = std::max(result.plunge_mm, depth - step.site.thickness_mm);
+    result.after_exit_mm = std::max(result.after_exit_mm, depth - last_engaged_mm_);
   }
 }
 

@@ -77,7 +77,8 @@ struct StepResult {
   double duration_s = 0;
   double peak_force_n = 0;
   double deepest_mm = 0;       // of the tip below the entry
-  double plunge_mm = 0;        // of the tip beyond where the cone left the far surface
+  double plunge_mm = 0;        // of the tip beyond the far surface, as the reference table counts it
+  double after_exit_mm = 0;    // of the tip beyond where the cone was last in bone
   LayerMeans near_cortex, medulla, far_cortex, all;
 };
 

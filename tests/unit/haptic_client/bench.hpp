@@ -1,0 +1,51 @@
+// A whole haptic client without threads: session, replica and patches on virtual time, with the delays of real ones.
+#pragma once
+#include <deque>
+#include <functional>
+#include <vector>
+
+#include "common/volume/case.hpp"
+#include "haptic_client/control/patch_builder.hpp"
+#include "haptic_client/control/replica.hpp"
+#include "haptic_client/control/session.hpp"
+
+namespace osteon::haptic::test {
+
+// A block across z = 0 … 30 mm: layers 5/20/5 mm at 1.9/0.3/1.9 g/cm³, h = 0.5 mm. It is entered along +z.
+[[nodiscard]] Case block_case(double width_mm = 12.0);
+
+struct BenchDelays {
+  int patch_ticks = 12;   // between two patches
+  int commit_ticks = 25;  // from closing a cut until the room confirms it
+};
+
+class Bench {
+ public:
+  Bench(const Case& bone, const std::vector<PlanStep>& plan, const SimulatedDeviceParams& device = {}, double force_scale = 0.0,
+        const BenchDelays& delays = {});
+
+  // One millisecond; `after_tick` sees it before replica and patches follow.
+  SessionTick tick();
+  // Until the plan is done and every cut confirmed.
+  void run(const std::function<void(const SessionTick&)>& after_tick = {});
+  void follow();  // replica and patch, as their thread would
+
+  [[nodiscard]] SimulatedSession& session() { return session_; }
+  [[nodiscard]] const Replica& replica() const { return replica_; }
+  [[nodiscard]] const Patch& patch() const { return patch_; }
+  [[nodiscard]] const std::vector<Cut>& cuts() const { return cuts_; }
+
+ private:
+  BenchDelays delays_;
+  SimulatedSession session_;
+  Replica replica_;
+  PatchBuilder builder_;
+  Patch patch_;
+  SessionTick last_;
+  std::vector<Cut> cuts_;
+  std::deque<std::pair<std::int64_t, Cut>> on_the_way_;
+  std::int64_t ticks_ = 0;
+  std::uint64_t room_seq_ = 0;
+};
+
+}  // namespace osteon::haptic::test

@@ -1,0 +1,232 @@
+// Drilling through the layered block as the dissertation's reference simulations do, on virtual time.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "common/mechanics/drilling.hpp"
+#include "tests/support/allocation_counter.hpp"
+#include "tests/unit/haptic_client/bench.hpp"
+
+namespace osteon::haptic::test {
+namespace {
+
+PlanStep drill_step(HandKind hand) {
+  PlanStep step;
+  step.action = Action::drill;
+  step.tool = "drill-3.2";
+  step.spindle_rpm = 1000;
+  step.hand = hand;
+  step.entry.point_mm = Vec3(0.1, -0.2, 0);
+  step.entry.axis = Vec3(0, 0, 1);
+  return step;
+}
+
+struct Mean {
+  double sum = 0;
+  int count = 0;
+  void add(double v) { sum += v, ++count; }
+  [[nodiscard]] double value() const { return count ? sum / count : 0.0; }
+};
+
+// Means over the depths at which the whole point is in one layer, half a voxel of h kept off the boundaries.
+struct Layers {
+  Mean force[3], feed[3];
+  double crossing_s[3] = {};
+  double torque_max = 0, force_after = 0, work_min = 0;
+
+  void see(const SessionTick& tick) {
+    const LoopReport& report = tick.report;
+    const double tip = report.pose_bone_proxy.position_mm.z();
+    const double force_n = -report.force_physical_n.z();
+    work_min = std::min(work_min, report.cutting_force_n.dot(report.moved_mm));
+    torque_max = std::max(torque_max, report.torque_nmm);
+    if (tip > 31.2) force_after = std::max(force_after, std::abs(force_n));
+    if (tick.order.phase != SurgeonPhase::push && tick.order.phase != SurgeonPhase::feed) return;
+    const double kTip = 0.961, kEdge = 0.3;
+    const double from[] = {kTip + 0.2, 5 + kTip + kEdge, 25 + kTip + kEdge}, to[] = {5 - kEdge, 25 - kEdge, 30 - kEdge};
+    for (int i = 0; i < 3; ++i)
+      if (tip > from[i] && tip < to[i]) {
+        force[i].add(force_n);
+        crossing_s[i] += 1e-3;
+      }
+    for (int i = 0; i < 3; ++i) feed[i].sum = (to[i] - from[i]) / std::max(1e-9, crossing_s[i]), feed[i].count = 1;
+  }
+};
+
+TEST(DrillingBlock, FeedRigFeelsTheLawsThrust) {
+  PlanStep step = drill_step(HandKind::rig);
+  step.feed_mm_per_s = 1.0;
+  step.beyond_mm = 3.0;
+  Bench bench(block_case(), {step});
+  Layers layers;
+  bench.run([&](const SessionTick& tick) { layers.see(tick); });
+  ASSERT_TRUE(bench.session().done());
+  EXPECT_NEAR(layers.force[0].value(), 28.9, 0.03 * 28.9);
+  EXPECT_NEAR(layers.force[1].value(), 3.25, 0.03 * 3.25);
+  EXPECT_NEAR(layers.force[2].value(), 28.9, 0.03 * 28.9);
+  EXPECT_EQ(layers.force_after, 0.0);
+  EXPECT_GE(layers.work_min, 0.0);
+  EXPECT_NEAR(layers.torque_max, 27.0, 1.5);
+}
+
+TEST(DrillingBlock, FeedRigRampsOverTheConesHeight) {
+  PlanStep step = drill_step(HandKind::rig);
+  step.feed_mm_per_s = 1.0;
+  step.beyond_mm = 1.0;
+  Bench bench(block_case(), {step});
+  // Engaged share of a cone that is z deep: (z / height)².
+  int seen = 0;
+  bench.run([&](const SessionTick& tick) {
+    const double tip = tick.report.pose_bone_proxy.position_mm.z();
+    if (tick.order.phase != SurgeonPhase::feed || tip < 0.2 || tip > 0.9) return;
+    ++seen;
+    // As a depth: contact points ask half a pitch ahead, and stand in rings 0.1 mm apart.
+    EXPECT_NEAR(0.961 * std::sqrt(tick.report.engaged), tip, 0.0625 + 0.1) << tip;
+  });
+  EXPECT_GT(seen, 300);
+}
+
+struct HandRun {
+  Layers layers;
+  StepResult result;
+};
+
+HandRun drill_by_hand(HandKind hand, double push_n = 29) {
+  PlanStep step = drill_step(hand);
+  step.push_n = push_n;
+  Bench bench(block_case(), {step});
+  HandRun run;
+  bench.run([&](const SessionTick& tick) { run.layers.see(tick); });
+  EXPECT_TRUE(bench.session().done());
+  run.result = bench.session().surgeon().results()[0];
+  std::printf("  %s: force %.2f/%.2f/%.2f N, feed %.3f/%.2f/%.3f mm/s, plunge %.2f mm, %.2f after the exit\n",
+              hand == HandKind::expert ? "expert" : "novice", run.layers.force[0].value(), run.layers.force[1].value(),
+              run.layers.force[2].value(), run.layers.feed[0].value(), run.layers.feed[1].value(), run.layers.feed[2].value(),
+              run.result.plunge_mm, run.result.after_exit_mm);
+  return run;
+}
+
+// The two hands of the reference table, each run once.
+const HandRun& expert() {
+  static const HandRun run = drill_by_hand(HandKind::expert);
+  return run;
+}
+const HandRun& novice() {
+  static const HandRun run = drill_by_hand(HandKind::novice);
+  return run;
+}
+
+// Reference table of the hands; 10 % on forces and feeds, 15 % on the plunge.
+TEST(DrillingBlock, ExpertMatchesTheReference) {
+  const HandRun& run = expert();
+  const double force[] = {27, 11, 27}, feed[] = {0.89, 10.7, 0.89};
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(run.layers.force[i].value(), force[i], 0.1 * force[i]) << i;
+    EXPECT_NEAR(run.layers.feed[i].value(), feed[i], 0.1 * feed[i]) << i;
+  }
+  EXPECT_GE(run.layers.feed[1].value(), 10.0 * run.layers.feed[0].value());
+  EXPECT_NEAR(run.result.plunge_mm, 6.0, 0.15 * 6.0);
+  // Closed form of the released hand: F/K + F/K_c.
+  EXPECT_NEAR(run.result.after_exit_mm, 27 / 5.5 + 27 / 50.0, 0.15 * (27 / 5.5 + 27 / 50.0));
+  EXPECT_GE(run.layers.work_min, 0.0);
+  EXPECT_EQ(run.layers.force_after, 0.0);
+}
+
+TEST(DrillingBlock, NoviceMatchesTheReference) {
+  const HandRun& run = novice();
+  const double force[] = {28, 18, 28}, feed[] = {0.96, 17.6, 0.95};
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(run.layers.force[i].value(), force[i], 0.1 * force[i]) << i;
+    EXPECT_NEAR(run.layers.feed[i].value(), feed[i], 0.1 * feed[i]) << i;
+  }
+  EXPECT_GE(run.layers.feed[1].value(), 10.0 * run.layers.feed[0].value());
+  EXPECT_NEAR(run.result.plunge_mm, 14.4, 0.15 * 14.4);
+  EXPECT_NEAR(run.result.after_exit_mm, 28 / 2.0 + 28 / 50.0, 0.15 * (28 / 2.0 + 28 / 50.0));
+}
+
+TEST(DrillingBlock, PlungeRisesWithPushAndFallsWithSkill) {
+  EXPECT_LT(expert().result.plunge_mm, novice().result.plunge_mm);
+  EXPECT_LT(expert().result.plunge_mm, drill_by_hand(HandKind::expert, 36).result.plunge_mm);
+}
+
+// A 3.3 N device with the hand made that much lighter drills the same hole.
+TEST(DrillingBlock, AWeakDeviceShowsTheSameBoneLighter) {
+  SimulatedDeviceParams weak;
+  weak.limits = {3.3, 1.75, 3.0, 100.0};
+  Bench bench(block_case(), {drill_step(HandKind::expert)}, weak);
+  Layers layers;
+  double rendered_max = 0;
+  bench.run([&](const SessionTick& tick) {
+    layers.see(tick);
+    rendered_max = std::max(rendered_max, tick.report.force_device_n.norm());
+  });
+  EXPECT_LE(rendered_max, 3.3);
+  EXPECT_NEAR(layers.force[0].value(), 27, 2.7);
+  EXPECT_NEAR(layers.feed[0].value(), 0.89, 0.09);
+}
+
+// The hole in the block is the drill's cylinder: 30 mm long, its mouth and exit being the block's faces.
+TEST(DrillingBlock, RemovesTheClosedFormVolume) {
+  PlanStep step = drill_step(HandKind::rig);
+  step.feed_mm_per_s = 3.0;
+  step.beyond_mm = 3.0;
+  Bench bench(block_case(), {step});
+  bench.run();
+  EXPECT_NEAR(bench.replica().committed().removed_mm3(), std::numbers::pi * 1.6 * 1.6 * 30.0, 0.02 * std::numbers::pi * 1.6 * 1.6 * 30.0);
+  EXPECT_EQ(bench.replica().unconfirmed(), 0u);
+  EXPECT_EQ(bench.replica().committed().hash(), bench.replica().predicted().hash());
+}
+
+// Paths hang together, are numbered without gaps and close in time.
+TEST(DrillingBlock, CutsFormOneChain) {
+  PlanStep step = drill_step(HandKind::rig);
+  step.feed_mm_per_s = 3.0;
+  Bench bench(block_case(), {step});
+  bench.run();
+  const std::vector<Cut>& cuts = bench.cuts();
+  ASSERT_GT(cuts.size(), 1000u);
+  for (std::size_t i = 0; i < cuts.size(); ++i) {
+    EXPECT_EQ(cuts[i].author_seq, i + 1);
+    EXPECT_GE(cuts[i].path.size(), 2u);
+    if (i > 0) {
+      EXPECT_EQ(cuts[i].path.front(), cuts[i - 1].path.back()) << i;
+    }
+  }
+}
+
+// The force does not depend on how late patches and confirmations come.
+TEST(DrillingBlock, LatePatchesDoNotChangeTheForce) {
+  PlanStep step = drill_step(HandKind::expert);
+  double plunge[2], force[2];
+  int i = 0;
+  for (const BenchDelays& delays : {BenchDelays{2, 2}, BenchDelays{60, 250}}) {
+    Bench bench(block_case(), {step}, {}, 0.0, delays);
+    Layers layers;
+    bench.run([&](const SessionTick& tick) { layers.see(tick); });
+    plunge[i] = bench.session().surgeon().results()[0].plunge_mm;
+    force[i++] = layers.force[1].value();
+  }
+  EXPECT_NEAR(plunge[0], plunge[1], 0.1);
+  EXPECT_NEAR(force[0], force[1], 0.02 * force[0]);
+}
+
+TEST(HapticLoop, DoesNotAllocate) {
+  PlanStep step = drill_step(HandKind::expert);
+  Bench bench(block_case(), {step});
+  std::int64_t allocations = 0;
+  int cutting = 0;
+  for (int i = 0; i < 6000; ++i) {
+    const osteon::test::AllocationCounter heap;
+    const SessionTick tick = bench.tick();
+    allocations += heap.count();
+    cutting += tick.report.phase == CuttingPhase::cutting;
+    bench.follow();
+  }
+  EXPECT_EQ(allocations, 0);
+  EXPECT_GT(cutting, 1000);
+}
+
+}  // namespace
+}  // namespace osteon::haptic::test

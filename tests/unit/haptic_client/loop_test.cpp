@@ -1,0 +1,272 @@
+// The loop's duties towards hand and bone: clutch, limits, walls, lost links, rejected cuts, workspace.
+#include "haptic_client/control/haptic_loop.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "common/volume/cut_field.hpp"
+#include "haptic_client/control/patch_builder.hpp"
+#include "tests/unit/haptic_client/bench.hpp"
+
+namespace osteon::haptic::test {
+namespace {
+
+// A drill held over the middle of the block's face, device and bone frames alike, the handle's place being the tip's.
+class LoopOnBlock : public ::testing::Test {
+ protected:
+  explicit LoopOnBlock(const char* tool = "drill-3.2", const Vec3& start = {0, 0, -1}) : field_(bone_, BodyId{}) {
+    ToolModel model(*find_tool(tool), bone_.pitch_mm());
+    loop_ = std::make_unique<HapticLoop>(LoopParams{}, std::vector<ToolModel>{model});
+    loop_->take_up(0, {start, Eigen::Quaterniond::Identity()}, WorkspaceMapping{});
+    input_.pose_device_tool.position_mm = start;
+    builder_.build(field_, loop_->tool(0), {start, Eigen::Quaterniond::Identity()}, patch_);
+  }
+  LoopReport tick() { return loop_->tick(input_, patch_); }
+  // Moves the handle in small steps.
+  LoopReport move_to(const Vec3& to, int ticks = 100) {
+    const Vec3 from = input_.pose_device_tool.position_mm;
+    LoopReport report;
+    for (int i = 1; i <= ticks; ++i) {
+      input_.pose_device_tool.position_mm = from + (to - from) * i / ticks;
+      report = tick();
+    }
+    return report;
+  }
+
+  Case bone_ = block_case();
+  CutField field_;
+  std::unique_ptr<HapticLoop> loop_;
+  PatchBuilder builder_;
+  Patch patch_;
+  LoopInput input_;
+};
+
+TEST_F(LoopOnBlock, FreeAirHasNoForce) {
+  const LoopReport report = move_to({0, 0, -0.2});
+  EXPECT_EQ(report.force_device_n.norm(), 0.0);
+  EXPECT_NEAR(report.pose_bone_proxy.position_mm.z(), -0.2, 1e-9);
+  EXPECT_EQ(report.phase, CuttingPhase::idle);
+}
+
+// Spindle off: the tip stays on the surface and the coupling's spring pushes back, K_c times the penetration.
+TEST_F(LoopOnBlock, ASpringWallWhereNothingTurns) {
+  LoopReport report = move_to({0, 0, 0.3});
+  for (int i = 0; i < 20; ++i) report = tick();
+  EXPECT_NEAR(report.pose_bone_proxy.position_mm.z(), 0.0, 0.08);
+  const double extension = 0.3 - report.pose_bone_proxy.position_mm.z();
+  EXPECT_NEAR(-report.force_physical_n.z(), 50.0 * extension, 1e-6);
+  EXPECT_NEAR(report.force_device_n.z(), report.force_physical_n.z(), 1e-6);  // s = 1, nothing moves
+  EXPECT_EQ(report.phase, CuttingPhase::rubbing);
+  EXPECT_EQ(loop_->cuts_closed(), 0u);
+}
+
+TEST_F(LoopOnBlock, ForceIsClampedToTheDevice) {
+  LoopReport report = move_to({0, 0, 5.0}, 400);
+  EXPECT_NEAR(report.force_device_n.norm(), 60.0, 1e-9);
+  EXPECT_TRUE(report.events & kForceLimited);
+  input_.device_warm = true;
+  report = tick();
+  EXPECT_NEAR(report.force_device_n.norm(), 30.0, 1e-9);
+}
+
+TEST_F(LoopOnBlock, TheClutchIsForcelessAndMovesNothing) {
+  move_to({0, 0, 0.3});
+  const Vec3 held = tick().pose_bone_proxy.position_mm;
+  input_.clutch = true;
+  for (int i = 0; i < 50; ++i) {
+    input_.pose_device_tool.position_mm += Vec3(0.5, -0.3, 0.4);
+    const LoopReport report = tick();
+    EXPECT_EQ(report.force_device_n.norm(), 0.0);
+    EXPECT_EQ(report.pose_bone_proxy.position_mm, held);
+  }
+  // Letting go elsewhere in the workspace goes on from where the tool is, without a jump in force.
+  input_.clutch = false;
+  const LoopReport report = tick();
+  EXPECT_NEAR((report.pose_bone_proxy.position_mm - held).norm(), 0.0, 1e-9);
+  EXPECT_NEAR(report.force_device_n.norm(), 0.0, 1e-9);
+}
+
+TEST_F(LoopOnBlock, SafetyZerosComeAtOnce) {
+  for (int fault = 0; fault < 4; ++fault) {
+    input_ = {};
+    input_.pose_device_tool.position_mm = {0, 0, 0.3};
+    for (int i = 0; i < 100; ++i) tick();
+    ASSERT_GT(tick().force_device_n.norm(), 10.0);
+    if (fault == 0) input_.device_ok = false;
+    if (fault == 1) input_.link_ok = false;
+    if (fault == 2) input_.periods = 4;
+    Patch nothing;
+    const LoopReport report = fault == 3 ? loop_->tick(input_, nothing) : tick();
+    EXPECT_EQ(report.force_device_n.norm(), 0.0) << fault;
+  }
+}
+
+// What the hand did not cause may only grow by 0.5 N a millisecond.
+TEST_F(LoopOnBlock, ForceReturnsGradually) {
+  move_to({0, 0, 0.5});
+  const double full = tick().force_device_n.norm();
+  ASSERT_GT(full, 15.0);
+  input_.link_ok = false;
+  tick();
+  input_.link_ok = true;
+  double before = 0.0;
+  for (int i = 0; i < 100; ++i) {
+    const double now = tick().force_device_n.norm();
+    EXPECT_LE(now, before + 0.5 + 1e-9);
+    before = now;
+  }
+  EXPECT_NEAR(before, full, 1e-6);
+}
+
+TEST_F(LoopOnBlock, WithoutALinkTheSpindleRunsDown) {
+  input_.spindle_rpm = 1000;
+  for (int i = 0; i < 400; ++i) tick();
+  EXPECT_EQ(tick().spindle_rpm, 1000.0);
+  input_.link_ok = false;
+  for (int i = 0; i < 400; ++i) tick();
+  EXPECT_EQ(tick().spindle_rpm, 0.0);
+}
+
+// A drill in its own hole has no play to speak of sideways, does not jam along it, and feels nothing where it has cut.
+TEST(DrillInItsHole, IsHeldSidewaysAndFreeAlongTheAxis) {
+  PlanStep step;
+  step.action = Action::drill;
+  step.tool = "drill-3.2";
+  step.hand = HandKind::rig;
+  step.feed_mm_per_s = 5;
+  step.beyond_mm = -20;  // stops 10 mm deep
+  step.entry.point_mm = Vec3(0, 0, 0);
+  step.entry.axis = Vec3(0, 0, 1);
+  Bench bench(block_case(), {step});
+  double force_on_the_way_out = 0, deepest = 0;
+  bench.run([&](const SessionTick& tick) {
+    deepest = std::max(deepest, tick.report.pose_bone_proxy.position_mm.z());
+    if (tick.order.phase == SurgeonPhase::retract && tick.report.pose_bone_proxy.position_mm.z() < deepest - 1.0)
+      force_on_the_way_out = std::max(force_on_the_way_out, tick.report.force_physical_n.norm());
+  });
+  EXPECT_NEAR(deepest, 10.0, 0.3);  // the rig turns back while the coupling is still stretched
+  EXPECT_EQ(force_on_the_way_out, 0.0);
+
+  // Put back into the hole by hand, spindle off.
+  HapticLoop loop(LoopParams{}, {ToolModel(*find_tool("drill-3.2"), 0.5)});
+  Patch patch;
+  PatchBuilder builder;
+  const Pose inside{{0, 0, 6}, Eigen::Quaterniond::Identity()};
+  builder.build(bench.replica().committed(), loop.tool(0), inside, patch);
+  loop.take_up(0, inside, WorkspaceMapping{});
+  LoopInput input;
+  input.pose_device_tool = inside;
+  LoopReport report;
+  for (int i = 0; i < 100; ++i) {
+    input.pose_device_tool.position_mm.x() = 0.003 * i;
+    report = loop.tick(input, patch);
+  }
+  EXPECT_LT(report.pose_bone_proxy.position_mm.x(), 0.13);
+  EXPECT_LT(report.force_physical_n.x(), -5.0);
+  input.pose_device_tool.position_mm = {0, 0, 6};
+  for (int i = 0; i < 100; ++i) {
+    input.pose_device_tool.position_mm.z() = 6 + 0.03 * i;
+    report = loop.tick(input, patch);
+  }
+  EXPECT_NEAR(report.pose_bone_proxy.position_mm.z(), 8.97, 1e-6);
+  EXPECT_EQ(report.force_physical_n.norm(), 0.0);
+}
+
+TEST(Burr, TakesAWindowToItsDepth) {
+  PlanStep step;
+  step.action = Action::burr;
+  step.tool = "burr-round-5";
+  step.window_u_mm = 8;
+  step.window_v_mm = 7;
+  step.depth_mm = 1.5;
+  step.entry.point_mm = Vec3(0, 0, 0);
+  step.entry.axis = Vec3(0, 0, 1);
+  Bench bench(block_case(16.0), {step});
+  double force_max = 0, work_min = 0;
+  bool cutting = false;
+  bench.run([&](const SessionTick& tick) {
+    force_max = std::max(force_max, tick.report.force_physical_n.norm());
+    work_min = std::min(work_min, tick.report.cutting_force_n.dot(tick.report.moved_mm));
+    cutting |= tick.report.phase == CuttingPhase::cutting;
+  });
+  ASSERT_TRUE(bench.session().done());
+  EXPECT_TRUE(cutting);
+  EXPECT_GE(work_min, 0.0);
+  EXPECT_GT(force_max, 0.2);
+  EXPECT_LT(force_max, 20.0);
+  const CutField& bone = bench.replica().predicted();
+  EXPECT_GT(bone.solid_mm({0, 0, 1.0}), 0.0);   // taken away
+  EXPECT_LT(bone.solid_mm({0, 0, 2.0}), 0.0);   // left
+  EXPECT_LT(bone.solid_mm({6.0, 0, 0.3}), 0.0);  // outside the window
+  // Closed form of a sphere swept over a rectangle: cap, half segments along the edges, slab. The hand gives way a
+  // little, so less comes off.
+  const double r = 2.5, d = 1.5, a = 8 - 5, b = 7 - 5;
+  const double cap = std::numbers::pi * d * d * (3 * r - d) / 3;
+  const double segment = r * r * std::acos(1 - d / r) - (r - d) * std::sqrt(2 * r * d - d * d);
+  const double whole = cap + segment * (a + b) + d * a * b;
+  EXPECT_GT(bone.removed_mm3(), 0.8 * whole);
+  EXPECT_LT(bone.removed_mm3(), 1.02 * whole);
+}
+
+TEST(Replica, ARejectedCutComesBack) {
+  const Case bone = block_case();
+  Replica replica(bone, BodyId{});
+  const Tool tool = *find_tool("drill-3.2");
+  const auto cut_at = [&](std::uint64_t seq, double x) {
+    Cut cut;
+    cut.author = AuthorId{1};
+    cut.author_seq = seq;
+    cut.shape = tool.cut_shape();
+    cut.level = tool.cut_level;
+    cut.path = {quantise(pose_along({x, 0, 0}, Vec3::UnitZ())), quantise(pose_along({x, 0, 3}, Vec3::UnitZ()))};
+    return cut;
+  };
+  replica.add_own(cut_at(1, -3));
+  replica.add_own(cut_at(2, 3));
+  EXPECT_GT(replica.predicted().solid_mm({3, 0, 1}), 0.0);
+  EXPECT_LT(replica.committed().solid_mm({3, 0, 1}), 0.0);
+  (void)replica.take_changes();
+  replica.commit(RoomSeq{1}, cut_at(1, -3), true);
+  replica.reject(RoomSeq{2}, 2);
+  EXPECT_LT(replica.predicted().solid_mm({3, 0, 1}), 0.0);
+  EXPECT_GT(replica.predicted().solid_mm({-3, 0, 1}), 0.0);
+  EXPECT_FALSE(replica.take_changes().empty());
+  EXPECT_EQ(replica.unconfirmed(), 0u);
+  EXPECT_EQ(replica.predicted().hash(), replica.committed().hash());
+}
+
+TEST(WorkspaceMapping, ReachesFarWithTheClutch) {
+  WorkspaceMapping mapping;
+  const Eigen::Quaterniond view(Eigen::AngleAxisd(0.7, Vec3(1, 2, -1).normalized()));
+  mapping.align(view, 2.0, {5, 0, 0}, {100, 50, 20});
+  const Pose handle{{10, 3, -4}, Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Vec3::UnitY()))};
+  const Pose tool = mapping.pose_bone_tool(handle);
+  // Round trip, scale and directions.
+  EXPECT_NEAR((mapping.pose_device_tool(tool).position_mm - handle.position_mm).norm(), 0.0, 1e-12);
+  EXPECT_NEAR((tool.position_mm - Vec3(100, 50, 20)).norm(), 2.0 * (handle.position_mm - Vec3(5, 0, 0)).norm(), 1e-12);
+  EXPECT_NEAR((mapping.to_bone(mapping.to_device(Vec3(1, 2, 3))) - Vec3(1, 2, 3)).norm(), 0.0, 1e-12);
+  // Re-anchoring keeps the tool where it is.
+  mapping.anchor({0, 0, 0}, tool.position_mm);
+  EXPECT_NEAR((mapping.pose_bone_tool({Vec3::Zero(), handle.rotation}).position_mm - tool.position_mm).norm(), 0.0, 1e-12);
+}
+
+TEST(CutRecorder, KeepsACornerAndDropsWhatIsStraight) {
+  CutRecorder recorder;
+  recorder.begin({}, 5.0);
+  for (int i = 1; i <= 4; ++i) recorder.add({{0.05 * i, 0, 0}, Eigen::Quaterniond::Identity()});
+  for (int i = 1; i <= 4; ++i) recorder.add({{0.2, 0.05 * i, 0}, Eigen::Quaterniond::Identity()});
+  EXPECT_TRUE(recorder.due());
+  CutPiece piece;
+  ASSERT_TRUE(recorder.close(piece));
+  ASSERT_EQ(piece.knots, 3);
+  EXPECT_EQ(piece.path[1], quantise({{0.2, 0, 0}, Eigen::Quaterniond::Identity()}));
+  EXPECT_EQ(piece.path[2], quantise({{0.2, 0.2, 0}, Eigen::Quaterniond::Identity()}));
+  // Standing still closes nothing.
+  recorder.add({{0.2, 0.2, 0}, Eigen::Quaterniond::Identity()});
+  EXPECT_FALSE(recorder.close(piece));
+}
+
+}  // namespace
+}  // namespace osteon::haptic::test
