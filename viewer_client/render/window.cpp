@@ -58,7 +58,7 @@ constexpr double kGhostOpacity = 0.28;
 
 // Soft shadows in hollows, for saved pictures: of hollows up to this size.
 constexpr double kShadowRadius_mm = 6.0;
-constexpr int kShadowSamples = 96;
+constexpr int kShadowSamples = 48;
 
 vtkSmartPointer<vtkFloatArray> vectors(const std::vector<std::array<float, 3>>& from) {
   auto to = vtkSmartPointer<vtkFloatArray>::New();
