@@ -262,11 +262,17 @@ Result<void> read_pixels(const Header& h, std::int16_t* out) {
   const std::size_t pixels = static_cast<std::size_t>(h.columns) * static_cast<std::size_t>(h.rows);
   const std::size_t width = image.GetPixelFormat().GetBitsAllocated() / 8u;
   if ((width != 1 && width != 2) || image.GetBufferLength() != pixels * width) return broken("has pixel data of another size than its header says");
+  // Some scanners write metal beyond the range that BitsStored promises. The library would cut those bits off and so
+  // turn metal into air; plain pixels are therefore taken as they lie in the file.
   std::vector<char> buffer(image.GetBufferLength());
-  if (!image.GetBuffer(buffer.data())) return broken("has pixel data that cannot be decompressed");
+  const gdcm::TransferSyntax syntax = reader.GetFile().GetHeader().GetDataSetTransferSyntax();
+  const gdcm::ByteValue* bytes = image.GetDataElement().GetByteValue();
+  const bool plain = (syntax == gdcm::TransferSyntax::ImplicitVRLittleEndian || syntax == gdcm::TransferSyntax::ExplicitVRLittleEndian) &&
+                     image.GetNumberOfOverlays() == 0 && bytes != nullptr && bytes->GetLength() >= buffer.size();
+  if (plain) std::memcpy(buffer.data(), bytes->GetPointer(), buffer.size());
+  else if (!image.GetBuffer(buffer.data())) return broken("has pixel data that cannot be decompressed");
 
-  // Signed values may lack their sign in the bits above the stored ones. Unsigned ones keep those bits: some scanners
-  // write metal beyond the range that BitsStored promises, and the library has taken out declared overlays.
+  // Signed values may lack their sign in the bits above the stored ones.
   const bool is_signed = image.GetPixelFormat().GetPixelRepresentation() == 1;
   const int unused = is_signed ? 16 - static_cast<int>(image.GetPixelFormat().GetBitsStored()) : 0;
   for (std::size_t i = 0; i < pixels; ++i) {
