@@ -26,8 +26,9 @@ class TheTree(unittest.TestCase):
 
     def test_every_file_is_built(self):
         def check(path, _text):
-            cmake = (ROOT / path).parent / "CMakeLists.txt"
-            return tree.declaration_faults(path, cmake.read_text() if cmake.exists() else "")
+            cmake, source = (ROOT / path).parent / "CMakeLists.txt", (ROOT / path).with_suffix(".cpp")
+            return tree.declaration_faults(path, cmake.read_text() if cmake.exists() else "",
+                                           source.read_text() if source.exists() else None)
         self.assertEqual(self.all_faults(check), [])
 
 
@@ -76,6 +77,9 @@ class TheRules(unittest.TestCase):
     def test_an_unlisted_file_is_noticed(self):
         self.assertTrue(tree.declaration_faults("common/core/check.hpp", "SOURCES precheck.hpp check.cpp"))
         self.assertFalse(tree.declaration_faults("common/core/check.hpp", "HEADERS check.hpp)"))
+        first = '#include "server/app/x.hpp"\n#include <vector>\n'
+        self.assertFalse(tree.declaration_faults("server/app/x.hpp", "", first))
+        self.assertTrue(tree.declaration_faults("server/app/x.hpp", "", "#include <vector>\n" + first))
 
 
 if __name__ == "__main__":

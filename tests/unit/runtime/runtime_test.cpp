@@ -73,8 +73,8 @@ TEST(DurationHistogram, PercentilesAreRightToThreePerCent) {
 
 TEST(PeriodicTimer, NeverTicksEarlyAndCountsWhatItMissed) {
   TickStats stats;
-  PeriodicTimer timer(2ms);
   const auto start = std::chrono::steady_clock::now();
+  PeriodicTimer timer(2ms);
   int periods = 0;
   for (int i = 0; i < 20; ++i) {
     periods += timer.wait(stats);
