@@ -135,11 +135,11 @@ class Client {
     constexpr int kRunDownTicks = 500;  // after the link is lost
     int down = 0;
     while (!session_.done() && !stop_.requested() && down < kRunDownTicks) {
-      const int periods = timer.wait(outcome_.ticks);
+      timer.wait(outcome_.ticks);
       const bool link_ok = link_ok_.load(std::memory_order_relaxed);
       if (!link_ok) ++down;
       patches_.refresh();
-      const SessionTick now = session_.tick(patches_.value(), link_ok, periods);
+      const SessionTick now = session_.tick(patches_.value(), link_ok);
 
       const std::int64_t woke_ns = ns(timer.woke());
       tick_times_[now.report.state_seq % kTickTimes].store(woke_ns, std::memory_order_relaxed);
@@ -232,12 +232,19 @@ class Client {
   void take(const Committed& committed) {
     const bool own = committed.cut.author == room_.room().author;
     if (own) confirm(committed.cut.author_seq, committed.place);
+    if (own) rejected_in_a_row_ = 0;
     replica_.commit(committed.place, committed.cut, own);
   }
   void take(const Rejected& rejected) {
     confirm(rejected.author_seq, RoomSeq{});
     replica_.reject(rejected.place, rejected.author_seq);
-    log::warn("cut rejected", {{"author_seq", rejected.author_seq}, {"reason", rejected.reason}});
+    // One now and then gives its bone back; a room that takes none makes further work pointless.
+    constexpr int kMostInARow = 20;
+    if (rejected_in_a_row_++ == 0) log::warn("cut rejected", {{"author_seq", rejected.author_seq}, {"reason", rejected.reason}});
+    if (rejected_in_a_row_ != kMostInARow) return;
+    const std::lock_guard lock(mutex_);
+    lost_why_ = Error{ErrorCode::unsupported, "the server rejects every cut: " + rejected.reason};
+    link_ok_ = false;
   }
 
   void build_patch() {
@@ -347,6 +354,7 @@ class Client {
   std::deque<Cut> unsent_;
   Pose built_at_;
   int built_tool_ = -1;
+  int rejected_in_a_row_ = 0;
   std::size_t noted_steps_ = 0;
   double noted_mm3_ = 0;
   DurationHistogram patch_times_;

@@ -74,33 +74,33 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch) noexcept
                  : spindle_.rpm > 1.0  ? CuttingPhase::free
                                        : CuttingPhase::idle;
 
-  const bool silent = !step.contact || !step.covered || input.clutch || !input.device_ok || !input.link_ok || input.periods > 3;
+  // Physical: the coupling's spring, as far as the device could ever show it.
+  const double s = params_.force_scale;
+  const double limit_n = input.device_warm ? params_.continuous_n : params_.peak_n;
+  const bool touching = step.contact && step.covered && !input.clutch;
   const Vec3 extension_mm = pose_bone_device.position_mm - proxy_.pose().position_mm;
-  if (silent) {
-    // Safety zeros and free air come at once.
+  if (touching) report.force_physical_n = -params_.stiffness_n_per_mm * extension_mm;
+  if (s * report.force_physical_n.norm() > limit_n) {
+    report.force_physical_n *= limit_n / (s * report.force_physical_n.norm());
+    report.events |= kForceLimited;
+  }
+
+  // Safety zeros and free air come at once.
+  if (touching && input.device_ok && input.link_ok && input.periods <= 3) {
+    force_bone_n_ = rendered_force(extension_mm, limit_n, input.periods, report);
+  } else {
     force_bone_n_.setZero();
     extension_mm_ = extension_mm;
-  } else {
-    force_bone_n_ = rendered_force(extension_mm, input, report);
   }
   device_mm_ = pose_bone_device.position_mm;
   report.force_device_n = mapping_.to_device(force_bone_n_);
   return report;
 }
 
-Vec3 HapticLoop::rendered_force(const Vec3& extension_mm, const LoopInput& input, LoopReport& report) noexcept {
+Vec3 HapticLoop::rendered_force(const Vec3& extension_mm, double limit_n, int periods, LoopReport& report) noexcept {
   const double s = params_.force_scale;
-  const double limit_n = input.device_warm ? params_.continuous_n : params_.peak_n;
-
-  // Physical: the coupling's spring, as far as the device could ever show it.
-  Vec3 spring_n = -params_.stiffness_n_per_mm * extension_mm;
-  if (s * spring_n.norm() > limit_n) {
-    spring_n *= limit_n / (s * spring_n.norm());
-    report.events |= kForceLimited;
-  }
-  report.force_physical_n = spring_n;
-
-  // Rendered: with the damping k_c·T that a sampled spring needs, never more than the spring, so that it cannot pull.
+  const Vec3& spring_n = report.force_physical_n;
+  // With the damping k_c·T that a sampled spring needs, never more than the spring, so that it cannot pull.
   const Vec3 rate_mm_per_s = (extension_mm - extension_mm_) / params_.dt_s;
   extension_mm_ = extension_mm;
   Vec3 damping_n = -params_.stiffness_n_per_mm * params_.dt_s * rate_mm_per_s;
@@ -112,7 +112,7 @@ Vec3 HapticLoop::rendered_force(const Vec3& extension_mm, const LoopInput& input
   const double before_n = force_bone_n_.norm();
   const double hand_mm = (extension_mm + proxy_.pose().position_mm - device_mm_).norm();
   const double by_hand_n = 2.0 * s * params_.stiffness_n_per_mm * hand_mm;  // spring and damping
-  const double most_n = before_n + by_hand_n + params_.slew_n_per_ms * 1e3 * params_.dt_s * input.periods;
+  const double most_n = before_n + by_hand_n + params_.slew_n_per_ms * 1e3 * params_.dt_s * periods;
   if (force_n.norm() > most_n) {
     force_n *= most_n / force_n.norm();
     report.events |= kSlewLimited;

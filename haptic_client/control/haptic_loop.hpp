@@ -80,7 +80,7 @@ class HapticLoop {
 
  private:
   void record(const ToolModel& model, bool near_bone, LoopReport& report) noexcept;
-  [[nodiscard]] Vec3 rendered_force(const Vec3& extension_mm, const LoopInput& input, LoopReport& report) noexcept;
+  [[nodiscard]] Vec3 rendered_force(const Vec3& extension_mm, double limit_n, int periods, LoopReport& report) noexcept;
 
   static constexpr int kQuietTicks = 20;  // a path ends when the tool has been off the bone for so long
 

@@ -8,7 +8,7 @@ SimulatedSession::SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& 
       loop_(loop_params(device.limits.peak_n, device.limits.continuous_n, device.limits.stiffness_n_per_mm, force_scale),
             surgeon_.plan().tools) {}
 
-SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok, int periods) noexcept {
+SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok) noexcept {
   const double dt_s = loop_.params().dt_s;
   SessionTick result;
   result.order = surgeon_.act(last_, dt_s);
@@ -39,7 +39,6 @@ SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok, int periods
   input.device_ok = reading.status != DeviceStatus::fault;
   input.device_warm = reading.status == DeviceStatus::warm;
   input.link_ok = link_ok;
-  input.periods = periods;
   result.report = last_ = loop_.tick(input, patch);
   device_.write(result.report.force_device_n);
   return result;

@@ -14,8 +14,9 @@ class SimulatedSession {
  public:
   SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale);
 
-  // [haptic] `link_ok` false ends force and spindle; `periods` as in LoopInput.
-  SessionTick tick(const Patch& patch, bool link_ok, int periods) noexcept;
+  // [haptic] `link_ok` false ends force and spindle. The simulated hand lives on these ticks: while none comes, as when
+  // the machine stalls, no time passes for it.
+  SessionTick tick(const Patch& patch, bool link_ok) noexcept;
   [[nodiscard]] bool done() const noexcept { return surgeon_.done(); }
 
   [[nodiscard]] HapticLoop& loop() noexcept { return loop_; }

@@ -43,7 +43,7 @@ Bench::Bench(const Case& bone, const std::vector<PlanStep>& plan, const Simulate
     : delays_(delays), session_(ready(plan, bone), device, force_scale), replica_(bone, BodyId{}) {}
 
 SessionTick Bench::tick() {
-  last_ = session_.tick(patch_, true, 1);
+  last_ = session_.tick(patch_, true);
   ++ticks_;
   return last_;
 }
