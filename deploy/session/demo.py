@@ -13,7 +13,7 @@ import plots
 import record
 import report
 from processes import Failure
-from session import ROOT, Session
+from session import ROOT, Session, save
 
 EXAMPLE = "usr/share/doc/invesalius-examples/examples/Cranium.inv3"
 
@@ -111,6 +111,7 @@ def main():
         session = record.read_table(out / "session.csv")
         plots.force_and_depth(session, out / "force_depth.png")
         numbers["sound"] = plots.spectrogram(out / "sound.wav", out / "spectrogram.png")
+        save(numbers, out)
         report.write(out, numbers, numbers["case"].get("title") or case.name)
     except Failure as failure:
         print(f"deploy/demo: {failure}", *([failure.detail] if failure.detail else []), sep="\n", file=sys.stderr)
@@ -119,7 +120,11 @@ def main():
         print("deploy/demo: stopped; every program has been ended", file=sys.stderr)
         return 130
     summarise(numbers, out, time.monotonic() - started)
-    return 0 if numbers["agreement"]["field_hash_equal"] else 1
+    return 0 if same_bone(numbers) else 1
+
+
+def same_bone(numbers):
+    return numbers["agreement"]["field_hash_equal"] and numbers["agreement"]["mesh_differences"] == 0
 
 
 def summarise(numbers, out, seconds):
@@ -130,8 +135,8 @@ def summarise(numbers, out, seconds):
     for key, (name, _) in report.LATENCIES.items():
         if latency.get(key, {}).get("count"):
             say(f"{name}: median {latency[key]['p50']:.1f} ms, 99 % {latency[key]['p99']:.1f} ms")
-    equal = numbers["agreement"]["field_hash_equal"]
-    say(f"The bone in server and haptic client is {'the same' if equal else 'NOT the same'} at the end.")
+    say("Server, haptic client and viewer hold " + ("the same bone" if same_bone(numbers) else "DIFFERENT bones") +
+        " at the end.")
     say(f"Session of {seconds:.0f} s. Report: {out / 'report.html'}")
 
 

@@ -113,15 +113,17 @@ def write(folder: Path, numbers, title):
     """Writes report.html into the session's folder; pictures are inside the page, the sound lies beside it."""
     latency, agreement = numbers["latency_ms"], numbers["agreement"]
     removed = numbers["programs"]["server"].get("removed_mm3")
-    same = "identical" if agreement["field_hash_equal"] else "NOT identical"
+    same = "identical" if agreement["field_hash_equal"] and not agreement["mesh_differences"] else "NOT identical"
     facts = [
         fact(f"{removed:.0f} mm³" if isinstance(removed, (int, float)) else "–", "bone removed"),
         fact(f"{max((step['peak_force_n'] for step in cutting_steps(numbers)), default=0):.1f} N", "largest force of the bone on a tool"),
         fact(ms(latency.get("cut_to_picture", {}).get("p50")), "from a cut to its picture (median)"),
         fact(ms(latency.get("cut_to_sound", {}).get("p50")), "from the cutting to its sound (median)"),
-        fact(same, "bone in server and haptic client at the end (hash)"),
+        fact(same, "bone in server, haptic client and viewer at the end (hashes)"),
     ]
     machine = numbers["machine"]
+    virtual = numbers["picture"].startswith("a virtual screen")
+    drawn_by = "; drawing it without a graphics card takes most of the time from cut to picture" if virtual else ""
     page = f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
 <title>{text(title)} – Osteon session</title><style>{STYLE}</style></head><body><main>
@@ -161,8 +163,8 @@ colour follow how much bone of what density is being cut.</p>
 
 <h2>How quickly everyone learns of a cut</h2>
 <table><tr><th>latency</th><th class=n>median</th><th class=n>99 %</th><th class=n>events</th></tr>{latency_rows(numbers)}</table>
-<p class=lead>Measured on {text(machine['processor'])}, {machine['cores']} cores, with all programs{
-', the software renderer' if numbers.get('virtual_screen') else ''} and this report's recording on the same machine.</p>
+<p class=lead>Measured on {text(machine['processor'])}, {machine['cores']} cores, with all programs on it.
+Picture: {text(numbers['picture'])}{drawn_by}.</p>
 
 <h2>Everything else</h2>
 <p>Field hash of the server: <code>{text((agreement['field_hash_server'] or '–')[:16])}…</code>, of the haptic client:

@@ -61,8 +61,8 @@ class Session:
         plan_file.write_text(json.dumps(self.plan, indent=2) + "\n", encoding="utf-8")
         with Household(self.out / "logs") as household:
             self.household = household
-            self.screen, where = start_screen(household, self.size)
-            self.say(f"Picture: {where}.")
+            self.screen, self.picture = start_screen(household, self.size)
+            self.say(f"Picture: {self.picture}.")
             address = self._start_server()
             viewer = self._start_viewer(address, "osteon-viewer", "--frame-log", self.out / "frames.csv",
                                         "--summary", self.out / "viewer.json")
@@ -187,6 +187,7 @@ class Session:
         numbers = {
             "device": "simulated",
             "machine": record.machine(),
+            "picture": self.picture,
             "case": self.info,
             "seconds_of_work": round(self.worked_s, 1),
             "latency_ms": record.latencies(self.out),
@@ -196,8 +197,12 @@ class Session:
             "plan": self.plan,
         }
         numbers["agreement"] = agreement(numbers)
-        (self.out / "session.json").write_text(json.dumps(numbers, indent=2) + "\n", encoding="utf-8")
+        save(numbers, self.out)
         return numbers
+
+
+def save(numbers, folder):
+    (folder / "session.json").write_text(json.dumps(numbers, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 def unit(vector):
