@@ -2,6 +2,7 @@
 import argparse
 import json
 import math
+import os
 import re
 import shutil
 import signal
@@ -49,11 +50,12 @@ def commit():
     return (git("rev-parse", "--short=12", "HEAD") or "unknown") + changed
 
 
-def results(figures, values, soak, machine):
+def results(figures, values, soak, machine, load):
     """What is committed under tests/perf/results: numbers with the commit and the conditions."""
     return {
         "commit": commit(), "date": datetime.now(timezone.utc).strftime("%Y-%m-%d"), "machine": machine,
         "size": "soak" if soak else "quick", "build": "perf",
+        "load_before": round(load, 2),  # processes that wanted a processor in the minute before
         "figures": {f.name: {"value": rounded(values[f.name][0]), "unit": f.unit, "baseline": rounded(values[f.name][1]),
                              "target": f.target_text(), "verdict": f.verdict(values[f.name][0])} for f in figures},
     }
@@ -115,6 +117,7 @@ def main():
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     run = groups.Run(options.build / "bin", folder, options.soak, lambda text: print(f"# {text}", file=sys.stderr, flush=True))
+    load = os.getloadavg()[0]
     try:
         values = measure(figures, run, groups.GROUPS)
     except groups.Failure as failure:
@@ -123,7 +126,7 @@ def main():
     except KeyboardInterrupt:
         print("deploy/figures: stopped; every program has been ended", file=sys.stderr)
         return 130
-    outcome = results(figures, values, options.soak, groups.record.machine())
+    outcome = results(figures, values, options.soak, groups.record.machine(), load)
     if options.save:
         results_file(outcome["machine"]).write_text(json.dumps(outcome, indent=2) + "\n", encoding="utf-8")
     if options.json:

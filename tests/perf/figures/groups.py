@@ -141,10 +141,10 @@ def rig_physics(folder, numbers):
     cylinder = np.pi * DRILL_RADIUS_MM ** 2 * THICKNESS_MM
     return {
         "rig_force_cortical_error": (
-            max(error_percent(measured[layer], cortical) for layer in ("near cortex", "far cortex")), cortical),
-        "rig_force_medullary_error": (error_percent(measured["medulla"], medullary), medullary),
+            max(error_percent(measured[layer], cortical) for layer in ("near cortex", "far cortex")), None),
+        "rig_force_medullary_error": (error_percent(measured["medulla"], medullary), None),
         "rig_force_after_exit": (float(np.max(np.abs(force[gone]))) if gone.any() else None, None),
-        "rig_removed_volume_error": (error_percent(removed, cylinder), cylinder),
+        "rig_removed_volume_error": (error_percent(removed, cylinder), None),
     }
 
 
@@ -163,7 +163,7 @@ def expert(run):
     return {
         "feed_medullary_over_cortical": (feeds["medulla"] / feeds["near cortex"], REFERENCE_FEED_RATIO),
         "plunge_expert": (plunge, REFERENCE_PLUNGE_MM["expert"]),
-        "plunge_expert_error": (error_percent(plunge, REFERENCE_PLUNGE_MM["expert"]), REFERENCE_PLUNGE_MM["expert"]),
+        "plunge_expert_error": (error_percent(plunge, REFERENCE_PLUNGE_MM["expert"]), None),
     }
 
 
@@ -173,7 +173,7 @@ def novice(run):
         hand(run, "expert")
     return {
         "plunge_novice": (plunge, REFERENCE_PLUNGE_MM["novice"]),
-        "plunge_novice_error": (error_percent(plunge, REFERENCE_PLUNGE_MM["novice"]), REFERENCE_PLUNGE_MM["novice"]),
+        "plunge_novice_error": (error_percent(plunge, REFERENCE_PLUNGE_MM["novice"]), None),
         "plunge_novice_over_expert": (plunge / run.plunges["expert"],
                                       REFERENCE_PLUNGE_MM["novice"] / REFERENCE_PLUNGE_MM["expert"]),
     }
