@@ -192,14 +192,19 @@ void CutField::gather_solid(int level, const CoordBox& box, std::span<float> out
                                          : CoordBox{(1 << (from - level)) * box.min, (1 << (from - level)) * box.max};
     if (!any_cut(cuts, there)) continue;
     gather_at_level(cuts, from, level, box, cut);
-    for (std::size_t i = 0; i < out.size(); ++i) out[i] = std::max(out[i], -cut[i]);
+    // R at its clip says only that no cut is near: there the depth is that of S.
+    const float uncut = cuts.background();
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] = cut[i] < uncut ? std::max(out[i], -cut[i]) : out[i];
   }
 }
 
 double CutField::solid_mm(const Vec3& point_mm) const {
   double f = grids_->bone.surface_mm(point_mm);
-  for (int level = 0; level < kLevels; ++level)
-    f = std::max(f, -grids_->cuts[static_cast<std::size_t>(level)].trilinear(point_mm / level_pitch_mm(grids_->bone.pitch_mm(), level)));
+  for (int level = 0; level < kLevels; ++level) {
+    const SparseVolume& cuts = grids_->cuts[static_cast<std::size_t>(level)];
+    const double r = cuts.trilinear(point_mm / level_pitch_mm(grids_->bone.pitch_mm(), level));
+    if (r < static_cast<double>(cuts.background())) f = std::max(f, -r);
+  }
   return f;
 }
 

@@ -39,7 +39,8 @@ class CutField {
   void gather_cuts(int level, const CoordBox& box, std::span<float> out) const;
   // S of the case on the samples of a level, trilinear between those of level 0.
   void gather_surface(int level, const CoordBox& box, std::span<float> out) const;
-  // f = max(S, −R₀, −R₁, −R₂) on the samples of a level: negative where bone is left, mm.
+  // f = max(S, −R₀, −R₁, −R₂) on the samples of a level: negative where bone is left, mm. Where no cut is within the
+  // band of a level, its R says nothing and f has the depth of S.
   void gather_solid(int level, const CoordBox& box, std::span<float> out) const;
   // f at a point, each grid trilinear.
   [[nodiscard]] double solid_mm(const Vec3& point_mm) const;

@@ -147,11 +147,12 @@ INSTANTIATE_TEST_SUITE_P(
                  c.path.clear();
                  for (int i = 0; i < 60; ++i) c.path.push_back(at({i % 2 ? 0.5 : 0.0, 0, 0}));
                }},
-        Breach{"wide_turn", Rejection::sweep, [](Cut& c) {
+        Breach{"many_turns", Rejection::sweep, [](Cut& c) {
                  const Tool drill = test::tool_named("drill-3.2");
                  c.tool = drill.hash();
                  c.shape = drill.cut_shape();
-                 c.path = {quantise(pose_along({0, 0, 0}, {0, 0, -1})), quantise(pose_along({0, 0, 0}, {1, 0, 0}))};
+                 c.path.clear();
+                 for (int i = 0; i < 20; ++i) c.path.push_back(quantise(pose_along({0, 0, 0}, i % 2 ? Vec3{1, 0, 0} : Vec3{0, 0, -1})));
                }},
         Breach{"spindle", Rejection::spindle, [](Cut& c) { c.spindle_rpm = 1'000'000; }}),
     [](const auto& test_case) { return std::string(test_case.param.name); });

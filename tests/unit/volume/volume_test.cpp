@@ -178,6 +178,20 @@ TEST(CutField, GathersWhatItIsAtEveryPoint) {
   }
 }
 
+TEST(CutField, UncutBoneKeepsItsDepthBesideACut) {
+  CutField field(plain_block(16.0, 8.0, 0.5), {});
+  const Vec3 deep{5.0, 5.0, -2.0};
+  const double before = field.solid_mm(deep);
+  field.apply(straight_cut(*find_tool("drill-3.2"), {0, 0, 1}, {0, 0, -5}, {0, 0, -1}));
+  EXPECT_NEAR(before, -2.0, 1e-3);
+  EXPECT_EQ(field.solid_mm(deep), before);
+  // The same in a box that has cuts elsewhere.
+  const CoordBox box{{0, 0, -4}, {10, 10, -4}};
+  std::vector<float> solid(11 * 11);
+  field.gather_solid(0, box, solid);
+  EXPECT_NEAR(solid.back(), before, 1e-3);
+}
+
 TEST(CutField, CountsVisitedComputedAndModifiedSamples) {
   CutField field(plain_block(16.0, 8.0, 0.5), {});
   const CutReport report = field.apply(some_cuts()[0]);
