@@ -95,7 +95,10 @@ def inside(session, layer):
 
 def loop_figures(run, numbers):
     loop, haptic = run.empty_loop(), numbers["programs"]["haptic"]["loop"]
+    patches = numbers["programs"]["haptic"]["patches"]
     return {
+        "patch_build_p50": (patches["p50_us"], None),
+        "patch_build_p99": (patches["p99_us"], None),
         "haptic_work_p50": (haptic["work_p50_us"], loop["work_p50_us"]),
         "haptic_work_p99": (haptic["work_p99_us"], loop["work_p99_us"]),
         "haptic_late_p50": (haptic["late_p50_us"], loop["late_p50_us"]),

@@ -41,6 +41,8 @@ FIGURES = [
     Figure("haptic_late_p99", "us", "lateness of the haptic loop's ticks, 99th percentile", "rig", baseline=EMPTY_LOOP),
     Figure("haptic_missed_ticks", "per_10000", "ticks that began a whole period late, per 10000", "rig",
            baseline=EMPTY_LOOP),
+    Figure("patch_build_p50", "us", "gathering the bone round the tool for the haptic loop, median", "rig"),
+    Figure("patch_build_p99", "us", "gathering the bone round the tool for the haptic loop, 99th percentile", "rig"),
     # How quickly the others learn of a cut.
     Figure("cut_to_commit_p50", "ms", "from a cut's end until its confirmation, median", "rig"),
     Figure("mesh_update_p50", "ms", "from a cut's end until the viewer has the new surface, median", "rig",
