@@ -16,6 +16,7 @@
 #include "audio_client/output/sound_engine.hpp"
 #include "audio_client/output/wav_recorder.hpp"
 #include "audio_client/synth/sound_scene.hpp"
+#include "common/runtime/command_line.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
 #include "common/runtime/stop_signal.hpp"
@@ -208,13 +209,7 @@ int main(int argc, char** argv) {
   app.add_option("--patience", options.patience_s, "Seconds to wait for the server")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::CallForHelp& help) {
-    return app.exit(help);
-  } catch (const CLI::ParseError& error) {
-    return log::exit_with(kProgram, {ErrorCode::invalid_input, std::string(error.what()) + "; see --help"});
-  }
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
 
   log::open(kProgram);
   const StopSignal stop;

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <string>
 
+#include "common/runtime/command_line.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
 #include "haptic_client/app/client.hpp"
@@ -153,13 +154,7 @@ int main(int argc, char** argv) {
   app.add_option("--cache", options.room.cache, "Folder where fetched cases are kept")->capture_default_str();
   app.add_option("--patience", options.patience_s, "Seconds to wait for the server")->capture_default_str();
   app.add_flag("--status", options.client.status, "A short line on standard output each second");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::CallForHelp& help) {
-    return app.exit(help);
-  } catch (const CLI::ParseError& error) {
-    return log::exit_with(kProgram, {ErrorCode::invalid_input, std::string(error.what()) + "; see --help"});
-  }
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
 
   log::open(kProgram);
   const StopSignal stop;

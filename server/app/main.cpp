@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <string>
 
+#include "common/runtime/command_line.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
 #include "common/runtime/progress.hpp"
@@ -114,13 +115,7 @@ int main(int argc, char** argv) {
   app.add_option("--listen", options.listen, "HOST:PORT on this machine; port 0 lets the system choose")->capture_default_str();
   app.add_option("--address-file", options.address_file, "Written with HOST:PORT when clients may come");
   app.add_option("--summary", options.summary_file, "JSON written at the end: field hash, counts, ticks, latencies");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::CallForHelp& help) {
-    return app.exit(help);
-  } catch (const CLI::ParseError& error) {
-    return log::exit_with(kProgram, {ErrorCode::invalid_input, std::string(error.what()) + "; see --help"});
-  }
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
 
   log::open(kProgram);
   const StopSignal stop;

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "common/runtime/command_line.hpp"
 #include "common/runtime/log.hpp"
 #include "common/runtime/progress.hpp"
 #include "common/runtime/stop_signal.hpp"
@@ -143,12 +144,7 @@ int main(int argc, char** argv) {
   Arguments arguments;
   CLI::App app("Makes a case, the bone that osteon-server loads, from a CT scan or a phantom.", kProgram);
   describe_options(app, arguments);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    return log::exit_with(kProgram, {ErrorCode::invalid_input, std::string(error.what()) + "; see osteon-import --help"});
-  }
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
 
   const StopSignal stop;
   if (app.got_subcommand("info")) {

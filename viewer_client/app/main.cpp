@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "common/runtime/command_line.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
 #include "common/runtime/stop_signal.hpp"
@@ -131,13 +132,7 @@ int main(int argc, char** argv) {
   app.add_option("--patience", arguments.patience_s, "Seconds to wait for the server")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 3600.0));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::CallForHelp& help) {
-    return app.exit(help);
-  } catch (const CLI::ParseError& error) {
-    return log::exit_with(kProgram, {ErrorCode::invalid_input, std::string(error.what()) + "; see --help"});
-  }
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
   log::open(kProgram);
   if (const auto outcome = run(arguments); !outcome) return log::exit_with(kProgram, outcome.error());
   return 0;
