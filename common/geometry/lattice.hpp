@@ -72,11 +72,21 @@ struct Box {
 // Pitch of a level, mm. Halving is exact in binary, so it is the same number everywhere.
 [[nodiscard]] constexpr double level_pitch_mm(double pitch_mm, int level) { return pitch_mm / static_cast<double>(1 << level); }
 
+// No cut is kept finer than this, unless the case itself is.
+inline constexpr double kFinestCut_mm = 0.1;
+// The finest level that cuts of a case with pitch h may go to: 0 when h / 2 is below kFinestCut_mm already.
+[[nodiscard]] constexpr int finest_level(double pitch_mm) {
+  int level = 0;
+  // A tenth of a per cent of room, so that h = 0.4 mm has its level of 0.1 mm whatever the rounding.
+  while (level + 1 < kLevels && level_pitch_mm(pitch_mm, level + 1) >= 0.999 * kFinestCut_mm) ++level;
+  return level;
+}
+
 [[nodiscard]] inline Vec3 position_mm(Coord c, double level_pitch) {
   return {c.x * level_pitch, c.y * level_pitch, c.z * level_pitch};
 }
 
-// The smallest box of samples that contains every sample of the level within `box`, grown by one sample.
+// The smallest box of samples of a lattice that encloses `box`.
 [[nodiscard]] CoordBox covering_samples(const Box& box, double level_pitch);
 
 }  // namespace osteon

@@ -39,5 +39,13 @@ TEST(Lattice, LevelsHalveThePitch) {
   EXPECT_EQ(position_mm({3, -5, 7}, 0.9), position_mm({12, -20, 28}, level_pitch_mm(0.9, 2)));
 }
 
+TEST(Lattice, NoCutIsKeptFinerThanATenthOfAMillimetre) {
+  EXPECT_EQ(finest_level(0.957), 2);
+  EXPECT_EQ(finest_level(0.4), 2);
+  EXPECT_EQ(finest_level(0.25), 1);
+  EXPECT_EQ(finest_level(0.19), 0);
+  EXPECT_EQ(finest_level(0.05), 0);
+}
+
 }  // namespace
 }  // namespace osteon
