@@ -45,9 +45,9 @@ struct BlockPayload {
   friend bool operator==(const BlockPayload&, const BlockPayload&) = default;
 };
 
-// Marching cubes on `solid_mm` (kBlockApron³ samples, z fastest, negative inside), leaving out covered cells;
-// `cut_mm` is the largest −R there (a vertex is on a cut face where it exceeds S). Vertex places are quantised along
-// their edges, so neighbouring blocks meet bit for bit.
+// Marching cubes on `solid_mm` (kBlockApron³ samples, z fastest, negative inside), leaving out covered cells.
+// `surface_mm` is S on the same samples: a vertex below the imported surface lies on a cut face. Vertex places are
+// quantised along their edges, so neighbouring blocks of one level meet bit for bit.
 [[nodiscard]] BlockPayload encode_block(std::span<const float> solid_mm, std::span<const float> surface_mm,
                                         CoveredGroups covered, double level_pitch_mm);
 // Error invalid_input: bytes that no encoder wrote.

@@ -1,6 +1,6 @@
 # How every Osteon target is declared: one library per folder, sources listed, headers in a FILE_SET.
 #
-#   osteon_library(tools SOURCES drill.cpp HEADERS drill.hpp DEPS osteon::geometry PRIVATE_DEPS yaml-cpp)
+#   osteon_library(tools SOURCES drill.cpp HEADERS drill.hpp DEPS osteon::geometry)
 #   osteon_program(osteon-server SOURCES main.cpp DEPS osteon::room)
 #   osteon_test(unit.field SOURCES kernel_test.cpp DEPS osteon::field)
 

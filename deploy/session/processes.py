@@ -1,5 +1,6 @@
 """The programs of a session as children: started, watched, and ended by their own ids; their last words are kept."""
 import collections
+import ctypes
 import os
 import queue
 import signal
@@ -141,7 +142,7 @@ class Household:
 def start_screen(household: Household, size="1280x720"):
     """The environment to draw in: the caller's display, or a virtual one of this session. Says which."""
     environment = dict(os.environ)
-    if environment.get("DISPLAY"):
+    if environment.get("DISPLAY") and display_opens():
         return environment, "a window on your display"
     xvfb = household.start("Xvfb", ["Xvfb", "-displayfd", "1", "-screen", "0", f"{size}x24", "-nolisten", "tcp",
                                     "-noreset"])
@@ -151,13 +152,27 @@ def start_screen(household: Household, size="1280x720"):
     for name in ("WAYLAND_DISPLAY", "XAUTHORITY"):
         environment.pop(name, None)
     environment.update(DISPLAY=f":{number.strip()}", LIBGL_ALWAYS_SOFTWARE="1")
-    return environment, "a virtual screen, since there is no display"
+    return environment, "a virtual screen, since no display opens"
 
 
-def has_sound_card():
-    """Whether sound can be heard here: a running sound server, or a card that one could open."""
-    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
-    if os.environ.get("PULSE_SERVER") or (runtime and Path(runtime, "pulse/native").exists()):
-        return True
-    cards = Path("/proc/asound/cards")
-    return cards.exists() and "no soundcards" not in cards.read_text()
+def display_opens():
+    """Whether the display that DISPLAY names takes us: it may be left over, or refuse."""
+    try:
+        x11 = ctypes.CDLL("libX11.so.6")
+    except OSError:
+        return False
+    x11.XOpenDisplay.restype = ctypes.c_void_p
+    x11.XCloseDisplay.argtypes = [ctypes.c_void_p]
+    display = x11.XOpenDisplay(None)
+    if display:
+        x11.XCloseDisplay(display)
+    return bool(display)
+
+
+def has_sound_server():
+    """Whether sound can be heard here: a PulseAudio server answers, or one starts when asked."""
+    try:
+        return subprocess.run(["pactl", "info"], stdin=subprocess.DEVNULL, capture_output=True, timeout=5,
+                              check=False).returncode == 0
+    except (OSError, subprocess.TimeoutExpired):
+        return False

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import record
-from processes import Failure, Household, has_sound_card, start_screen
+from processes import Failure, Household, has_sound_server, start_screen
 
 ROOT = Path(__file__).resolve().parents[2]
 SURFACE_PATIENCE_S = 120.0
@@ -113,11 +113,11 @@ class Session:
     def _start_audio(self, address):
         command = [self.programs / "osteon-audio", "--server", address, "--wav", self.out / "sound.wav",
                    "--state-log", self.out / "states.csv", "--summary", self.out / "audio.json", "--output", "pulse"]
-        if has_sound_card():
-            self.say("Sound: your sound card.")
+        if has_sound_server():
+            self.say("Sound: your sound server.")
         else:
             command = [ROOT / "deploy/with-null-sink", *command]
-            self.say("Sound: a PulseAudio sink without a card, since there is no sound card; it is recorded.")
+            self.say("Sound: a PulseAudio sink without a card, since no sound server answers; it is recorded.")
         self.household.start("osteon-audio", command)
 
     def _work(self, viewer, address, plan_file):

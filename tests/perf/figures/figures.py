@@ -113,6 +113,9 @@ def main():
 
     import groups  # needs numpy, which --list does not
     signal.signal(signal.SIGTERM, stop)
+    if options.save and commit().endswith("changes"):
+        print("deploy/figures: --save needs all changes committed, so that its numbers can be traced", file=sys.stderr)
+        return 2
     folder = options.build / "figures"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)

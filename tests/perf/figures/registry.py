@@ -39,7 +39,7 @@ FIGURES = [
     Figure("haptic_work_p99", "us", "work of the haptic loop in a tick, 99th percentile", "rig", baseline=EMPTY_LOOP),
     Figure("haptic_late_p50", "us", "lateness of the haptic loop's ticks, median", "rig", baseline=EMPTY_LOOP),
     Figure("haptic_late_p99", "us", "lateness of the haptic loop's ticks, 99th percentile", "rig", baseline=EMPTY_LOOP),
-    Figure("haptic_missed_ticks", "per_10000", "ticks that began a whole period late, per 10000", "rig",
+    Figure("haptic_missed_ticks", "per_10000", "periods that no tick ran in, per 10000 ticks", "rig",
            baseline=EMPTY_LOOP),
     Figure("patch_build_p50", "us", "gathering the bone round the tool for the haptic loop, median", "rig"),
     Figure("patch_build_p99", "us", "gathering the bone round the tool for the haptic loop, 99th percentile", "rig"),
