@@ -11,7 +11,7 @@ namespace osteon {
 Digest field_hash(std::vector<FieldLeaf> leaves, double pitch_mm) {
   std::ranges::sort(leaves, {}, [](const FieldLeaf& leaf) { return std::tuple(leaf.body, leaf.level, leaf.origin); });
   Hasher hasher;
-  std::vector<std::byte> bytes(2 * kLeafVoxels);
+  std::vector<std::byte> bytes(std::size_t{2} * kLeafVoxels);
   for (const FieldLeaf& leaf : leaves) {
     OSTEON_CHECK(leaf.values.size() == kLeafVoxels);
     const std::int32_t band = band_quanta(level_pitch_mm(pitch_mm, leaf.level));

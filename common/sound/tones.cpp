@@ -44,7 +44,8 @@ Tone find_tone(std::span<const float> samples, double rate_hz, double low_hz, do
   // The main lobe is 4 / duration wide: a quarter of that steps over no peak.
   const double step = rate_hz / static_cast<double>(samples.size());
   double best_hz = low_hz, best = -1;
-  for (double hz = low_hz; hz <= high_hz; hz += step) {
+  for (int i = 0; low_hz + i * step <= high_hz; ++i) {
+    const double hz = low_hz + i * step;
     const double power = squared_amplitude(samples, rate_hz, hz);
     if (power > best) best = power, best_hz = hz;
   }
