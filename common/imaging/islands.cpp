@@ -60,7 +60,7 @@ Result<IslandReport> keep_largest_island(HuVolume& volume, double threshold_hu, 
       }
       // Touching runs of the four rows before this one: a column more at either end, for the diagonals.
       const auto end = static_cast<std::uint32_t>(runs.size());
-      const auto join = [&](int other_row, int other_slice) {
+      const auto join = [&, rows = rows](int other_row, int other_slice) {
         if (other_row < 0 || other_row >= rows || other_slice < 0) return;
         const std::size_t r = static_cast<std::size_t>(other_slice) * static_cast<std::size_t>(rows) + static_cast<std::size_t>(other_row);
         std::uint32_t a = row_begin[r];

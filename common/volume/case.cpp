@@ -304,7 +304,7 @@ Result<void> Case::save(const std::filesystem::path& folder) const {
     if (error) return failure(ErrorCode::internal, "cannot rename " + partial.string() + " to " + target.string() + ": " + error.message());
     return {};
   };
-  const Result<void> written = write();
+  Result<void> written = write();
   if (!written) fs::remove_all(partial, error);
   return written;
 }
