@@ -22,7 +22,8 @@ struct CuttingState {
   double engaged_fraction = 0;     // 0 to 1
   Vec3 force_physical_N = Vec3::Zero();  // of the bone on the tool, bone frame
   double torque_Nmm = 0;
-  double depth_mm = 0;             // of the tip below the imported surface
+  double depth_mm = 0;             // of the tip from the entry of the step under way, along the axis of its site;
+                                   // negative before the bone, 0 before the first step
   CuttingPhase phase = CuttingPhase::idle;
 };
 

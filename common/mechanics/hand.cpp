@@ -14,13 +14,14 @@ HandParams novice_hand() {
   return hand;
 }
 
-HandParams scaled(const HandParams& hand, double s) {
+HandParams scaled(const HandParams& hand, double force, double length) {
   HandParams result = hand;
-  result.mass_kg *= s;
-  result.damping_n_s_per_mm *= s;
-  result.stiffness_n_per_mm *= s;
-  result.push_n *= s;
-  result.lateral_n_per_mm *= s;
+  result.push_n *= force;
+  // Forces for each millimetre of the handle's way, its speed or its acceleration.
+  result.mass_kg *= force * length;
+  result.damping_n_s_per_mm *= force * length;
+  result.stiffness_n_per_mm *= force * length;
+  result.lateral_n_per_mm *= force * length;
   return result;
 }
 

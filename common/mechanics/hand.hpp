@@ -22,8 +22,9 @@ struct HandParams {
 };
 [[nodiscard]] HandParams expert_hand();
 [[nodiscard]] HandParams novice_hand();
-// Every force-like parameter times s, for a device that renders physical force times s: motions stay the same.
-[[nodiscard]] HandParams scaled(const HandParams& hand, double s);
+// For a device that renders physical force times `force` and whose handle moves 1 / `length` as far as the tool: the
+// tool's motions stay the same.
+[[nodiscard]] HandParams scaled(const HandParams& hand, double force, double length = 1.0);
 
 enum class HandMode : std::uint8_t {
   carry,    // the rest place is where the command says; no push

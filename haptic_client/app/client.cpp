@@ -16,6 +16,7 @@
 #include "common/runtime/periodic.hpp"
 #include "haptic_client/control/patch_builder.hpp"
 #include "haptic_client/control/replica.hpp"
+#include "haptic_client/control/room_watch.hpp"
 
 namespace osteon::haptic {
 namespace {
@@ -27,6 +28,8 @@ constexpr auto kTick = 1ms;
 constexpr auto kSpin = 150us;
 constexpr int kPriority = 80;
 constexpr auto kConfirmPatience = 20s;
+constexpr auto kJoinPatience = 30s;           // without anything from the room
+constexpr std::size_t kMostFromRoom = 4096;   // events that may wait for the replica; the network waits beyond that
 constexpr std::size_t kTickTimes = 8192;  // ticks whose wake-up time is remembered
 
 std::int64_t ns(Clock::time_point t) { return std::chrono::duration_cast<std::chrono::nanoseconds>(t.time_since_epoch()).count(); }
@@ -91,6 +94,8 @@ class Client {
     if (!outcome_.stopped && replica_.unconfirmed() > 0)
       return failure(ErrorCode::unavailable, "the server has not confirmed the last " + std::to_string(replica_.unconfirmed()) +
                                                  " cuts within " + std::to_string(kConfirmPatience.count()) + " s; look at the server's log");
+    outcome_.coupling_n_per_mm = session_.loop().coupling_n_per_mm();
+    outcome_.workspace_scale = session_.loop().mapping().scale();
     outcome_.steps = session_.surgeon().results();
     outcome_.field_hash = replica_.predicted().hash();
     outcome_.removed_total_mm3 = replica_.predicted().removed_mm3();
@@ -104,8 +109,12 @@ class Client {
  private:
   void open_room() {
     const auto pass = [this](FromRoom event) {
-      const std::lock_guard lock(mutex_);
+      std::unique_lock lock(mutex_);
+      // Nothing is taken any more once the replica's thread has ended.
+      taken_.wait(lock, [this] { return from_room_.size() < kMostFromRoom || replica_over_; });
+      if (replica_over_) return;
       from_room_.push_back(std::move(event));
+      heard_ns_ = ns(Clock::now());
       wake_.notify_one();
     };
     RoomEvents events;
@@ -113,18 +122,24 @@ class Client {
     events.complete = [pass](RoomSeq contained) { pass(Complete{contained}); };
     events.committed = [pass](RoomSeq place, const Cut& cut) { pass(Committed{place, cut}); };
     events.rejected = [pass](RoomSeq place, std::uint64_t seq, const std::string& why) { pass(Rejected{place, seq, why}); };
-    events.lost = [this](const Error& why) {
-      const std::lock_guard lock(mutex_);
-      lost_why_ = why;
-      link_ok_ = false;
-      wake_.notify_one();
-    };
+    events.lost = [this](const Error& why) { give_up(why); };
     room_.open(std::move(events));
   }
 
+  // Force and spindle go down and the client ends with this.
+  void give_up(const Error& why) {
+    const std::lock_guard lock(mutex_);
+    if (!lost_why_) lost_why_ = why;
+    link_ok_ = false;
+    wake_.notify_one();
+  }
+
   bool wait_joined() {
-    while (!joined_ && link_ok_ && !stop_.wait_for(2ms)) {
-    }
+    heard_ns_ = ns(Clock::now());
+    while (!joined_ && link_ok_ && !stop_.wait_for(2ms))
+      if (Clock::now().time_since_epoch() - std::chrono::nanoseconds(heard_ns_) > kJoinPatience)
+        give_up({ErrorCode::unavailable, "the server has sent nothing for " + std::to_string(kJoinPatience.count()) +
+                                             " s while the bone was fetched; look at the server's log"});
     return joined_ && link_ok_;
   }
 
@@ -135,11 +150,13 @@ class Client {
     constexpr int kRunDownTicks = 500;  // after the link is lost
     int down = 0;
     while (!session_.done() && !stop_.requested() && down < kRunDownTicks) {
-      timer.wait(outcome_.ticks);
+      const int periods = timer.wait(outcome_.ticks);
       const bool link_ok = link_ok_.load(std::memory_order_relaxed);
       if (!link_ok) ++down;
       patches_.refresh();
-      const SessionTick now = session_.tick(patches_.value(), link_ok);
+      const bool room_follows = room_health_.load(std::memory_order_relaxed) == RoomHealth::follows;
+      if (!room_follows) ++outcome_.held_for_room_ticks;
+      const SessionTick now = session_.tick(patches_.value(), link_ok && room_follows, periods);
 
       const std::int64_t woke_ns = ns(timer.woke());
       tick_times_[now.report.state_seq % kTickTimes].store(woke_ns, std::memory_order_relaxed);
@@ -151,7 +168,6 @@ class Client {
       if (now.report.events & kCutsWaiting) ++outcome_.cuts_waiting_ticks;
 
       row_.mono_ns = woke_ns;
-      row_.tick = static_cast<std::int64_t>(now.report.state_seq);
       row_.phase = now.order.phase;
       row_.step = static_cast<std::uint32_t>(now.order.step);
       row_.idle = idle;
@@ -175,12 +191,16 @@ class Client {
         std::unique_lock lock(mutex_);
         wake_.wait_for(lock, 2ms, [&] { return !from_room_.empty(); });
         events.swap(from_room_);
+        taken_.notify_all();
       }
+      const bool heard = !events.empty();
       // Before the queues are looked at: what was closed up to here must still be taken.
       const bool over = touching_over_;
       take_own_cuts();
       for (FromRoom& event : events) std::visit([this](auto& e) { take(e); }, event);
       events.clear();
+      replica_.settle();
+      watch_room(heard);
       build_patch();
       if (!over) continue;
       if (!waiting_since) waiting_since = Clock::now();
@@ -188,21 +208,15 @@ class Client {
       if (settled || !link_ok_ || stop_.requested() || Clock::now() - *waiting_since > kConfirmPatience) break;
     }
     note_removed(outcome_.removed_mm3.size());
+    const std::lock_guard lock(mutex_);
+    replica_over_ = true;
+    taken_.notify_all();
   }
 
   void take_own_cuts() {
     CutPiece piece;
     while (session_.loop().take_piece(piece)) {
-      const Tool& tool = session_.loop().tool(piece.tool).tool;
-      Cut cut;
-      cut.author = room_.room().author;
-      cut.author_seq = piece.author_seq;
-      cut.lease_epoch = room_.room().lease_epoch;
-      cut.tool = tool.hash();
-      cut.shape = tool.cut_shape();
-      cut.level = tool.cut_level;
-      cut.path.assign(piece.path.begin(), piece.path.begin() + piece.knots);
-      cut.spindle_rpm = piece.spindle_rpm;
+      const Cut cut = cut_of(piece, session_.loop().tool(piece.tool), room_.room().author, room_.room().lease_epoch);
       unsent_.push_back(cut);
       const std::int64_t closed_ns = tick_times_[static_cast<std::size_t>(piece.closed_tick) % kTickTimes].load(std::memory_order_relaxed);
       outcome_.cuts.push_back({piece.author_seq, 0, closed_ns, 0});
@@ -242,9 +256,20 @@ class Client {
     constexpr int kMostInARow = 20;
     if (rejected_in_a_row_++ == 0) log::warn("cut rejected", {{"author_seq", rejected.author_seq}, {"reason", rejected.reason}});
     if (rejected_in_a_row_ != kMostInARow) return;
-    const std::lock_guard lock(mutex_);
-    lost_why_ = Error{ErrorCode::unsupported, "the server rejects every cut: " + rejected.reason};
-    link_ok_ = false;
+    give_up({ErrorCode::unsupported, "the server rejects every cut: " + rejected.reason});
+  }
+
+  void watch_room(bool heard) {
+    const double now_s = 1e-9 * static_cast<double>(ns(Clock::now()));
+    const RoomHealth health = watch_.update(now_s, heard, replica_.unconfirmed());
+    unconfirmed_ = replica_.unconfirmed();
+    const RoomHealth before = room_health_.exchange(health);
+    if (health == before) return;
+    if (health == RoomHealth::follows) log::info("the server follows again");
+    else log::warn("the spindle is held", {{"because", name(health)}, {"unconfirmed_cuts", replica_.unconfirmed()}});
+    if (health == RoomHealth::lost && link_ok_)
+      give_up({ErrorCode::unavailable, "the server has not answered " + std::to_string(replica_.unconfirmed()) +
+                                           " cuts; see whether it runs and can be reached"});
   }
 
   void build_patch() {
@@ -321,8 +346,11 @@ class Client {
 
   void print_status(const TickRow& row) const {
     const LoopReport& r = row.report;
-    std::printf("%s %s: depth %.1f mm, force %.1f N, feed %.2f mm/s, %.0f rpm (%s)\n", tool_name(row).c_str(), name(row.phase),
+    std::printf("%s %s: depth %.1f mm, force %.1f N, feed %.2f mm/s, %.0f rpm (%s)", tool_name(row).c_str(), name(row.phase),
                 row.depth_mm, r.force_physical_n.norm(), r.feed_mm_per_s, r.spindle_rpm, name(r.phase));
+    const RoomHealth health = room_health_;
+    if (health != RoomHealth::follows) std::printf(", held: %s, %zu cuts unconfirmed", name(health), unconfirmed_.load());
+    std::printf("\n");
     std::fflush(stdout);
   }
 
@@ -340,10 +368,14 @@ class Client {
   EventQueue<TickRow, 2048> rows_; // haptic → reporter
   std::array<std::atomic<std::int64_t>, kTickTimes> tick_times_;
 
-  std::mutex mutex_;               // guards the two below; never taken by the haptic thread
+  std::mutex mutex_;               // guards the three below; never taken by the haptic thread
+  bool replica_over_ = false;
   std::deque<FromRoom> from_room_;
   std::optional<Error> lost_why_;
-  std::condition_variable wake_;
+  std::condition_variable wake_, taken_;
+  std::atomic<std::int64_t> heard_ns_{0};
+  std::atomic<RoomHealth> room_health_{RoomHealth::follows};
+  std::atomic<std::size_t> unconfirmed_{0};
   std::atomic<bool> link_ok_{true}, joined_{false}, touching_over_{false}, all_over_{false};
 
   // Haptic thread.
@@ -351,10 +383,11 @@ class Client {
   const Site* site_ = nullptr;
   bool taken_up_ = false;
   // Replica thread.
-  std::deque<Cut> unsent_;
+  std::deque<Cut> unsent_;         // as bounded as what is unconfirmed
   Pose built_at_;
   int built_tool_ = -1;
   int rejected_in_a_row_ = 0;
+  RoomWatch watch_;
   std::size_t noted_steps_ = 0;
   double noted_mm3_ = 0;
   DurationHistogram patch_times_;

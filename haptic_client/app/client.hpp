@@ -30,9 +30,11 @@ struct ClientOutcome {
   RoomSeq room_seq;
   double removed_total_mm3 = 0;
   std::uint64_t rejected = 0, patches = 0, uncovered_ticks = 0, cuts_waiting_ticks = 0, rows_dropped = 0;
+  std::uint64_t held_for_room_ticks = 0;  // in which spindle and force were down because the room did not follow
   double patch_p50_us = 0, patch_p99_us = 0;
   DeviceLimits limits;
   LoopParams loop;
+  double coupling_n_per_mm = 0, workspace_scale = 0;  // of the last step: K_c, and bone mm for each mm of the handle
 };
 
 // Runs a plan to its end and waits until the room has confirmed every cut. Errors: unavailable (the server went away;

@@ -71,19 +71,20 @@ json step_summary(const ReadyStep& step, const StepResult& result, double remove
   return out;
 }
 
-json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan) {
+json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, const std::string& device) {
   const TickStats& ticks = outcome.ticks;
   json steps = json::array();
   for (std::size_t i = 0; i < plan.steps.size(); ++i)
     steps.push_back(step_summary(plan.steps[i], outcome.steps[i], outcome.removed_mm3[i]));
-  return {{"device", "simulated"},
+  return {{"device", device},
           {"device_limits",
            {{"peak_n", outcome.limits.peak_n},
             {"continuous_n", outcome.limits.continuous_n},
             {"stiffness_n_per_mm", outcome.limits.stiffness_n_per_mm},
             {"workspace_radius_mm", outcome.limits.workspace_radius_mm}}},
           {"force_scale", outcome.loop.force_scale},
-          {"coupling_n_per_mm", outcome.loop.stiffness_n_per_mm},
+          {"coupling_n_per_mm", outcome.coupling_n_per_mm},
+          {"workspace_scale", outcome.workspace_scale},
           {"loop",
            {{"ticks", ticks.work.count()},
             {"missed", ticks.missed},
@@ -100,6 +101,7 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan) {
           {"work", durations(ticks.work)},
           {"patches", {{"built", outcome.patches}, {"p50_us", outcome.patch_p50_us}, {"p99_us", outcome.patch_p99_us},
                        {"uncovered_ticks", outcome.uncovered_ticks}, {"cuts_waiting_ticks", outcome.cuts_waiting_ticks}}},
+          {"held_for_room_ticks", outcome.held_for_room_ticks},
           {"rows_dropped", outcome.rows_dropped},
           {"cuts", outcome.cuts.size()},
           {"rejected", outcome.rejected},
@@ -112,8 +114,8 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan) {
 
 Result<void> run(Options& options, const StopSignal& stop) {
   // Everything that can be wrong without a server is said before one is looked for.
-  if (options.device != "simulated")
-    return failure(ErrorCode::not_found, "there is no device \"" + options.device + "\"; choose simulated");
+  const Result<SimulatedDeviceParams> device = find_simulated_device(options.device);
+  if (!device) return tl::unexpected(device.error());
   if (options.client.force_scale < 0.0 || options.client.force_scale > 1.0)
     return failure(ErrorCode::invalid_input, "--scale must be a number above 0 and at most 1");
   if (!(options.patience_s >= 0.0 && options.patience_s <= 3600.0))
@@ -128,11 +130,11 @@ Result<void> run(Options& options, const StopSignal& stop) {
   const Result<ReadyPlan> ready = make_ready(*plan, room->bone());
   if (!ready) return failure(ready.error().code, "the plan " + options.plan.string() + ", " + ready.error().message);
 
-  const Result<ClientOutcome> outcome = run_client(*room, *ready, SimulatedDeviceParams{}, options.client, stop);
+  const Result<ClientOutcome> outcome = run_client(*room, *ready, *device, options.client, stop);
   if (!outcome) return tl::unexpected(outcome.error());
   if (Result<void> written = write_cut_log(options.cut_log, outcome->cuts); !written) return written;
   if (!options.summary.empty())
-    if (Result<void> written = write_file(options.summary, summary_of(*outcome, *ready).dump(2) + "\n"); !written) return written;
+    if (Result<void> written = write_file(options.summary, summary_of(*outcome, *ready, device->name).dump(2) + "\n"); !written) return written;
   std::printf("%s: %s %zu steps, %zu cuts, %.1f mm3 removed, field %.12s at %llu\n", kProgram,
               outcome->stopped ? "stopped in" : "done", ready->steps.size(), outcome->cuts.size(), outcome->removed_total_mm3,
               to_hex(outcome->field_hash).c_str(), static_cast<unsigned long long>(outcome->room_seq.value));
@@ -146,7 +148,7 @@ int main(int argc, char** argv) {
   CLI::App app("Carries out a surgeon's plan at a haptic device: feels and cuts the bone of a room at 1 kHz.", kProgram);
   app.add_option("--server", options.room.address, "HOST:PORT of osteon-server")->required();
   app.add_option("--plan", options.plan, "JSON file with the surgeon's steps")->required();
-  app.add_option("--device", options.device, "Which device; simulated is one with a simulated hand")->capture_default_str();
+  app.add_option("--device", options.device, "simulated, one as strong as the drilling of bone, or simulated-3.3N, a desktop one; both with a simulated hand")->capture_default_str();
   app.add_option("--scale", options.client.force_scale, "Rendered over physical force; by default the device's continuous force / 30 N");
   app.add_option("--session-log", options.client.session_log, "CSV with a row for each millisecond");
   app.add_option("--cut-log", options.cut_log, "CSV with a row for each cut");

@@ -28,12 +28,13 @@ Result<void> SessionLog::open(const std::filesystem::path& file) {
 
 void SessionLog::write(const TickRow& row, const std::string& tool) {
   if (!file_.is_open()) return;
+  if (first_mono_ns_ == 0) first_mono_ns_ = row.mono_ns;
   const LoopReport& r = row.report;
   const Vec3& tip = r.pose_bone_proxy.position_mm;
   char line[384];
   const int size = std::snprintf(
       line, sizeof line, "%.3f,%lld,%llu,%s,%s,%.5f,%.5f,%.5f,%.5f,%.5f,%.4f,%.4f,%.5f,%.4f,%.4f,%.2f,%.3f\n",
-      1e-3 * static_cast<double>(row.tick), static_cast<long long>(row.mono_ns), static_cast<unsigned long long>(r.state_seq),
+      1e-9 * static_cast<double>(row.mono_ns - first_mono_ns_), static_cast<long long>(row.mono_ns), static_cast<unsigned long long>(r.state_seq),
       name(r.phase), tool.c_str(), tip.x(), tip.y(), tip.z(), row.depth_mm, row.device_depth_mm, r.force_physical_n.norm(),
       row.force_rendered_n, r.feed_mm_per_s, r.density_g_cm3, r.engaged, r.spindle_rpm, r.torque_nmm);
   file_.write(line, size);

@@ -13,7 +13,6 @@ namespace osteon::haptic {
 // One tick, as it crosses from the haptic thread.
 struct TickRow {
   std::int64_t mono_ns = 0;
-  std::int64_t tick = 0;
   SurgeonPhase phase = SurgeonPhase::done;
   std::uint32_t step = 0;
   double depth_mm = 0, device_depth_mm = 0;  // along the axis of the step's site
@@ -40,6 +39,7 @@ class SessionLog {
  private:
   std::filesystem::path path_;
   std::ofstream file_;
+  std::int64_t first_mono_ns_ = 0;  // of the first row; 0: none yet
 };
 
 [[nodiscard]] Result<void> write_cut_log(const std::filesystem::path& file, const std::vector<CutRow>& rows);

@@ -1,18 +1,21 @@
 #include "haptic_client/control/cut_recorder.hpp"
 
-#include <algorithm>
+#include "common/geometry/segment.hpp"
 
 namespace osteon::haptic {
-namespace {
 
-double segment_distance_mm(const Vec3& p, const Vec3& a, const Vec3& b) {
-  const Vec3 ab = b - a;
-  const double length2 = ab.squaredNorm();
-  const double t = length2 > 0.0 ? std::clamp((p - a).dot(ab) / length2, 0.0, 1.0) : 0.0;
-  return (p - a - t * ab).norm();
+Cut cut_of(const CutPiece& piece, const ToolModel& model, AuthorId author, std::uint64_t lease_epoch) {
+  Cut cut;
+  cut.author = author;
+  cut.author_seq = piece.author_seq;
+  cut.lease_epoch = lease_epoch;
+  cut.tool = model.tool.hash();
+  cut.shape = model.tool.cut_shape();
+  cut.level = model.cut_level;
+  cut.path.assign(piece.path.begin(), piece.path.begin() + piece.knots);
+  cut.spindle_rpm = piece.spindle_rpm;
+  return cut;
 }
-
-}  // namespace
 
 void CutRecorder::begin(const Pose& pose_bone_tool, double cutting_length_mm) noexcept {
   recording_ = true;

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "common/field/cut.hpp"
+#include "haptic_client/control/tool_model.hpp"
 
 namespace osteon::haptic {
 
@@ -17,6 +18,9 @@ struct CutPiece {
   std::uint32_t spindle_rpm = 0;
   std::int64_t closed_tick = 0;
 };
+
+// The whole cut; `model`: of the piece's tool.
+[[nodiscard]] Cut cut_of(const CutPiece& piece, const ToolModel& model, AuthorId author, std::uint64_t lease_epoch);
 
 class CutRecorder {
  public:

@@ -11,7 +11,7 @@ LoopParams loop_params(double peak_n, double continuous_n, double stiffness_n_pe
   params.peak_n = peak_n;
   params.continuous_n = continuous_n;
   params.force_scale = force_scale > 0.0 ? force_scale : std::min(1.0, continuous_n / kFullScale_n);
-  params.stiffness_n_per_mm = std::min(params.stiffness_n_per_mm, stiffness_n_per_mm / params.force_scale);
+  params.device_n_per_mm = stiffness_n_per_mm;
   return params;
 }
 
@@ -20,6 +20,7 @@ HapticLoop::HapticLoop(const LoopParams& params, std::vector<ToolModel> tools) :
 void HapticLoop::take_up(int tool, const Pose& pose_bone_tool, const WorkspaceMapping& mapping) noexcept {
   tool_ = tool;
   mapping_ = mapping;
+  coupling_n_per_mm_ = std::min(params_.stiffness_n_per_mm, params_.device_n_per_mm / (params_.force_scale * mapping.scale()));
   proxy_.place(pose_bone_tool);
   recorder_.end();
   spindle_ = {};
@@ -51,7 +52,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch) noexcept
   else {
     const bool cuts_waiting = proxy_.sweeps_full() || pieces_.size() >= 60;
     if (cuts_waiting) report.events |= kCutsWaiting;
-    step = proxy_.step(model, patch, pose_bone_device, spindle_.rpm, params_.stiffness_n_per_mm,
+    step = proxy_.step(model, patch, pose_bone_device, spindle_.rpm, coupling_n_per_mm_,
                        input.link_ok && !input.clutch && !cuts_waiting, params_.dt_s);
   }
   if (!step.covered) report.events |= kUncovered;
@@ -79,7 +80,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch) noexcept
   const double limit_n = input.device_warm ? params_.continuous_n : params_.peak_n;
   const bool touching = step.contact && step.covered && !input.clutch;
   const Vec3 extension_mm = pose_bone_device.position_mm - proxy_.pose().position_mm;
-  if (touching) report.force_physical_n = -params_.stiffness_n_per_mm * extension_mm;
+  if (touching) report.force_physical_n = -coupling_n_per_mm_ * extension_mm;
   if (s * report.force_physical_n.norm() > limit_n) {
     report.force_physical_n *= limit_n / (s * report.force_physical_n.norm());
     report.events |= kForceLimited;
@@ -103,7 +104,7 @@ Vec3 HapticLoop::rendered_force(const Vec3& extension_mm, double limit_n, int pe
   // With the damping k_c·T that a sampled spring needs, never more than the spring, so that it cannot pull.
   const Vec3 rate_mm_per_s = (extension_mm - extension_mm_) / params_.dt_s;
   extension_mm_ = extension_mm;
-  Vec3 damping_n = -params_.stiffness_n_per_mm * params_.dt_s * rate_mm_per_s;
+  Vec3 damping_n = -coupling_n_per_mm_ * params_.dt_s * rate_mm_per_s;
   if (damping_n.norm() > spring_n.norm()) damping_n *= spring_n.norm() / damping_n.norm();
   Vec3 force_n = s * (spring_n + damping_n);
   if (force_n.norm() > limit_n) force_n *= limit_n / force_n.norm();
@@ -111,7 +112,7 @@ Vec3 HapticLoop::rendered_force(const Vec3& extension_mm, double limit_n, int pe
   // The hand's own movement may raise the force as fast as it moves; everything else only slowly.
   const double before_n = force_bone_n_.norm();
   const double hand_mm = (extension_mm + proxy_.pose().position_mm - device_mm_).norm();
-  const double by_hand_n = 2.0 * s * params_.stiffness_n_per_mm * hand_mm;  // spring and damping
+  const double by_hand_n = 2.0 * s * coupling_n_per_mm_ * hand_mm;  // spring and damping
   const double most_n = before_n + by_hand_n + params_.slew_n_per_ms * 1e3 * params_.dt_s * periods;
   if (force_n.norm() > most_n) {
     force_n *= most_n / force_n.norm();

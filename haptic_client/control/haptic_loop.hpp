@@ -18,13 +18,14 @@ namespace osteon::haptic {
 struct LoopParams {
   double dt_s = 1e-3;
   double force_scale = 1.0;               // s: rendered = s · physical
-  double stiffness_n_per_mm = 50.0;       // K_c of the coupling, physical; k_c = s · K_c on the device
+  double stiffness_n_per_mm = 50.0;       // K_c of the coupling, physical, where the device is stiff enough for it
+  double device_n_per_mm = 60.0;          // k of the device
   double peak_n = 60.0;                   // of the device
   double continuous_n = 30.0;             // of the device; the limit while it is warm
   double slew_n_per_ms = 0.5;             // growth of force that the hand did not cause; on the device
 };
 
-// K_c and s for a device: s = continuous force / 30 N unless given, and s · K_c within the device's stiffness.
+// For a device: s = continuous force / 30 N unless given.
 [[nodiscard]] LoopParams loop_params(double peak_n, double continuous_n, double stiffness_n_per_mm, double force_scale);
 
 struct LoopInput {
@@ -77,6 +78,9 @@ class HapticLoop {
   // [haptic]
   [[nodiscard]] const WorkspaceMapping& mapping() const noexcept { return mapping_; }
   [[nodiscard]] std::uint64_t cuts_closed() const noexcept { return cuts_closed_; }
+  // [haptic] K_c of the tool in hand, physical: where the tool moves m mm for each mm of the handle, the device shows
+  // m · s · K_c, which its k limits.
+  [[nodiscard]] double coupling_n_per_mm() const noexcept { return coupling_n_per_mm_; }
 
  private:
   void record(const ToolModel& model, bool near_bone, LoopReport& report) noexcept;
@@ -95,6 +99,7 @@ class HapticLoop {
   bool placed_ = false, clutched_ = false;
   int quiet_ticks_ = 0;
   double torque_nmm_ = 0;
+  double coupling_n_per_mm_ = 0;
   std::uint64_t cuts_closed_ = 0, ticks_ = 0;
   Vec3 extension_mm_ = Vec3::Zero();      // of the last tick
   Vec3 force_bone_n_ = Vec3::Zero();      // rendered in the last tick

@@ -88,9 +88,9 @@ std::shared_ptr<const Brick> PatchBuilder::brick(Store& store, const CutField& f
 void PatchBuilder::build(const CutField& field, const ToolModel& model, const Pose& pose, Patch& patch) {
   const double h = field.bone().pitch_mm();
   const Tool& tool = model.tool;
-  if (fine_level_ != tool.cut_level || fine_.size() > kMostKeptBricks) fine_.clear();
+  if (fine_level_ != model.cut_level || fine_.size() > kMostKeptBricks) fine_.clear();
   if (coarse_.size() > kMostKeptBricks) coarse_.clear(), density_.clear();
-  fine_level_ = tool.cut_level;
+  fine_level_ = model.cut_level;
   const Pose pose_tool_bone = pose.inverse();
 
   // Bricks whose centre is farther from the tool's surface than the margin and half their diagonal are left out, and so
@@ -109,7 +109,7 @@ void PatchBuilder::build(const CutField& field, const ToolModel& model, const Po
   const double fine_reach_mm = params_.fine_samples * model.fine_pitch_mm - 2.0 * params_.fine_margin_mm - tool.diameter_mm;
   const Box fine_box = tool_box(tool, pose, 0.0, -std::min(tool.cutting_length_mm, std::max(1.0, fine_reach_mm)));
   fill(patch.fine, bricks_in(fine_box.grown(params_.fine_margin_mm), model.fine_pitch_mm), model.fine_pitch_mm,
-       params_.fine_margin_mm, [&](Coord i) { return brick(fine_, field, tool.cut_level, i, Quantity::solid); });
+       params_.fine_margin_mm, [&](Coord i) { return brick(fine_, field, model.cut_level, i, Quantity::solid); });
 
   const CoordBox coarse = bricks_in(tool_box(tool, pose, 0.0, -tool.reach_mm()).grown(params_.coarse_margin_mm), h);
   fill(patch.coarse, coarse, h, params_.coarse_margin_mm,

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "common/geometry/segment.hpp"
+
 namespace osteon::haptic {
 namespace {
 
@@ -13,13 +15,6 @@ constexpr int kMostSubSteps = 24;
 constexpr double kNothing_mm = 1e-6;
 // Points whose face looks less than this into the direction of cutting neither cut nor resist.
 constexpr double kLeastFacing = 0.2;
-
-double segment_distance_mm(const Vec3& p, const Vec3& a, const Vec3& b) noexcept {
-  const Vec3 ab = b - a;
-  const double length2 = ab.squaredNorm();
-  const double t = length2 > 0.0 ? std::clamp((p - a).dot(ab) / length2, 0.0, 1.0) : 0.0;
-  return (p - a - t * ab).norm();
-}
 
 Vec3 sphere_centre(const Pose& pose, double radius_mm) noexcept { return pose.point({0, 0, -radius_mm}); }
 

@@ -1,32 +1,34 @@
 #include "haptic_client/control/replica.hpp"
 
 #include <algorithm>
-
-#include "common/field/kernel.hpp"
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <utility>
 
 namespace osteon::haptic {
 
-Replica::Replica(const Case& bone, BodyId body) : bone_(bone), body_(body), predicted_(bone, body) {}
+Replica::Replica(const Case& bone, BodyId body) : body_(body), committed_(bone, body), predicted_(bone, body) {}
 
 void Replica::restore(const FieldLeaf& leaf) {
-  joined_.push_back(leaf);
+  committed_.restore(leaf);
   predicted_.restore(leaf);
   changes_.push_back({leaf.level, {leaf.origin}});
 }
 
 void Replica::add_own(const Cut& cut) {
-  pending_.push_back(cut);
   last_own_ = std::max(last_own_, cut.author_seq);
   CutReport report = predicted_.apply(cut);
+  pending_.push_back({cut, report.changed_leaves});
   if (!report.changed_leaves.empty()) changes_.push_back({report.level, std::move(report.changed_leaves)});
 }
 
 void Replica::commit(RoomSeq place, const Cut& cut, bool own) {
   room_seq_ = place;
-  committed_cuts_.push_back(cut);
+  committed_.apply(cut);
   if (own) {
     // The prediction holds it already: applying it again would change nothing.
-    const auto found = std::ranges::find(pending_, cut.author_seq, &Cut::author_seq);
+    const auto found = std::ranges::find(pending_, cut.author_seq, [](const Pending& p) { return p.cut.author_seq; });
     if (found != pending_.end()) {
       pending_.erase(found);
       return;
@@ -39,19 +41,33 @@ void Replica::commit(RoomSeq place, const Cut& cut, bool own) {
 void Replica::reject(RoomSeq place, std::uint64_t author_seq) {
   room_seq_ = std::max(room_seq_, place);
   ++rejected_;
-  const auto found = std::ranges::find(pending_, author_seq, &Cut::author_seq);
+  const auto found = std::ranges::find(pending_, author_seq, [](const Pending& p) { return p.cut.author_seq; });
   if (found == pending_.end()) return;
-  changes_.push_back({found->level, SweptTool(*found, bone_.pitch_mm()).leaves()});
+  if (!found->changed.empty()) undone_.push_back({found->cut.level, std::move(found->changed)});
   pending_.erase(found);
-  predicted_ = committed();
-  for (const Cut& cut : pending_) predicted_.apply(cut);
 }
 
-CutField Replica::committed() const {
-  CutField field(bone_, body_);
-  for (const FieldLeaf& leaf : joined_) field.restore(leaf);
-  for (const Cut& cut : committed_cuts_) field.apply(cut);
-  return field;
+void Replica::settle() {
+  if (undone_.empty()) return;
+  std::array<float, kLeafVoxels> values;
+  for (ChangedLeaves& undone : undone_) {
+    for (const Coord origin : undone.origins) {
+      committed_.gather_cuts(undone.level, {origin, origin + Coord{kLeafSize - 1, kLeafSize - 1, kLeafSize - 1}}, values);
+      FieldLeaf leaf{body_, undone.level, origin, std::vector<std::int16_t>(kLeafVoxels)};
+      std::ranges::transform(values, leaf.values.begin(), [](float mm) { return static_cast<std::int16_t>(std::lround(mm / kQuantum_mm)); });
+      predicted_.restore(leaf);
+    }
+    changes_.push_back(std::move(undone));
+  }
+  undone_.clear();
+  // A pending cut may have found its bone gone already, by one that was rejected: now it is the one that takes it.
+  for (Pending& pending : pending_) {
+    ++cut_again_;
+    const CutReport report = predicted_.apply(pending.cut);
+    std::vector<Coord> all;
+    std::ranges::set_union(pending.changed, report.changed_leaves, std::back_inserter(all));
+    pending.changed = std::move(all);
+  }
 }
 
 std::vector<ChangedLeaves> Replica::take_changes() { return std::exchange(changes_, {}); }

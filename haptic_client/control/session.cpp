@@ -8,18 +8,22 @@ SimulatedSession::SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& 
       loop_(loop_params(device.limits.peak_n, device.limits.continuous_n, device.limits.stiffness_n_per_mm, force_scale),
             surgeon_.plan().tools) {}
 
-SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok) noexcept {
+SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok, int periods) noexcept {
   const double dt_s = loop_.params().dt_s;
   SessionTick result;
   result.order = surgeon_.act(last_, dt_s);
   if (result.order.phase != SurgeonPhase::done && result.order.phase != SurgeonPhase::wait) {
     const ReadyStep& step = surgeon_.plan().steps[result.order.step];
     if (result.order.take_up) {
-      const WorkspaceMapping mapping = Surgeon::mapping_for(step, device_.limits().workspace_radius_mm);
+      const DeviceLimits limits = device_.limits();
+      const LoopParams& params = loop_.params();
+      // Bone mm for each mm of the handle at which even this device can show the coupling's whole stiffness.
+      const double stiff_enough = limits.stiffness_n_per_mm / (params.force_scale * params.stiffness_n_per_mm);
+      const WorkspaceMapping mapping = Surgeon::mapping_for(step, limits.workspace_radius_mm, stiff_enough);
       const Pose pose_bone_tool{result.order.hand.target_mm, step.rotation};
       loop_.take_up(step.tool, pose_bone_tool, mapping);
       // On a device that shows less than the physical force the whole hand is that much lighter.
-      HandParams hand = scaled(Surgeon::hand_for(step.plan), loop_.params().force_scale);
+      const HandParams hand = scaled(Surgeon::hand_for(step.plan), params.force_scale, mapping.scale());
       device_.take(hand, mapping.pose_device_tool(pose_bone_tool).position_mm);
     }
     const WorkspaceMapping& mapping = loop_.mapping();
@@ -39,6 +43,7 @@ SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok) noexcept {
   input.device_ok = reading.status != DeviceStatus::fault;
   input.device_warm = reading.status == DeviceStatus::warm;
   input.link_ok = link_ok;
+  input.periods = periods;
   result.report = last_ = loop_.tick(input, patch);
   device_.write(result.report.force_device_n);
   return result;

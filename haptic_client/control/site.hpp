@@ -15,7 +15,7 @@ struct Site {
 
 // Where a ray from far out along `toward` to the bone's centre first meets bone. Error invalid_input: it meets none.
 [[nodiscard]] Result<Site> find_site_toward(const Case& bone, const Vec3& toward);
-// Where the line through `point_mm` along `axis` meets bone within 60 mm; the axis is kept as it is given.
+// Where the line through `point_mm` along `axis` meets bone, at most 30 mm before or behind the point; the axis is kept as it is given.
 [[nodiscard]] Result<Site> find_site_at(const Case& bone, const Vec3& point_mm, const Vec3& axis);
 // Beside another site, by u and v millimetres along its surface.
 [[nodiscard]] Result<Site> find_site_beside(const Case& bone, const Site& site, double u_mm, double v_mm);

@@ -11,8 +11,7 @@ constexpr double kStandOff_mm = 12.0;        // where a tool is taken up, above 
 constexpr double kNear_mm = 1.5;             // from here the surface is sought slowly
 constexpr double kCarrySpeed_mm_per_s = 25.0;
 constexpr double kSeekSpeed_mm_per_s = 4.0;
-constexpr double kMostPush_s = 60.0;
-constexpr double kMostWaitForPatch_s = 10.0;
+constexpr double kBeyondGone_mm = 1.0;       // sought so far past the far side where there is no bone any more
 constexpr double kCorticalDensity = 1.1;     // g/cm³; what is denser counts as cortex in the means
 constexpr double kBurrTilt_rad = 30.0 * std::numbers::pi / 180.0;  // the pole of a burr does not cut
 constexpr double kPass_mm = 0.6;             // depth of a burr's pass
@@ -29,6 +28,19 @@ Result<Site> find_site(const Case& bone, const PlanEntry& entry, const Site* las
     return find_site_beside(bone, *last, (*entry.beside_last_mm)[0], (*entry.beside_last_mm)[1]);
   }
   return failure(ErrorCode::invalid_input, "entry is missing; give {\"toward\": [x, y, z]} or {\"point_mm\": [...], \"axis\": [...]}");
+}
+
+// The time that a phase may take. What moves by its own clock gets twice that and a margin; the rest, what waits for bone
+// or spindle, as long as any bone could ask for.
+double most_s(const ReadyStep& step, SurgeonPhase phase) {
+  constexpr double kMargin_s = 10.0, kMostPush_s = 60.0;
+  switch (phase) {
+    case SurgeonPhase::seek: return kMargin_s + 2.0 * step.site.thickness_mm / kSeekSpeed_mm_per_s;
+    case SurgeonPhase::push: return kMostPush_s;
+    case SurgeonPhase::feed: return kMargin_s + 2.0 * (step.site.thickness_mm + step.plan.beyond_mm) / step.plan.feed_mm_per_s;
+    case SurgeonPhase::sweep: return kMargin_s + 2.0 * step.sweep_length_mm / step.plan.sweep_mm_per_s;
+    default: return kMargin_s;
+  }
 }
 
 // Back and forth over the window, pass below pass, following the imported surface.
@@ -59,7 +71,9 @@ void plan_sweep(const Case& bone, const Tool& tool, ReadyStep& step) {
         const double along = places > 1 ? half_u * (2.0 * place / (places - 1) - 1.0) : 0.0;
         const double u = forth ? along : -along;
         const Vec3 centre = site.entry_mm + u * site.across_u + v * site.across_v + (surface_height(u, v) + depth - radius) * site.axis;
-        step.sweep_mm.push_back(centre + tip_from_centre);
+        const Vec3 tip = centre + tip_from_centre;
+        if (!step.sweep_mm.empty()) step.sweep_length_mm += (tip - step.sweep_mm.back()).norm();
+        step.sweep_mm.push_back(tip);
       }
       forth = !forth;
     }
@@ -128,7 +142,7 @@ HandParams Surgeon::hand_for(const PlanStep& plan) {
   return hand;
 }
 
-WorkspaceMapping Surgeon::mapping_for(const ReadyStep& step, double workspace_radius_mm) {
+WorkspaceMapping Surgeon::mapping_for(const ReadyStep& step, double workspace_radius_mm, double stiff_enough) {
   const Site& site = step.site;
   // The view looks along the tool: the device's z comes out of the bone.
   Eigen::Matrix3d view;
@@ -137,7 +151,8 @@ WorkspaceMapping Surgeon::mapping_for(const ReadyStep& step, double workspace_ra
   view.col(1) = view.col(2).cross(view.col(0));
   const double reach_mm = std::max(kStandOff_mm, std::min(site.thickness_mm, 60.0) + 15.0);
   WorkspaceMapping mapping;
-  mapping.align(Eigen::Quaterniond(view).normalized(), std::max(1.0, reach_mm / workspace_radius_mm), Vec3::Zero(), site.entry_mm);
+  const double scale = std::max(std::min(1.0, stiff_enough), reach_mm / workspace_radius_mm);
+  mapping.align(Eigen::Quaterniond(view).normalized(), scale, Vec3::Zero(), site.entry_mm);
   return mapping;
 }
 
@@ -192,8 +207,10 @@ void Surgeon::drill(const ReadyStep& step, const LoopReport& report, double dt_s
       if (rig) {
         if (carry_to_depth(step, -0.3, kSeekSpeed_mm_per_s, dt_s)) enter(SurgeonPhase::feed);
       } else {
-        carry_to_depth(step, step.site.thickness_mm, kSeekSpeed_mm_per_s, dt_s);
-        if (force_n > 0.3 || depth > step.site.thickness_mm) enter(SurgeonPhase::push);
+        carry_to_depth(step, step.site.thickness_mm + kBeyondGone_mm, kSeekSpeed_mm_per_s, dt_s);
+        if (force_n > 0.3) enter(SurgeonPhase::push);
+        // Nothing was met all the way: the hole is there already.
+        else if (depth > step.site.thickness_mm) enter(SurgeonPhase::retract);
       }
       break;
     case SurgeonPhase::feed:
@@ -205,10 +222,6 @@ void Surgeon::drill(const ReadyStep& step, const LoopReport& report, double dt_s
       if (depth > step.site.thickness_mm && force_n < 0.5 * step.plan.push_n) {
         hand_.mode = HandMode::release;
         enter(SurgeonPhase::react);
-      } else if (in_phase_s_ > kMostPush_s) {
-        results_[step_].completed = false;
-        target_depth_mm_ = depth;
-        enter(SurgeonPhase::retract);
       }
       break;
     case SurgeonPhase::react:
@@ -247,6 +260,45 @@ void Surgeon::burr(const ReadyStep& step, const LoopReport&, double dt_s) noexce
   }
 }
 
+bool Surgeon::work(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept {
+  const bool drills = step.plan.action == Action::drill;
+  const double above_mm = drills ? -kNear_mm : depth_mm(step, step.sweep_mm.front()) - kNear_mm;
+  const Vec3 beside = drills ? Vec3(Vec3::Zero()) : Vec3(step.sweep_mm.front() - step.site.entry_mm);
+  switch (phase_) {
+    case SurgeonPhase::approach:
+      spindle_rpm_ = step.spindle_rpm;
+      if (carry_to_depth(step, above_mm, kCarrySpeed_mm_per_s, dt_s)) enter(SurgeonPhase::spin_up);
+      hand_.target_mm += beside - beside.dot(step.site.axis) * step.site.axis;
+      break;
+    case SurgeonPhase::spin_up:
+      if (report.spindle_rpm > 0.97 * step.spindle_rpm && in_phase_s_ > 0.3) enter(SurgeonPhase::seek);
+      break;
+    case SurgeonPhase::retract: {
+      const Vec3 lateral = hand_.target_mm - step.site.entry_mm - (hand_.target_mm - step.site.entry_mm).dot(step.site.axis) * step.site.axis;
+      if (carry_to_depth(step, -kStandOff_mm, kCarrySpeed_mm_per_s, dt_s)) enter(SurgeonPhase::lift);
+      hand_.target_mm += lateral;
+      break;
+    }
+    case SurgeonPhase::lift:
+      spindle_rpm_ = 0.0;
+      return report.spindle_rpm < 1.0 && in_phase_s_ > 0.2;
+    default: drills ? drill(step, report, dt_s) : burr(step, report, dt_s); break;
+  }
+  return false;
+}
+
+bool Surgeon::give_up(const ReadyStep& step, const LoopReport& report) noexcept {
+  results_[step_].completed = false;
+  if (phase_ == SurgeonPhase::lift) return true;
+  if (phase_ == SurgeonPhase::retract) {
+    enter(SurgeonPhase::lift);
+    return false;
+  }
+  target_depth_mm_ = depth_mm(step, report.pose_bone_device.position_mm);
+  enter(SurgeonPhase::retract);
+  return false;
+}
+
 SurgeonOrder Surgeon::act(const LoopReport& report, double dt_s) noexcept {
   SurgeonOrder order;
   if (done()) return order;
@@ -271,35 +323,12 @@ SurgeonOrder Surgeon::act(const LoopReport& report, double dt_s) noexcept {
     } else if (!(report.events & kUncovered)) {
       results_[step_].completed = true;
       enter(SurgeonPhase::approach);
-    } else if (in_phase_s_ > kMostWaitForPatch_s) {
+    } else if (in_phase_s_ > most_s(step, phase_)) {
       finished = true;
     }
   } else {
     observe(step, report, dt_s);
-    const bool drills = step.plan.action == Action::drill;
-    const double above_mm = drills ? -kNear_mm : depth_mm(step, step.sweep_mm.front()) - kNear_mm;
-    const Vec3 beside = drills ? Vec3(Vec3::Zero()) : Vec3(step.sweep_mm.front() - step.site.entry_mm);
-    switch (phase_) {
-      case SurgeonPhase::approach:
-        spindle_rpm_ = step.spindle_rpm;
-        if (carry_to_depth(step, above_mm, kCarrySpeed_mm_per_s, dt_s)) enter(SurgeonPhase::spin_up);
-        hand_.target_mm += beside - beside.dot(step.site.axis) * step.site.axis;
-        break;
-      case SurgeonPhase::spin_up:
-        if (report.spindle_rpm > 0.97 * step.spindle_rpm && in_phase_s_ > 0.3) enter(SurgeonPhase::seek);
-        break;
-      case SurgeonPhase::retract: {
-        const Vec3 lateral = hand_.target_mm - step.site.entry_mm - (hand_.target_mm - step.site.entry_mm).dot(step.site.axis) * step.site.axis;
-        if (carry_to_depth(step, -kStandOff_mm, kCarrySpeed_mm_per_s, dt_s)) enter(SurgeonPhase::lift);
-        hand_.target_mm += lateral;
-        break;
-      }
-      case SurgeonPhase::lift:
-        spindle_rpm_ = 0.0;
-        finished = report.spindle_rpm < 1.0 && in_phase_s_ > 0.2;
-        break;
-      default: drills ? drill(step, report, dt_s) : burr(step, report, dt_s); break;
-    }
+    finished = in_phase_s_ > most_s(step, phase_) ? give_up(step, report) : work(step, report, dt_s);
   }
 
   order.phase = phase_;

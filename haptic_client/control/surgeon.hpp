@@ -43,6 +43,7 @@ struct ReadyStep {
   double tip_height_mm = 0;           // of a drill's point
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // of the tool, bone frame
   std::vector<Vec3> sweep_mm;         // places of the tip, burr
+  double sweep_length_mm = 0;         // from the first to the last of them
 };
 
 struct ReadyPlan {
@@ -91,8 +92,9 @@ class Surgeon {
   [[nodiscard]] bool done() const noexcept { return step_ >= plan_.steps.size(); }
   [[nodiscard]] const ReadyPlan& plan() const { return plan_; }
   [[nodiscard]] const std::vector<StepResult>& results() const { return results_; }
-  // The mapping that puts a step's site into the middle of the workspace, seen along the tool.
-  [[nodiscard]] static WorkspaceMapping mapping_for(const ReadyStep& step, double workspace_radius_mm);
+  // The mapping that puts a step's site into the middle of the workspace, seen along the tool. A small workspace needs a
+  // scale above 1; a soft device gets one below, down to `stiff_enough`, as far as its workspace reaches.
+  [[nodiscard]] static WorkspaceMapping mapping_for(const ReadyStep& step, double workspace_radius_mm, double stiff_enough);
   // The hand of a step, physical values.
   [[nodiscard]] static HandParams hand_for(const PlanStep& plan);
 
@@ -101,6 +103,10 @@ class Surgeon {
   void observe(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept;
   // Moves the target along the axis towards a depth; true when it is there.
   bool carry_to_depth(const ReadyStep& step, double depth_mm, double speed_mm_per_s, double dt_s) noexcept;
+  // One tick of a phase that the hand takes part in; true at the end of the step.
+  bool work(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept;
+  // The phase has had its time: draws the tool out, or ends the step (true) where that too takes too long.
+  bool give_up(const ReadyStep& step, const LoopReport& report) noexcept;
   void drill(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept;
   void burr(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept;
 

@@ -1,9 +1,13 @@
 #include "haptic_client/control/tool_model.hpp"
 
+#include <algorithm>
+
 namespace osteon::haptic {
 
 ToolModel::ToolModel(const Tool& definition, double pitch_mm, double wear)
-    : tool(definition), fine_pitch_mm(level_pitch_mm(pitch_mm, definition.cut_level)) {
+    : tool(definition),
+      cut_level(std::min(definition.cut_level, finest_level(pitch_mm))),
+      fine_pitch_mm(level_pitch_mm(pitch_mm, cut_level)) {
   constexpr int kActivePoints = 240;
   inset = 0.5 * fine_pitch_mm + kQuantum_mm;
   for (const SamplePoint& p : sample_points(tool, kActivePoints)) {

@@ -19,7 +19,8 @@ struct ContactPoint {
 
 struct ToolModel {
   Tool tool;
-  double fine_pitch_mm = 0;             // of the level that the tool cuts
+  int cut_level = 0;                    // the level of its cuts: the tool's own or the finest of the case
+  double fine_pitch_mm = 0;             // of that level
   double inset = 0;                     // mm, see ContactPoint
   std::vector<ContactPoint> active;     // on the part that cuts
   std::vector<ContactPoint> passive;    // walls and shank: they only block

@@ -2,6 +2,17 @@
 
 namespace osteon::haptic {
 
+Result<SimulatedDeviceParams> find_simulated_device(std::string_view name) {
+  // Force, stiffness and workspace of a PHANToM Omni, as its vendor gives them; its motors are taken never to be warm.
+  static const SimulatedDeviceParams kDevices[] = {{}, {"simulated-3.3N", {3.3, 3.3, 0.7, 100.0}}};
+  std::string names;
+  for (const SimulatedDeviceParams& device : kDevices) {
+    if (device.name == name) return device;
+    names += (names.empty() ? "" : " or ") + device.name;
+  }
+  return failure(ErrorCode::not_found, "there is no device \"" + std::string(name) + "\"; choose " + names);
+}
+
 SimulatedDevice::SimulatedDevice(const SimulatedDeviceParams& params) : params_(params), hand_(HandParams{}, Vec3::Zero()) {}
 
 DeviceReading SimulatedDevice::read() noexcept { return {{hand_.position_mm(), rotation_}, buttons_, DeviceStatus::ok}; }

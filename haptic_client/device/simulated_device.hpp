@@ -1,20 +1,26 @@
 // A device of our own making with a hand on it: time passes when step() is called, and the hand really is pushed back.
 #pragma once
+#include <string>
+
+#include "common/core/result.hpp"
 #include "common/mechanics/hand.hpp"
 #include "haptic_client/device/haptic_device.hpp"
 
 namespace osteon::haptic {
 
-// As strong as the drilling of bone, so that physical force is shown unscaled.
+// Unless named otherwise, as strong as the drilling of bone, so that physical force is shown unscaled.
 struct SimulatedDeviceParams {
+  std::string name = "simulated";
   DeviceLimits limits{60.0, 30.0, 60.0, 120.0};
 };
+// The simulated devices by name. Error not_found: names them.
+[[nodiscard]] Result<SimulatedDeviceParams> find_simulated_device(std::string_view name);
 
 class SimulatedDevice final : public HapticDevice {
  public:
   explicit SimulatedDevice(const SimulatedDeviceParams& params = {});
 
-  [[nodiscard]] std::string_view name() const override { return "simulated"; }
+  [[nodiscard]] std::string_view name() const override { return params_.name; }
   [[nodiscard]] DeviceLimits limits() const override { return params_.limits; }
   [[nodiscard]] DeviceReading read() noexcept override;
   void write(const Vec3& force_n) noexcept override;

@@ -51,15 +51,7 @@ SessionTick Bench::tick() {
 void Bench::follow() {
   CutPiece piece;
   while (session_.loop().take_piece(piece)) {
-    const Tool& tool = session_.loop().tool(piece.tool).tool;
-    Cut cut;
-    cut.author = AuthorId{1};
-    cut.author_seq = piece.author_seq;
-    cut.tool = tool.hash();
-    cut.shape = tool.cut_shape();
-    cut.level = tool.cut_level;
-    cut.path.assign(piece.path.begin(), piece.path.begin() + piece.knots);
-    cut.spindle_rpm = piece.spindle_rpm;
+    const Cut cut = cut_of(piece, session_.loop().tool(piece.tool), AuthorId{1}, 0);
     replica_.add_own(cut);
     cuts_.push_back(cut);
     on_the_way_.emplace_back(ticks_ + delays_.commit_ticks, cut);

@@ -167,6 +167,65 @@ TEST(DrillingBlock, AWeakDeviceShowsTheSameBoneLighter) {
   EXPECT_NEAR(layers.feed[0].value(), 0.89, 0.09);
 }
 
+// A desktop device is too soft for the coupling and is helped by moving farther than the tool; one with little room
+// moves less far. The bone under them is the same.
+TEST(DrillingBlock, TheWorkspaceScaleDoesNotChangeTheBone) {
+  SimulatedDeviceParams narrow;
+  narrow.limits.workspace_radius_mm = 30.0;
+  narrow.limits.stiffness_n_per_mm = 90.0;
+  const SimulatedDeviceParams desktop = *find_simulated_device("simulated-3.3N");
+  for (const SimulatedDeviceParams& device : {narrow, desktop}) {
+    Bench bench(block_case(), {drill_step(HandKind::expert)}, device);
+    Layers layers;
+    double rendered_max = 0;
+    bench.run([&](const SessionTick& tick) {
+      layers.see(tick);
+      rendered_max = std::max(rendered_max, tick.report.force_device_n.norm());
+    });
+    const double m = bench.session().loop().mapping().scale(), s = bench.session().loop().params().force_scale;
+    const double coupling = bench.session().loop().coupling_n_per_mm();
+    EXPECT_NE(m, 1.0) << device.name;
+    EXPECT_LE(m * s * coupling, device.limits.stiffness_n_per_mm * (1.0 + 1e-12)) << device.name;
+    EXPECT_LE(rendered_max, device.limits.peak_n + 1e-9) << device.name;
+    EXPECT_NEAR(layers.force[0].value(), 27, 2.7) << device.name;
+    EXPECT_NEAR(layers.feed[0].value(), 0.89, 0.09) << device.name;
+    EXPECT_NEAR(layers.force[1].value(), 11, 1.1) << device.name;
+    // Closed form of the released hand: F/K + F/K_c.
+    const double released = 27 / 5.5 + 27 / coupling;
+    EXPECT_NEAR(bench.session().surgeon().results()[0].after_exit_mm, released, 0.15 * released) << device.name;
+  }
+}
+
+// Where the bone is gone already the hand goes through and comes back.
+TEST(DrillingBlock, TheSameHoleTwiceEnds) {
+  const PlanStep step = drill_step(HandKind::expert);
+  Bench bench(block_case(), {step, step});
+  bench.run();
+  ASSERT_TRUE(bench.session().done());
+  const std::vector<StepResult>& results = bench.session().surgeon().results();
+  EXPECT_TRUE(results[0].completed && results[1].completed);
+  EXPECT_TRUE(results[0].broke_through);
+  EXPECT_FALSE(results[1].broke_through);
+  EXPECT_NEAR(results[1].deepest_mm, 30.0, 0.2);
+  EXPECT_LT(results[1].peak_force_n, 1.0);
+}
+
+// Whatever the tool reports, a step ends: a spindle that does not start, one that does not stop, bone that never gives.
+TEST(Surgeon, NoStepGoesOnForEver) {
+  for (const HandKind hand : {HandKind::expert, HandKind::rig})
+    for (const double rpm : {0.0, 1000.0})
+      for (const double force_n : {0.0, 29.0}) {
+        Surgeon surgeon(*make_ready({drill_step(hand)}, block_case()));
+        LoopReport report;
+        report.spindle_rpm = rpm;
+        report.force_physical_n = {0, 0, -force_n};
+        double time_s = 0;
+        for (; time_s < 300.0 && !surgeon.done(); time_s += 1e-3) surgeon.act(report, 1e-3);
+        EXPECT_TRUE(surgeon.done()) << rpm << " rpm, " << force_n << " N";
+        EXPECT_FALSE(surgeon.results()[0].completed) << rpm << " rpm, " << force_n << " N";
+      }
+}
+
 // The hole in the block is the drill's cylinder: 30 mm long, its mouth and exit being the block's faces.
 TEST(DrillingBlock, RemovesTheClosedFormVolume) {
   PlanStep step = drill_step(HandKind::rig);

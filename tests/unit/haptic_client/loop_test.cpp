@@ -8,6 +8,7 @@
 
 #include "common/volume/cut_field.hpp"
 #include "haptic_client/control/patch_builder.hpp"
+#include "haptic_client/control/room_watch.hpp"
 #include "tests/unit/haptic_client/bench.hpp"
 
 namespace osteon::haptic::test {
@@ -129,6 +130,79 @@ TEST_F(LoopOnBlock, WithoutALinkTheSpindleRunsDown) {
   EXPECT_EQ(tick().spindle_rpm, 0.0);
 }
 
+// k of the device is never exceeded, however far the tool moves for each millimetre of the handle.
+TEST_F(LoopOnBlock, TheDeviceFeelsNoMoreThanItsStiffness) {
+  for (const double scale : {0.5, 1.0, 4.0}) {
+    WorkspaceMapping mapping;
+    mapping.align(Eigen::Quaterniond::Identity(), scale, {0, 0, -1}, {0, 0, -1});
+    loop_->take_up(0, {{0, 0, -1}, Eigen::Quaterniond::Identity()}, mapping);
+    const auto force_at = [&](double bone_mm) {
+      input_.pose_device_tool.position_mm.z() = -1.0 + (bone_mm + 1.0) / scale;
+      for (int i = 0; i < 100; ++i) tick();
+      return tick().force_device_n.norm();
+    };
+    const double shown = (force_at(0.5) - force_at(0.3)) / (0.2 / scale);
+    EXPECT_NEAR(shown, std::min(50.0 * scale, 60.0), 1e-6) << scale;
+  }
+}
+
+// A tick that comes late is known to the loop: after three missed ones there is no force.
+TEST(Session, LateTicksReachTheLoop) {
+  PlanStep step;
+  step.action = Action::drill;
+  step.tool = "drill-3.2";
+  step.entry.point_mm = Vec3(0, 0, 0);
+  step.entry.axis = Vec3(0, 0, 1);
+  Bench bench(block_case(), {step});
+  for (int i = 0; i < 3000; ++i) {
+    bench.tick();
+    bench.follow();
+  }
+  ASSERT_GT(bench.tick().report.force_device_n.norm(), 5.0);
+  EXPECT_GT(bench.session().tick(bench.patch(), true, 3).report.force_device_n.norm(), 5.0);
+  const LoopReport late = bench.session().tick(bench.patch(), true, 4).report;
+  EXPECT_EQ(late.force_device_n.norm(), 0.0);
+  EXPECT_TRUE(late.events & kMissedTicks);
+}
+
+// No finer than the case allows: what is cut, what is felt.
+TEST(ToolModel, CutsNoFinerThanTheCase) {
+  const Tool tool = *find_tool("drill-3.2");
+  for (const double h : {0.5, 0.25, 0.15, 0.08}) {
+    const ToolModel model(tool, h);
+    EXPECT_EQ(model.cut_level, std::min(tool.cut_level, finest_level(h))) << h;
+    EXPECT_EQ(model.fine_pitch_mm, level_pitch_mm(h, model.cut_level)) << h;
+    EXPECT_EQ(cut_of(CutPiece{}, model, AuthorId{1}, 7).level, model.cut_level) << h;
+  }
+  EXPECT_LT(ToolModel(tool, 0.15).cut_level, tool.cut_level);
+}
+
+// Bone that only this client has seen go stays little when the room does not answer.
+TEST(RoomWatch, HoldsTheSpindleWhileTheRoomDoesNotFollow) {
+  RoomWatch watch;
+  EXPECT_EQ(watch.update(100.0, false, 0), RoomHealth::follows);
+  EXPECT_EQ(watch.update(200.0, false, 0), RoomHealth::follows);  // nobody cuts, nothing need come
+  EXPECT_EQ(watch.update(201.9, false, 1), RoomHealth::follows);
+  EXPECT_EQ(watch.update(202.1, false, 1), RoomHealth::silent);
+  EXPECT_EQ(watch.update(202.2, true, 1), RoomHealth::follows);
+  EXPECT_EQ(watch.update(223.0, false, 1), RoomHealth::lost);
+
+  EXPECT_EQ(watch.update(300.0, true, 512), RoomHealth::follows);
+  EXPECT_EQ(watch.update(300.1, true, 513), RoomHealth::behind);
+  EXPECT_EQ(watch.update(300.2, true, 300), RoomHealth::behind);  // not on and off at the limit
+  EXPECT_EQ(watch.update(300.3, true, 256), RoomHealth::follows);
+}
+
+TEST(SimulatedDevice, IsChosenByName) {
+  EXPECT_EQ(find_simulated_device("simulated")->limits.continuous_n, 30.0);
+  const SimulatedDevice desktop(*find_simulated_device("simulated-3.3N"));
+  EXPECT_EQ(desktop.name(), "simulated-3.3N");
+  EXPECT_NEAR(loop_params(desktop.limits().peak_n, desktop.limits().continuous_n, desktop.limits().stiffness_n_per_mm, 0.0).force_scale, 0.11, 1e-12);
+  const auto none = find_simulated_device("phantom");
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().message.find("simulated"), std::string::npos);
+}
+
 // A drill in its own hole has no play to speak of sideways, does not jam along it, and feels nothing where it has cut.
 TEST(DrillInItsHole, IsHeldSidewaysAndFreeAlongTheAxis) {
   PlanStep step;
@@ -230,9 +304,54 @@ TEST(Replica, ARejectedCutComesBack) {
   (void)replica.take_changes();
   replica.commit(RoomSeq{1}, cut_at(1, -3), true);
   replica.reject(RoomSeq{2}, 2);
+  replica.settle();
   EXPECT_LT(replica.predicted().solid_mm({3, 0, 1}), 0.0);
   EXPECT_GT(replica.predicted().solid_mm({-3, 0, 1}), 0.0);
   EXPECT_FALSE(replica.take_changes().empty());
+  EXPECT_EQ(replica.unconfirmed(), 0u);
+  EXPECT_EQ(replica.predicted().hash(), replica.committed().hash());
+}
+
+// Rejections in a row, among cuts of one's own and of others through the same bone: what is left is the committed field
+// and what is still pending, and the pending cuts are made again once, the committed ones not at all.
+TEST(Replica, RejectionsInARowAreSettledOnce) {
+  const Case bone = block_case();
+  const Tool tool = *find_tool("drill-3.2");
+  const auto cut_at = [&](std::uint64_t author, std::uint64_t seq, double x) {
+    Cut cut;
+    cut.author = AuthorId{author};
+    cut.author_seq = seq;
+    cut.shape = tool.cut_shape();
+    cut.level = tool.cut_level;
+    cut.path = {quantise(pose_along({x, 0, 0}, Vec3::UnitZ())), quantise(pose_along({x, 0, 3}, Vec3::UnitZ()))};
+    return cut;
+  };
+  Replica replica(bone, BodyId{});
+  CutField expected(bone, BodyId{});
+  std::uint64_t place = 0;
+  for (int i = 0; i < 20; ++i) {
+    replica.commit(RoomSeq{++place}, cut_at(2, 1 + i, -4.0 + 0.1 * i), false);
+    expected.apply(cut_at(2, 1 + i, -4.0 + 0.1 * i));
+  }
+  // 1 to 6 overlap: what 5 would take is gone by 2 already, which is rejected.
+  const double x[] = {-2.5, 0.0, 0.6, 2.5, 0.1, 3.5};
+  for (std::uint64_t seq = 1; seq <= 6; ++seq) replica.add_own(cut_at(1, seq, x[seq - 1]));
+  (void)replica.take_changes();
+  replica.reject(RoomSeq{++place}, 2);
+  replica.reject(RoomSeq{++place}, 3);
+  replica.commit(RoomSeq{++place}, cut_at(2, 21, 4.0), false);
+  expected.apply(cut_at(2, 21, 4.0));
+  replica.reject(RoomSeq{++place}, 4);
+  replica.settle();
+  EXPECT_EQ(replica.committed().hash(), expected.hash());
+  for (const std::uint64_t seq : {1, 5, 6}) expected.apply(cut_at(1, seq, x[seq - 1]));
+  EXPECT_EQ(replica.predicted().hash(), expected.hash());
+  EXPECT_EQ(replica.cut_again(), 3u);
+  // One that took back what a rejected one had taken may be rejected later.
+  replica.reject(RoomSeq{++place}, 5);
+  replica.settle();
+  replica.commit(RoomSeq{++place}, cut_at(1, 1, x[0]), true);
+  replica.commit(RoomSeq{++place}, cut_at(1, 6, x[5]), true);
   EXPECT_EQ(replica.unconfirmed(), 0u);
   EXPECT_EQ(replica.predicted().hash(), replica.committed().hash());
 }
