@@ -17,8 +17,8 @@ from session import ROOT, Session, save
 
 EXAMPLE = "usr/share/doc/invesalius-examples/examples/Cranium.inv3"
 
-# Rendered over physical force: what suits a desktop device that can hold 3.3 N.
-DEVICE_SCALE = 0.11
+# A desktop device that can hold 3.3 N, so that the rendered force is what such a one would show.
+DEVICE = "simulated-3.3N"
 
 
 def say(line):
@@ -75,7 +75,7 @@ def run_on_some_side(programs, case, directions, out):
     """The session; a bone that does not lie along one direction is tried from the next."""
     for direction in directions:
         try:
-            return Session(programs, case, plans.drill_and_window(direction), out, say, scale=DEVICE_SCALE).run()
+            return Session(programs, case, plans.drill_and_window(direction), out, say, device=DEVICE).run()
         except Failure as failure:
             if direction == directions[-1] or "entry" not in failure.detail:
                 raise

@@ -48,9 +48,9 @@ class Session:
     """What one session needs; `say` gets its live status. Results lie in `out`."""
 
     def __init__(self, programs: Path, case: Path, plan, out: Path, say=print, pictures=True, late_viewer=False,
-                 scale=None, size="1280x720"):
+                 device="simulated", size="1280x720"):
         self.programs, self.case, self.plan, self.out, self.say = programs, case, plan, out, say
-        self.pictures, self.late_viewer, self.scale, self.size = pictures, late_viewer, scale, size
+        self.pictures, self.late_viewer, self.device, self.size = pictures, late_viewer, device, size
         self.started = time.monotonic()
         self.info = case_info(programs, case)
 
@@ -125,10 +125,9 @@ class Session:
         cache = ROOT / "build" / "case-cache"
         cache.mkdir(parents=True, exist_ok=True)
         haptic = self.household.start("osteon-haptic", [
-            self.programs / "osteon-haptic", "--server", address, "--plan", plan_file, "--device", "simulated",
+            self.programs / "osteon-haptic", "--server", address, "--plan", plan_file, "--device", self.device,
             "--session-log", self.out / "session.csv", "--cut-log", self.out / "cuts.csv",
-            "--summary", self.out / "haptic.json", "--cache", cache, "--status",
-            *(["--scale", str(self.scale)] if self.scale else [])])
+            "--summary", self.out / "haptic.json", "--cache", cache, "--status"])
         haptic.may_end = True
         began = time.monotonic()
         cutting_lines, photographed = 0, False
@@ -185,7 +184,7 @@ class Session:
         summaries = {name: record.read_json(self.out / f"{name}.json") for name in ("server", "haptic", "viewer", "audio")}
         statuses = [record.read_json(file) for file in sorted(self.out.glob("*viewer_status.json"))]
         numbers = {
-            "device": "simulated",
+            "device": self.device,
             "machine": record.machine(),
             "picture": self.picture,
             "case": self.info,
