@@ -12,20 +12,20 @@ namespace osteon {
 Result<void> write_file(const std::filesystem::path& file, std::string_view content) {
   std::filesystem::path partial = file;
   partial += ".partial-" + std::to_string(::getpid());
+  const auto give_up = [&](const std::string& reason) -> Result<void> {
+    std::error_code ignored;
+    std::filesystem::remove(partial, ignored);
+    return failure(ErrorCode::internal, "cannot write " + file.string() + ": " + reason);
+  };
   {
     std::ofstream out(partial, std::ios::binary | std::ios::trunc);
     out.write(content.data(), static_cast<std::streamsize>(content.size()));
     out.flush();
-    if (!out) {
-      const std::string reason = std::strerror(errno);
-      std::error_code ignored;
-      std::filesystem::remove(partial, ignored);
-      return failure(ErrorCode::internal, "cannot write " + file.string() + ": " + reason);
-    }
+    if (!out) return give_up(std::strerror(errno));
   }
   std::error_code error;
   std::filesystem::rename(partial, file, error);
-  if (error) return failure(ErrorCode::internal, "cannot write " + file.string() + ": " + error.message());
+  if (error) return give_up(error.message());
   return {};
 }
 

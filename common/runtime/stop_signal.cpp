@@ -24,10 +24,7 @@ void raise_flag() noexcept {
   if (descriptor >= 0) [[maybe_unused]] const auto written = ::write(descriptor, &one, sizeof one);
 }
 
-void on_signal(int number) {
-  if (number == SIGINT && stop_requested.load(std::memory_order_acquire)) ::_exit(130);
-  raise_flag();
-}
+void on_signal(int) { raise_flag(); }
 
 }  // namespace
 

@@ -4,7 +4,8 @@
 
 namespace osteon {
 
-// One per process, made in main before other threads start. A second SIGINT ends the process at once.
+// One per process, made in main before other threads start. A second signal changes nothing: an impatient person must
+// not leave half-written files. SIGQUIT still ends a process that hangs.
 class StopSignal {
  public:
   StopSignal();

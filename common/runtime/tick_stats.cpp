@@ -43,10 +43,4 @@ double DurationHistogram::percentile_us(double percent) const noexcept {
   return max_us();
 }
 
-void DurationHistogram::merge(const DurationHistogram& other) noexcept {
-  for (std::size_t i = 0; i < bins_.size(); ++i) bins_[i] += other.bins_[i];
-  count_ += other.count_;
-  max_ns_ = std::max(max_ns_, other.max_ns_);
-}
-
 }  // namespace osteon

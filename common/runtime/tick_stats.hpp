@@ -12,7 +12,6 @@ class DurationHistogram {
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
   [[nodiscard]] double percentile_us(double percent) const noexcept;  // 0 when empty
   [[nodiscard]] double max_us() const noexcept { return static_cast<double>(max_ns_) / 1000.0; }
-  void merge(const DurationHistogram& other) noexcept;
 
  private:
   // Bins: 32 for each power of two of nanoseconds.
@@ -27,7 +26,7 @@ class DurationHistogram {
 struct TickStats {
   DurationHistogram lateness;  // start of the tick after its due time
   DurationHistogram work;      // from start to end of the tick
-  std::uint64_t missed = 0;    // ticks that began a whole period late or more
+  std::uint64_t missed = 0;    // periods that no tick ran in, because the one before came too late
 };
 
 }  // namespace osteon

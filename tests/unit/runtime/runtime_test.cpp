@@ -83,6 +83,7 @@ TEST(PeriodicTimer, NeverTicksEarlyAndCountsWhatItMissed) {
   }
   EXPECT_GE(std::chrono::steady_clock::now() - start, 2ms * periods);
   EXPECT_GE(stats.missed, 3u);
+  EXPECT_EQ(stats.missed + 20u, static_cast<unsigned>(periods)) << "a period has its tick or is missed";
   EXPECT_EQ(stats.lateness.count(), 20u);
   EXPECT_EQ(stats.work.count(), 20u);
 }
@@ -100,6 +101,19 @@ TEST(StopSignal, IsRaisedBySigterm) {
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }
 
+// Whoever presses Ctrl-C again must not cut off what the program writes before it ends.
+TEST(StopSignal, ASecondSigintCutsNothingOff) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    StopSignal stop;
+    for (int i = 0; i < 3; ++i) ::kill(::getpid(), SIGINT);
+    ::_exit(stop.wait_for(10s) ? 0 : 3);
+  }
+  int status = -1;
+  ::waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+}
+
 TEST(Files, AreWrittenWholeAndReadBack) {
   const test::TempDir temp;
   ASSERT_TRUE(write_file(temp / "a", "first"));
@@ -110,6 +124,11 @@ TEST(Files, AreWrittenWholeAndReadBack) {
   ASSERT_FALSE(missing);
   EXPECT_NE(missing.error().message.find("b"), std::string::npos);
   EXPECT_FALSE(write_file(temp / "no-folder" / "c", "x"));
+
+  // A folder in the file's place cannot be renamed over.
+  std::filesystem::create_directory(temp / "folder");
+  EXPECT_FALSE(write_file(temp / "folder", "x"));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp.path()), {}), 2) << "a partial file was left";
 }
 
 TEST(Log, LinesHaveKeysAndQuotesWhereNeeded) {
