@@ -1,7 +1,9 @@
 // osteon-audio: joins a room and makes its tools heard.
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
+#include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -9,6 +11,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
 
 #include "audio_client/net/cutting_watch.hpp"
@@ -41,6 +44,22 @@ struct Options {
   std::filesystem::path wav_file, state_log_file, summary_file;
   double patience_s = 5;
 };
+
+// Whether a file could be written there; what it holds stays. No file is always well.
+Result<void> check_writable(const std::filesystem::path& file, const std::string& what, const std::string& option) {
+  if (file.empty()) return {};
+  std::error_code ignored;
+  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  int reason = 0;
+  if (std::filesystem::is_directory(file, ignored))
+    reason = EISDIR;
+  else if (std::filesystem::exists(file, ignored) ? ::access(file.c_str(), W_OK) != 0 : ::access(folder.c_str(), W_OK | X_OK) != 0)
+    reason = errno;
+  if (reason == 0) return {};
+  return failure(ErrorCode::internal, "cannot write " + what + " " + file.string() + ": " +
+                                          std::generic_category().message(reason) + "; give " + option +
+                                          " a file in a folder that exists and may be written");
+}
 
 // Rows of the state log and the latency that they add up to.
 //
@@ -122,17 +141,12 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   output_params.kind = *kind;
 
   // What fails on this machine is found before the server is bothered.
-  StateLog states;
-  if (Result<void> opened = states.open(options.state_log_file); !opened) return opened;
+  if (Result<void> usable = check_writable(options.state_log_file, "the state log", "--state-log"); !usable) return usable;
+  if (Result<void> usable = check_writable(options.wav_file, "the recording", "--wav"); !usable) return usable;
   std::optional<audio::WavRecorder> recorder;
-  if (!options.wav_file.empty()) {
-    Result<audio::WavRecorder> opened = audio::WavRecorder::open(options.wav_file, output_params.rate_hz);
-    if (!opened) return tl::unexpected(opened.error());
-    recorder = std::move(*opened);
-  }
   audio::SynthParams synth_params;
   synth_params.rate_hz = output_params.rate_hz;
-  audio::SoundEngine engine(synth_params, recorder ? &*recorder : nullptr);
+  audio::SoundEngine engine(synth_params);
   Result<std::unique_ptr<audio::AudioOutput>> output = audio::open_output(output_params, engine);
   if (!output) return tl::unexpected(output.error());
 
@@ -143,6 +157,16 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   // A stop is what was asked for, also before the server answered.
   if (!room && room.error().code == ErrorCode::cancelled) return {};
   if (!room) return tl::unexpected(room.error());
+
+  // Only now: opening empties the files, and without a server an earlier recording must stay.
+  StateLog states;
+  if (Result<void> opened = states.open(options.state_log_file); !opened) return opened;
+  if (!options.wav_file.empty()) {
+    Result<audio::WavRecorder> opened = audio::WavRecorder::open(options.wav_file, output_params.rate_hz);
+    if (!opened) return tl::unexpected(opened.error());
+    recorder = std::move(*opened);
+    engine.record_to(*recorder);
+  }
   if (Result<void> started = (*output)->start(); !started) return started;
   log::info("joined", {{"server", options.server}, {"case", room->case_title}, {"output", options.output}});
 

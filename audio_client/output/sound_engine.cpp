@@ -12,10 +12,7 @@ std::int64_t now_ns() noexcept { return std::chrono::steady_clock::now().time_si
 
 }  // namespace
 
-SoundEngine::SoundEngine(const SynthParams& params, WavRecorder* recorder)
-    : rate_hz_(params.rate_hz), recorder_(recorder) {
-  synth_.prepare(params);
-}
+SoundEngine::SoundEngine(const SynthParams& params) : rate_hz_(params.rate_hz) { synth_.prepare(params); }
 
 void SoundEngine::render(std::span<float> mono) noexcept {
   const std::int64_t start_ns = now_ns();

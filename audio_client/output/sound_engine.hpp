@@ -23,8 +23,9 @@ struct Sounded {
 
 class SoundEngine final : public SoundSource {
  public:
-  // `recorder` may be null, else it must outlive the engine.
-  SoundEngine(const SynthParams& params, WavRecorder* recorder);
+  explicit SoundEngine(const SynthParams& params);
+  // Records from now on; before the output starts. The recorder must outlive the engine's last render().
+  void record_to(WavRecorder& recorder) noexcept { recorder_ = &recorder; }
 
   void deliver(const SoundScene& scene) noexcept { scenes_.store(scene); }            // one thread only
   void render(std::span<float> mono) noexcept override;                               // [audio]
@@ -45,7 +46,7 @@ class SoundEngine final : public SoundSource {
 
   double rate_hz_;
   DrillSynth synth_;
-  WavRecorder* recorder_;
+  WavRecorder* recorder_ = nullptr;
   LatestValue<SoundScene> scenes_;
   EventQueue<Sounded, 1024> sounded_;
   SoundScene last_;  // what was noted last, to note each state once

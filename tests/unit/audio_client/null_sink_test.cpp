@@ -134,7 +134,7 @@ TEST(PulseOutput, RenderedToneArrivesAtTheSink) {
 }
 
 TEST(PulseOutput, DrillIsHeardThroughTheServer) {
-  SoundEngine engine({}, nullptr);
+  SoundEngine engine(SynthParams{});
   auto output = open_output({.kind = OutputKind::pulse}, engine);
   ASSERT_TRUE(output) << output.error().message;
   Monitor monitor;

@@ -36,7 +36,7 @@ struct CountingSource final : SoundSource {
 };
 
 TEST(SoundEngine, NotesEachStateOnceWhenItIsFirstRendered) {
-  SoundEngine engine({}, nullptr);
+  SoundEngine engine(SynthParams{});
   std::vector<float> frames(256);
   CuttingState state = test::cortical_drill(1345);
   const std::int64_t before = std::chrono::steady_clock::now().time_since_epoch().count();
@@ -61,7 +61,7 @@ TEST(SoundEngine, NotesEachStateOnceWhenItIsFirstRendered) {
 }
 
 TEST(SoundEngine, StatedLatencyIsWhereASceneIsFirstHeard) {
-  SoundEngine engine({}, nullptr);
+  SoundEngine engine(SynthParams{});
   std::vector<float> frames(1024);
   engine.deliver(scene_of(test::free_drill(1400), 1));
   engine.render(frames);
@@ -75,7 +75,8 @@ TEST(SoundEngine, RenderDoesNotAllocateEvenWhileRecording) {
   const test::TempDir temp;
   auto recorder = WavRecorder::open(temp / "a.wav", 48000);
   ASSERT_TRUE(recorder);
-  SoundEngine engine({}, &*recorder);
+  SoundEngine engine(SynthParams{});
+  engine.record_to(*recorder);
   std::vector<float> frames(256);
   std::vector<SoundScene> scenes;
   const test::ScriptedDrilling script = test::scripted_drilling();
