@@ -241,6 +241,7 @@ class Client {
   void take(const FieldLeaf& leaf) { replica_.restore(leaf); }
   void take(const Complete& complete) {
     replica_.joined(complete.contained);
+    noted_mm3_ = replica_.predicted().removed_mm3();  // by others, before the first step
     joined_ = true;
   }
   void take(const Committed& committed) {
