@@ -145,21 +145,31 @@ void CutField::restore(const FieldLeaf& leaf) {
 }
 
 std::vector<FieldLeaf> CutField::leaves() const {
+  std::vector<FieldLeaf> all = leaf_places();
+  for (FieldLeaf& leaf : all) read(leaf);
+  return all;
+}
+
+std::vector<FieldLeaf> CutField::leaf_places() const {
   std::vector<FieldLeaf> all;
   for (int level = 0; level < kLevels; ++level) {
     const SparseVolume& cuts = grids_->cuts[static_cast<std::size_t>(level)];
     const std::size_t first = all.size();
-    for (const Coord origin : cuts.leaves()) {
-      FieldLeaf leaf{grids_->body, level, origin, std::vector<std::int16_t>(kLeafVoxels)};
-      std::ranges::transform(std::span(cuts.leaf(origin), kLeafVoxels), leaf.values.begin(), to_quanta);
-      all.push_back(std::move(leaf));
-    }
-    for (const Coord origin : cuts.constants())
-      all.push_back({grids_->body, level, origin, std::vector<std::int16_t>(kLeafVoxels, to_quanta(cuts.value(origin)))});
+    for (const auto& origins : {cuts.leaves(), cuts.constants()})
+      for (const Coord origin : origins) all.push_back({grids_->body, level, origin, {}});
     std::sort(all.begin() + static_cast<std::ptrdiff_t>(first), all.end(),
               [](const FieldLeaf& a, const FieldLeaf& b) { return a.origin < b.origin; });
   }
   return all;
+}
+
+void CutField::read(FieldLeaf& leaf) const {
+  const SparseVolume& cuts = grids_->cuts[static_cast<std::size_t>(leaf.level)];
+  leaf.values.resize(kLeafVoxels);
+  if (const float* values = cuts.leaf(leaf.origin))
+    std::ranges::transform(std::span(values, kLeafVoxels), leaf.values.begin(), to_quanta);
+  else
+    std::ranges::fill(leaf.values, to_quanta(cuts.value(leaf.origin)));
 }
 
 Digest CutField::hash() const { return field_hash(leaves(), grids_->bone.pitch_mm()); }

@@ -32,6 +32,10 @@ class CutField {
 
   [[nodiscard]] const Case& bone() const;
   [[nodiscard]] std::vector<FieldLeaf> leaves() const;  // sorted by (level, origin)
+  // The same in two steps, for a reader that cannot hold the field still while it copies: the leaves without values,
+  // then the present values of one of them. A leaf stays in its place for ever.
+  [[nodiscard]] std::vector<FieldLeaf> leaf_places() const;
+  void read(FieldLeaf& leaf) const;
   [[nodiscard]] Digest hash() const;                    // field_hash of leaves()
   [[nodiscard]] bool has_cuts(int level, const CoordBox& box) const;  // any R below the band in the box of that level
 

@@ -17,6 +17,9 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kMaxReceiveBytes = 4 * 1024 * 1024;  // a piece of a case is 1 MiB, a mesh message about 256 kB
 constexpr auto kAnswerTime = 5s;                   // for one request to a server that was reached
+// A server that is silent so long is asked whether it lives, and gone if it has not answered in kPingAnswerMs. The server
+// allows pings from kShortestPingMs on (server/net/room_server.cpp).
+constexpr int kPingMs = 2000, kPingAnswerMs = 3000;
 
 std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
   // What fails is told in one sentence by the program, not in gRPC's own lines.
@@ -26,6 +29,10 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 50);
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 200);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 200);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kPingMs);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kPingAnswerMs);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
 }
@@ -96,17 +103,6 @@ Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const 
   room.bounds = {from_wire(response.bounds_min_mm()), from_wire(response.bounds_max_mm())};
   room.room_seq = RoomSeq{response.room_seq()};
   return room;
-}
-
-Result<RoomStatus> room_status(const JoinedRoom& room) {
-  v1::GetStatusResponse response;
-  grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + kAnswerTime);
-  const grpc::Status status = v1::RoomService::NewStub(room.channel)->GetStatus(&context, {}, &response);
-  if (!status.ok()) return tl::unexpected(error_of(status, "the server"));
-  const Result<Digest> hash = digest_from_wire(response.field_hash());
-  if (!hash) return tl::unexpected(hash.error());
-  return RoomStatus{RoomSeq{response.room_seq()}, *hash, response.removed_mm3(), response.rejected()};
 }
 
 }  // namespace osteon::wire

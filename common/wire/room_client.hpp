@@ -35,12 +35,4 @@ struct JoinedRoom {
 [[nodiscard]] Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
                                            std::chrono::milliseconds patience, const std::function<bool()>& stop);
 
-struct RoomStatus {
-  RoomSeq room_seq;
-  Digest field_hash;
-  double removed_mm3 = 0;
-  std::uint64_t rejected = 0;
-};
-[[nodiscard]] Result<RoomStatus> room_status(const JoinedRoom& room);
-
 }  // namespace osteon::wire

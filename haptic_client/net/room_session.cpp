@@ -271,13 +271,6 @@ void RoomSession::send(const CuttingState& state) {
   impl_->wake.notify_one();
 }
 
-std::size_t RoomSession::waiting_cuts() const {
-  const std::lock_guard lock(impl_->mutex);
-  return impl_->cuts.size();
-}
-
-Result<wire::RoomStatus> RoomSession::status() const { return wire::room_status(impl_->room); }
-
 void RoomSession::close() {
   if (!impl_ || !impl_->reader.joinable()) return;
   {

@@ -59,8 +59,6 @@ class RoomSession {
   [[nodiscard]] bool send(const Cut& cut);
   // Newest wins: a state that is still waiting is replaced. Cuts that are waiting go first.
   void send(const CuttingState& state);
-  [[nodiscard]] std::size_t waiting_cuts() const;
-  [[nodiscard]] Result<wire::RoomStatus> status() const;  // asks the server
   // Ends the stream after what is waiting was sent, at most a second, and joins the thread. Again: does nothing.
   void close();
 

@@ -5,13 +5,10 @@
 #include "common/wire/convert.hpp"
 
 namespace osteon {
-namespace {
 
 Bytes serialised(const google::protobuf::MessageLite& message) {
   return std::make_shared<const std::string>(message.SerializeAsString());
 }
-
-}  // namespace
 
 MeshOutbox::MeshOutbox(MeshUpdate snapshot)
     : waiting_(std::move(snapshot.blocks)),
@@ -61,10 +58,11 @@ MessageParts MeshOutbox::take() {
   return parts;
 }
 
-void SessionOutbox::begin(std::vector<FieldLeaf> leaves, RoomSeq contained) {
+void SessionOutbox::begin(RoomSeq contained) { contained_ = contained; }
+
+void SessionOutbox::set_leaves(std::vector<FieldLeaf> leaves) {
   leaves_ = std::move(leaves);
-  contained_ = contained;
-  begun_ = true;
+  leaves_known_ = true;
 }
 
 bool SessionOutbox::add(RoomSeq place, Bytes row) { return place <= contained_ || add_answer(std::move(row)); }
@@ -76,7 +74,7 @@ bool SessionOutbox::add_answer(Bytes row) {
 }
 
 MessageParts SessionOutbox::take() {
-  if (!begun_) return {};
+  if (!leaves_known_) return {};
   v1::SessionResponse response;
   if (next_leaf_ < leaves_.size()) {
     *response.mutable_leaf() = wire::to_wire(leaves_[next_leaf_]);

@@ -13,10 +13,15 @@
 #include "common/field/field_hash.hpp"
 #include "common/surface/mesh_block.hpp"
 
+namespace google::protobuf {
+class MessageLite;
+}
+
 namespace osteon {
 
 // Serialised once and shared by every subscriber that it waits for or travels to.
 using Bytes = std::shared_ptr<const std::string>;
+[[nodiscard]] Bytes serialised(const google::protobuf::MessageLite& message);
 
 // One message in pieces that are sent behind each other; empty when there is nothing to send.
 using MessageParts = std::vector<Bytes>;
@@ -57,8 +62,11 @@ class SessionOutbox {
  public:
   static constexpr std::size_t kMaxRows = 8192;
 
-  void begin(std::vector<FieldLeaf> leaves, RoomSeq contained);
-  // A row of the room's order; one that the leaves contain is skipped. False when kMaxRows wait already; the row is then
+  void begin(RoomSeq contained);
+  // Copied while rows may have come already: every leaf contains at least the order up to `contained`. What it contains
+  // beyond that changes nothing when its row is applied again, since a cut field is a minimum over its cuts.
+  void set_leaves(std::vector<FieldLeaf> leaves);
+  // A row of the room's order; one up to `contained` is skipped. False when kMaxRows wait already; the row is then
   // not taken.
   [[nodiscard]] bool add(RoomSeq place, Bytes row);
   // An answer outside the order: the first outcome of a cut that was sent again.
@@ -70,7 +78,7 @@ class SessionOutbox {
   std::vector<FieldLeaf> leaves_;
   std::size_t next_leaf_ = 0;
   RoomSeq contained_;
-  bool begun_ = false, complete_said_ = false;
+  bool leaves_known_ = false, complete_said_ = false;
   std::deque<Bytes> rows_;
 };
 

@@ -20,10 +20,6 @@ namespace {
 
 using Clock = RoomHost::Clock;
 
-Bytes serialised(const google::protobuf::MessageLite& message) {
-  return std::make_shared<const std::string>(message.SerializeAsString());
-}
-
 Bytes block_message(const BlockKey& key, const StoredBlock& block) {
   v1::WatchMeshResponse response;
   v1::MeshBlock& out = *response.add_blocks();
@@ -68,8 +64,11 @@ constexpr std::uint64_t kShowIdleTicks = 1200;
 
 }  // namespace
 
-// Lock order: room_, then sessions_mutex_ or mesh_mutex_ or cutting_mutex_, then a stream's own; queue_mutex_ and
-// jobs_mutex_ are never held with another.
+// Leaves copied at once. Between two batches the room goes on cutting.
+constexpr std::size_t kLeafBatch = 64;
+
+// Lock order: room_mutex, then sessions_mutex or mesh_mutex or cutting_mutex, then a stream's own, then jobs_mutex.
+// queue_mutex, mesh_wake_mutex and stats_mutex are never held with another.
 struct RoomHost::Impl {
   Impl(Room r, HostRates rates) : room(std::move(r)), rates_(rates) {}
 
@@ -81,11 +80,14 @@ struct RoomHost::Impl {
   void publish_states();
   void make_stale_blocks();
   void session_over(AuthorId author);
+  void read_leaves(std::vector<FieldLeaf>& leaves);
 
   Room room;
   std::shared_mutex room_mutex;
+  std::optional<std::vector<Cut>> meanwhile;  // under room_mutex: cuts applied since bone_status() began to copy
   const HostRates rates_;
   std::atomic<std::uint64_t> room_seq{0}, authors{0};
+  std::atomic<std::size_t> stale{0};
   std::atomic<bool> stopping{false};
 
   std::mutex queue_mutex;
@@ -120,7 +122,6 @@ struct RoomHost::Impl {
   TickStats stats;
   DurationHistogram mesh_update;
   RoomCounts counts;
-  std::size_t stale = 0;
 
   std::optional<std::string> ended;  // under sessions, cutting and mesh mutex: why new streams end at once
   std::optional<BoneStatus> last_status;  // of the job thread
@@ -171,8 +172,12 @@ void RoomHost::Impl::run_ticks() {
       mesh_wake.notify_one();
     }
     timer.done(own);
-    // Others read a copy, so that a tick never waits for a reader of its histograms.
-    if (const std::unique_lock lock(stats_mutex, std::try_to_lock); lock || last) stats = own;
+    // Others read a copy, so that a tick never waits for a reader of its figures; only the last one makes sure.
+    std::unique_lock lock(stats_mutex, std::try_to_lock);
+    if (!lock && last) lock.lock();
+    if (!lock) continue;
+    stats = own;
+    counts = room.counts();  // which no other thread changes
   }
 }
 
@@ -181,9 +186,8 @@ void RoomHost::Impl::decide(QueuedCut& queued) {
     const std::unique_lock lock(room_mutex);
     Result<Outcome> decision = room.submit(queued.cut);
     room_seq = room.room_seq().value;
-    const std::lock_guard stats_lock(stats_mutex);
-    counts = room.counts();
     stale = room.stale_blocks();
+    if (meanwhile && decision && decision->committed() && !decision->repeated) meanwhile->push_back(queued.cut);
     return decision;
   }();
   if (!outcome) {
@@ -277,6 +281,7 @@ void RoomHost::Impl::make_stale_blocks() {
   {
     const std::unique_lock lock(room_mutex);
     keys = room.take_stale_blocks();
+    stale = 0;
     update.room_seq = room.room_seq();
   }
 
@@ -390,40 +395,63 @@ Digest RoomHost::surface_hash() const {
   return impl_->store.hash();
 }
 
+// In batches: a room that is much cut has many leaves, and a tick must not wait until all of them are copied.
+void RoomHost::Impl::read_leaves(std::vector<FieldLeaf>& leaves) {
+  for (std::size_t i = 0; i < leaves.size();) {
+    const std::shared_lock lock(room_mutex);
+    for (const std::size_t end = std::min(leaves.size(), i + kLeafBatch); i < end; ++i) room.field().read(leaves[i]);
+  }
+}
+
 BoneStatus RoomHost::bone_status() {
   std::vector<FieldLeaf> leaves;
+  {
+    // Only this thread and, with the lock alone, the tick's use `meanwhile`.
+    const std::shared_lock lock(impl_->room_mutex);
+    if (impl_->last_status && impl_->last_status->room_seq == impl_->room.room_seq()) return *impl_->last_status;
+    leaves = impl_->room.field().leaf_places();
+    impl_->meanwhile.emplace();
+  }
+  impl_->read_leaves(leaves);
   BoneStatus status;
+  std::vector<Cut> meanwhile;
   {
     const std::shared_lock lock(impl_->room_mutex);
     status.room_seq = impl_->room.room_seq();
     status.counts = impl_->room.counts();
-    if (impl_->last_status && impl_->last_status->room_seq == status.room_seq) return *impl_->last_status;
-    leaves = impl_->room.leaves();
+    meanwhile = std::move(*impl_->meanwhile);
+    impl_->meanwhile.reset();
   }
-  // Measured on a copy, so that the room is not kept from cutting.
+  // Measured on a copy, so that the room is not kept from cutting. Leaves that contain some of the cuts since their
+  // copying began get the others now, and those once more, which changes nothing: the copy is the bone at room_seq.
   CutField copy(bone(), BodyId{0});
   for (const FieldLeaf& leaf : leaves) copy.restore(leaf);
+  for (const Cut& cut : meanwhile) copy.apply(cut);
   status.removed_mm3 = copy.removed_mm3();
-  status.field_hash = osteon::field_hash(std::move(leaves), bone().pitch_mm());
+  status.field_hash = copy.hash();
   impl_->last_status = status;
   return status;
 }
 
 Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink) {
-  // Held until the sink is listed: every row after these leaves is committed, and so offered, later.
-  const std::shared_lock room_lock(impl_->room_mutex);
-  if (!impl_->room.may_cut(sink->author()))
-    return failure(ErrorCode::invalid_input, "open.author " + std::to_string(sink->author().value) +
-                                                 " has not joined this room as a haptic client; call Join first");
-  std::vector<FieldLeaf> leaves = impl_->room.leaves();
-  const RoomSeq contained = impl_->room.room_seq();
-  const std::lock_guard lock(impl_->sessions_mutex);
-  if (!impl_->open_authors.insert(sink->author()).second)
-    return failure(ErrorCode::invalid_input,
-                   "open.author " + std::to_string(sink->author().value) + " has an open session; join again for another");
-  impl_->sessions.add(*sink);
-  sink->begin(std::move(leaves), contained);
-  if (impl_->ended) sink->end(*impl_->ended);
+  std::vector<FieldLeaf> leaves;
+  {
+    // Held until the sink is listed: every row after `contained` is committed, and so offered, later.
+    const std::shared_lock room_lock(impl_->room_mutex);
+    if (!impl_->room.may_cut(sink->author()))
+      return failure(ErrorCode::invalid_input, "open.author " + std::to_string(sink->author().value) +
+                                                   " has not joined this room as a haptic client; call Join first");
+    leaves = impl_->room.field().leaf_places();
+    const std::lock_guard lock(impl_->sessions_mutex);
+    if (!impl_->open_authors.insert(sink->author()).second)
+      return failure(ErrorCode::invalid_input,
+                     "open.author " + std::to_string(sink->author().value) + " has an open session; join again for another");
+    impl_->sessions.add(*sink);
+    sink->begin(impl_->room.room_seq());
+    if (impl_->ended) sink->end(*impl_->ended);
+  }
+  impl_->read_leaves(leaves);
+  sink->set_leaves(std::move(leaves));
   return {};
 }
 

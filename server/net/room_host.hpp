@@ -33,7 +33,10 @@ class CuttingSink : public StreamSink {
 class SessionSink : public StreamSink {
  public:
   [[nodiscard]] virtual AuthorId author() const = 0;
-  virtual void begin(std::vector<FieldLeaf> leaves, RoomSeq contained) = 0;
+  virtual void begin(RoomSeq contained) = 0;                // of the leaves; rows come from here on
+  // Once, after begin() and perhaps after rows. Those apply to these leaves: what one of them contains already is no
+  // change when its row is applied again.
+  virtual void set_leaves(std::vector<FieldLeaf> leaves) = 0;
   virtual void offer(RoomSeq place, const Bytes& row) = 0;  // a whole SessionResponse
   virtual void answer(const Bytes& row) = 0;                // the same, outside the room's order
   virtual void refuse(const Error& why) = 0;                // a breach of the protocol: the stream ends
@@ -85,7 +88,7 @@ class RoomHost {
   void run_slowly(std::function<void()> job);
   AuthorId join(MemberKind kind);
   [[nodiscard]] BoneStatus bone_status();
-  // From now on the sink hears every row after those of its leaves. Error: invalid_input (the author may not cut, or
+  // The sink hears every row after those of its leaves. Error: invalid_input (the author may not cut, or
   // has an open session).
   [[nodiscard]] Result<void> open_session(const std::shared_ptr<SessionSink>& sink);
   void watch_mesh(MeshSink& sink);

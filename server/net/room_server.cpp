@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <charconv>
 #include <chrono>
+#include <system_error>
 #include <utility>
 
 #include "server/net/services.hpp"
@@ -49,28 +50,47 @@ bool is_ipv4_loopback(const std::string& host) {
 
 bool is_loopback(const std::string& host) { return host == "localhost" || host == "[::1]" || is_ipv4_loopback(host); }
 
-Error port_in_use(const std::string& listen) {
-  return {ErrorCode::exists, "cannot listen on " + listen +
-                                 ": the port is in use by another program; choose another with --listen, or 0 for a free one"};
+Error cannot_listen(const std::string& listen, const std::string& why, ErrorCode code = ErrorCode::unavailable) {
+  return {code, "cannot listen on " + listen + ": " + why + "; choose another with --listen, or 0 for a free one"};
+}
+Error cannot_listen(const std::string& listen, int reason) {
+  if (reason == EADDRINUSE) return cannot_listen(listen, "the port is in use by another program", ErrorCode::exists);
+  return cannot_listen(listen, std::generic_category().message(reason));
 }
 
-// Whether a socket can be bound there, tried with one that is closed again.
-bool can_bind(const HostPort& at) {
+// Binds a socket there and closes it again. 0, or why the system refuses.
+int try_to_bind(const addrinfo& address) {
+  const int socket = ::socket(address.ai_family, address.ai_socktype | SOCK_CLOEXEC, address.ai_protocol);
+  if (socket < 0) return errno;
+  const int yes = 1;
+  ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  const int reason = ::bind(socket, address.ai_addr, address.ai_addrlen) == 0 ? 0 : errno;
+  ::close(socket);
+  return reason;
+}
+
+Result<void> try_to_listen(const std::string& listen, const HostPort& at) {
   const std::string host = at.host == "[::1]" ? "::1" : at.host;
   addrinfo hints{}, *found = nullptr;
   hints.ai_socktype = SOCK_STREAM;
-  if (::getaddrinfo(host.c_str(), std::to_string(at.port).c_str(), &hints, &found) != 0) return false;
-  bool bound = true;
-  for (const addrinfo* address = found; address && bound; address = address->ai_next) {
-    const int socket = ::socket(address->ai_family, address->ai_socktype | SOCK_CLOEXEC, address->ai_protocol);
-    if (socket < 0) continue;  // a family that this machine does not have
-    const int yes = 1;
-    ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-    bound = ::bind(socket, address->ai_addr, address->ai_addrlen) == 0 || errno == EADDRNOTAVAIL;
-    ::close(socket);
+  if (const int unknown = ::getaddrinfo(host.c_str(), std::to_string(at.port).c_str(), &hints, &found); unknown != 0)
+    return tl::unexpected(cannot_listen(listen, ::gai_strerror(unknown)));
+  bool bound = false;
+  int lacking = 0, refused = 0;
+  for (const addrinfo* address = found; address; address = address->ai_next) {
+    const int reason = try_to_bind(*address);
+    // localhost has an address of each family, and a machine may lack one of them.
+    if (reason == EADDRNOTAVAIL || reason == EAFNOSUPPORT)
+      lacking = reason;
+    else if (reason != 0)
+      refused = reason;
+    else
+      bound = true;
   }
   ::freeaddrinfo(found);
-  return bound;
+  if (refused != 0) return tl::unexpected(cannot_listen(listen, refused));
+  if (!bound) return tl::unexpected(cannot_listen(listen, lacking));
+  return {};
 }
 
 std::uint64_t new_server_epoch() {
@@ -82,6 +102,7 @@ std::uint64_t new_server_epoch() {
 constexpr int kMaxReceiveBytes = 256 * 1024;       // a cut of 64 knots is below 4 kB
 constexpr int kMaxSendBytes = 4 * 1024 * 1024;     // a piece of a case is 1 MiB
 constexpr int kKeepaliveMs = 10'000;               // a peer that answers no ping that long is gone
+constexpr int kShortestPingMs = 500;               // clients may ask that often whether the server lives
 
 }  // namespace
 
@@ -105,8 +126,7 @@ Result<void> RoomServer::check_listen(const std::string& listen) {
     return failure(ErrorCode::invalid_input, "--listen " + listen +
                                                  " is reachable from other machines, but this server speaks plain text; "
                                                  "use 127.0.0.1, [::1] or localhost");
-  if (!can_bind(*at)) return tl::unexpected(port_in_use(listen));
-  return {};
+  return try_to_listen(listen, *at);
 }
 
 Result<std::unique_ptr<RoomServer>> RoomServer::start(Room room, const RoomServerOptions& options,
@@ -129,6 +149,8 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(Room room, const RoomServe
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveMs);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kShortestPingMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, 64);
   builder.SetMaxReceiveMessageSize(kMaxReceiveBytes);
   builder.SetMaxSendMessageSize(kMaxSendBytes);
@@ -136,7 +158,9 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(Room room, const RoomServe
   impl->server = builder.BuildAndStart();
   if (!impl->server || port == 0) {
     impl->host->stop();
-    return tl::unexpected(port_in_use(options.listen));
+    // gRPC does not say why; most likely the port was taken while the surface was made.
+    if (Result<void> usable = check_listen(options.listen); !usable) return tl::unexpected(usable.error());
+    return tl::unexpected(cannot_listen(options.listen, "the system refused"));
   }
   impl->address = parse_listen(options.listen)->host + ":" + std::to_string(port);
   return std::unique_ptr<RoomServer>(new RoomServer(std::move(impl)));

@@ -26,7 +26,8 @@ class RoomServer {
  public:
   // Whether start() could listen there now: told before a long preparation instead of after it. Errors as start().
   [[nodiscard]] static Result<void> check_listen(const std::string& listen);
-  // Errors: invalid_input (`listen` is not HOST:PORT, or not of this machine alone), exists (the port is in use).
+  // Errors: invalid_input (`listen` is not HOST:PORT, or not of this machine alone), exists (the port is in use),
+  // unavailable (the system refuses for another reason, which the message gives).
   // `progress` hears how far the first surface is.
   [[nodiscard]] static Result<std::unique_ptr<RoomServer>> start(Room room, const RoomServerOptions& options,
                                                                  const std::function<void(double)>& progress);

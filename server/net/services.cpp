@@ -205,9 +205,13 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink {
   void start() { StartRead(&request_); }
 
   AuthorId author() const override { return author_; }
-  void begin(std::vector<FieldLeaf> leaves, RoomSeq contained) override {
+  void begin(RoomSeq contained) override {
     const std::lock_guard lock(mutex_);
-    outbox_.begin(std::move(leaves), contained);
+    outbox_.begin(contained);
+  }
+  void set_leaves(std::vector<FieldLeaf> leaves) override {
+    const std::lock_guard lock(mutex_);
+    outbox_.set_leaves(std::move(leaves));
     pump();
   }
   void offer(RoomSeq place, const Bytes& row) override {
@@ -360,7 +364,7 @@ class CaseStream final : public OutStream<WriteReactor> {
       file_.close();
       ++file_index_;
     }
-    auto piece = std::make_shared<const std::string>(response.SerializeAsString());
+    Bytes piece = serialised(response);
     const std::lock_guard lock(mutex_);
     waiting_ = std::move(piece);
     pump();

@@ -52,7 +52,7 @@ std::string_view sentence(Rejection reason) {
     case Rejection::body: return "the room has no such body";
     case Rejection::lease: return "the cut was made under a tool lease that is over";
     case Rejection::tool: return "the tool, or this shape of it, is not registered in the room";
-    case Rejection::level: return "the level is finer than the tool's";
+    case Rejection::level: return "the level is finer than the tool or the case allows";
     case Rejection::path: return "the path has no knots or more than a cut may have";
     case Rejection::rotation: return "a rotation on the path is not a unit quaternion";
     case Rejection::place: return "the path leaves the surroundings of the bone";
@@ -114,7 +114,7 @@ Rejection Room::judge(const Cut& cut) const {
   if (cut.lease_epoch != lease_epoch()) return Rejection::lease;
   const auto tool = std::find_if(tools_.begin(), tools_.end(), [&](const Tool& t) { return t.hash() == cut.tool; });
   if (tool == tools_.end() || tool->cut_shape() != cut.shape) return Rejection::tool;
-  if (cut.level < 0 || cut.level >= kLevels || cut.level > tool->cut_level) return Rejection::level;
+  if (cut.level < 0 || cut.level > std::min(tool->cut_level, finest_level(bone().pitch_mm()))) return Rejection::level;
   if (cut.path.empty() || cut.path.size() > static_cast<std::size_t>(limits_.path_knots)) return Rejection::path;
   if (cut.spindle_rpm > limits_.spindle_rpm) return Rejection::spindle;
 

@@ -78,7 +78,6 @@ class Room {
   [[nodiscard]] const RoomCounts& counts() const { return counts_; }
   [[nodiscard]] const Case& bone() const { return field_.bone(); }
   [[nodiscard]] const CutField& field() const { return field_; }
-  [[nodiscard]] std::vector<FieldLeaf> leaves() const { return field_.leaves(); }
   [[nodiscard]] Digest field_hash() const { return field_.hash(); }
 
   // Blocks whose payload the cuts since the last call have made stale, each once.

@@ -134,7 +134,8 @@ TEST(Trouble, ADeviceThatIsNotThereIsNamed) {
                       "osteon-haptic", {"phantom", "simulated"});
 }
 
-TEST(Trouble, AKilledServerIsNoticedByAllItsClients) {
+// A server that hears this signal in the middle of work: its clients say so and end, however silently it went.
+void expect_all_notice(int signal) {
   Stage stage(16.0);
   const auto screen = Xvfb::start("640x480");
   ASSERT_TRUE(screen);
@@ -144,13 +145,18 @@ TEST(Trouble, AKilledServerIsNoticedByAllItsClients) {
   Process haptic = stage.start_haptic("work", {{"steps", nlohmann::json::array({drill_at(0, 0, "rig")})}});
   std::this_thread::sleep_for(3s);
   ASSERT_TRUE(haptic.running()) << haptic.err();
-  stage.server().signal(SIGKILL);
+  stage.server().signal(signal);
   for (auto& [name, process] : {std::pair<std::string, Process*>{"osteon-haptic", &haptic}, {"osteon-audio", &audio}, {"osteon-viewer", &viewer.process()}}) {
     const auto code = process->wait(30s);
     ASSERT_TRUE(code) << name << " did not notice";
     expect_one_sentence({*code, false, process->out(), process->err()}, name, {});
   }
 }
+
+TEST(Trouble, AKilledServerIsNoticedByAllItsClients) { expect_all_notice(SIGKILL); }
+
+// Its connections stay open, as those of a machine that lost its network do.
+TEST(Trouble, AServerThatHangsIsNoticedByAllItsClients) { expect_all_notice(SIGSTOP); }
 
 TEST(Trouble, AServerStopsCleanlyInTheMiddleOfWork) {
   Stage stage(16.0);

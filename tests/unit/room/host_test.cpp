@@ -16,24 +16,25 @@ namespace {
 using namespace std::chrono_literals;
 using test::strokes;
 
-// Keeps a replica from what it is told.
+// Keeps a replica from what a session's stream would carry.
 class FakeSession final : public SessionSink {
  public:
   FakeSession(AuthorId author, const Case& bone) : author_(author), replica_(bone, BodyId{0}) {}
 
   AuthorId author() const override { return author_; }
-  void begin(std::vector<FieldLeaf> leaves, RoomSeq contained) override {
+  void begin(RoomSeq contained) override {
     const std::lock_guard lock(mutex_);
-    for (const FieldLeaf& leaf : leaves) replica_.restore(leaf);
-    seq_ = contained;
+    outbox_.begin(contained);
+  }
+  void set_leaves(std::vector<FieldLeaf> leaves) override {
+    const std::lock_guard lock(mutex_);
+    outbox_.set_leaves(std::move(leaves));
+    read();
   }
   void offer(RoomSeq place, const Bytes& row) override {
     const std::lock_guard lock(mutex_);
-    if (place <= seq_) return;
-    v1::SessionResponse response;
-    ASSERT_TRUE(response.ParseFromString(*row));
-    replica_.apply(wire::from_wire(response.committed().cut()).value());
-    seq_ = place;
+    ASSERT_TRUE(outbox_.add(place, row));
+    read();
   }
   void answer(const Bytes&) override {}
   void refuse(const Error& why) override { ADD_FAILURE() << why.message; }
@@ -49,8 +50,22 @@ class FakeSession final : public SessionSink {
   }
 
  private:
+  void read() {
+    for (MessageParts parts = outbox_.take(); !parts.empty(); parts = outbox_.take()) {
+      v1::SessionResponse response;
+      ASSERT_TRUE(response.ParseFromString(*parts.front()));
+      if (response.has_leaf()) replica_.restore(wire::from_wire(response.leaf()).value());
+      if (response.has_complete()) seq_ = RoomSeq{response.complete().room_seq()};
+      if (!response.has_committed()) continue;
+      EXPECT_EQ(response.committed().room_seq(), seq_.value + 1) << "every row once and in order";
+      replica_.apply(wire::from_wire(response.committed().cut()).value());
+      seq_ = RoomSeq{response.committed().room_seq()};
+    }
+  }
+
   const AuthorId author_;
   mutable std::mutex mutex_;
+  SessionOutbox outbox_;
   CutField replica_;
   RoomSeq seq_;
   std::atomic<int> decided_{0};
@@ -141,6 +156,47 @@ TEST(RoomHost, EverySinkEndsWithTheRoomsBoneAndSurface) {
   EXPECT_EQ(health.queued_cuts, 0u);
   host.leave(early);
   host.leave(after);
+}
+
+// Leaves are copied while the room goes on cutting, so some are newer than others. What is said of a place of the order
+// must be true of it all the same.
+TEST(RoomHost, CopiesOfTheBoneAreRightWhileItIsCut) {
+  const Case bone = test::test_block();
+  RoomHost host(Room(bone), {.tick = 200us, .mesh = 50ms}, {});
+  const auto hand = std::make_shared<FakeSession>(host.join(MemberKind::surgeon), bone);
+  ASSERT_TRUE(host.open_session(hand));
+  constexpr std::uint64_t kCuts = 60;
+  std::vector<Cut> cuts = strokes(hand->author(), static_cast<int>(kCuts), 21);
+  for (Cut& cut : cuts) cut.level = 1;  // cheaper, and several batches of leaves all the same
+  std::thread cutting([&] {
+    for (const Cut& cut : cuts) {
+      host.queue_cut(hand, cut, RoomHost::Clock::now());
+      std::this_thread::sleep_for(300us);
+    }
+  });
+  std::vector<BoneStatus> said;
+  std::vector<std::shared_ptr<FakeSession>> late;
+  while (host.room_seq().value < kCuts) {
+    if (BoneStatus status = host.bone_status(); said.empty() || said.back().room_seq < status.room_seq) said.push_back(status);
+    if (late.size() >= 4) continue;
+    late.push_back(std::make_shared<FakeSession>(host.join(MemberKind::surgeon), bone));
+    ASSERT_TRUE(host.open_session(late.back()));
+  }
+  cutting.join();
+  host.stop();
+  said.push_back(host.bone_status());
+
+  CutField alone(bone, BodyId{0});
+  std::uint64_t applied = 0;
+  for (const BoneStatus& status : said) {
+    while (applied < status.room_seq.value) alone.apply(cuts[applied++]);
+    EXPECT_EQ(status.field_hash, alone.hash()) << "at " << applied;
+    EXPECT_EQ(status.counts.committed, applied);
+  }
+  EXPECT_EQ(applied, kCuts);
+  for (const auto& session : late) EXPECT_EQ(session->hash(), alone.hash());
+  for (const auto& session : late) host.leave(*session);
+  host.leave(*hand);
 }
 
 }  // namespace

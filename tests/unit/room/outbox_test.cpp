@@ -150,14 +150,15 @@ v1::SessionResponse parsed(const MessageParts& parts) {
 
 TEST(SessionOutbox, SendsLeavesThenCompleteThenOnlyTheRowsAfterThem) {
   SessionOutbox outbox;
-  EXPECT_TRUE(outbox.take().empty()) << "nothing before the leaves are known";
+  outbox.begin(RoomSeq{4});
   std::vector<FieldLeaf> leaves(2);
   for (FieldLeaf& leaf : leaves) leaf.values.assign(kLeafVoxels, 5);
   leaves[1].origin = {8, 0, 0};
-  outbox.begin(leaves, RoomSeq{4});
   // The publisher may still bring the row that the leaves already contain.
   EXPECT_TRUE(outbox.add(RoomSeq{4}, row(4)));
   EXPECT_TRUE(outbox.add(RoomSeq{5}, row(5)));
+  EXPECT_TRUE(outbox.take().empty()) << "nothing before the leaves are known";
+  outbox.set_leaves(leaves);
   EXPECT_EQ(parsed(outbox.take()).leaf().origin().x(), 0);
   EXPECT_EQ(parsed(outbox.take()).leaf().origin().x(), 8);
   EXPECT_EQ(parsed(outbox.take()).complete().room_seq(), 4u);
@@ -169,7 +170,8 @@ TEST(SessionOutbox, SendsLeavesThenCompleteThenOnlyTheRowsAfterThem) {
 
 TEST(SessionOutbox, GivesUpAReaderThatIsTooFarBehind) {
   SessionOutbox outbox;
-  outbox.begin({}, RoomSeq{0});
+  outbox.begin(RoomSeq{0});
+  outbox.set_leaves({});
   std::uint64_t seq = 0;
   while (outbox.add(RoomSeq{seq + 1}, row(seq + 1))) ++seq;
   EXPECT_EQ(seq, SessionOutbox::kMaxRows);

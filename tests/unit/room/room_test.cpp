@@ -157,6 +157,18 @@ INSTANTIATE_TEST_SUITE_P(
         Breach{"spindle", Rejection::spindle, [](Cut& c) { c.spindle_rpm = 1'000'000; }}),
     [](const auto& test_case) { return std::string(test_case.param.name); });
 
+// The same burr over a case that is finer already: what is kept of its cuts goes no further than kFinestCut_mm.
+TEST(Room, TakesNoCutFinerThanTheCaseAllows) {
+  Room room(test::plain_block(8.0, 4.0, 0.3));
+  auto cuts = strokes(room.join(MemberKind::surgeon), 2, 12);
+  const Digest uncut = room.field_hash();
+  cuts[0].level = 2;  // 0.075 mm
+  EXPECT_EQ(room.submit(cuts[0])->rejection, Rejection::level);
+  EXPECT_EQ(room.field_hash(), uncut);
+  cuts[1].level = 1;  // 0.15 mm
+  commit(room, cuts[1]);
+}
+
 // Whoever joins at any moment and applies what is committed from then on has the server's bone.
 TEST(Room, SnapshotAndStreamGiveEveryHolderTheSameHash) {
   Room room(test_block());
@@ -164,7 +176,7 @@ TEST(Room, SnapshotAndStreamGiveEveryHolderTheSameHash) {
   std::vector<CutField> holders;
   for (const Cut& cut : cuts) {
     CutField& joined = holders.emplace_back(room.bone(), BodyId{0});
-    for (const FieldLeaf& leaf : room.leaves()) joined.restore(leaf);
+    for (const FieldLeaf& leaf : room.field().leaves()) joined.restore(leaf);
     commit(room, cut);
     for (CutField& holder : holders) holder.apply(cut);
   }

@@ -1,6 +1,8 @@
 // The gRPC services with real clients in this process, on the loopback device and ports that the system chooses.
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <mutex>
@@ -31,6 +33,14 @@ wire::JoinedRoom join(const std::string& address, wire::ClientKind kind) {
   auto room = wire::join_room(address, kind, "test", 5s, {});
   EXPECT_TRUE(room.has_value()) << room.error().message;
   return room.value();
+}
+
+v1::GetStatusResponse status_of(const wire::JoinedRoom& room) {
+  v1::GetStatusResponse response;
+  grpc::ClientContext context;
+  const grpc::Status status = v1::RoomService::NewStub(room.channel)->GetStatus(&context, {}, &response);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  return response;
 }
 
 // A haptic client that keeps a replica, as osteon-haptic does.
@@ -166,12 +176,11 @@ TEST_F(RoomServerTest, EveryHolderHasTheServersHashHoweverLateItJoins) {
   for (Surgeon* holder : {first.get(), second.get(), late.get(), later.get()})
     ASSERT_TRUE(wait_until([&] { return holder->complete() && holder->seq().value == 60; }, kPatience));
 
-  const auto status = later->session().status();
-  ASSERT_TRUE(status.has_value()) << status.error().message;
-  EXPECT_EQ(status->room_seq.value, 60u);
-  for (Surgeon* holder : {first.get(), second.get(), late.get(), later.get()}) EXPECT_EQ(holder->hash(), status->field_hash);
-  EXPECT_GT(status->removed_mm3, 0.0);
-  EXPECT_EQ(status->rejected, 0u);
+  const auto status = status_of(later->session().room());
+  EXPECT_EQ(status.room_seq(), 60u);
+  for (Surgeon* holder : {first.get(), second.get(), late.get(), later.get()}) EXPECT_EQ(wire::to_wire(holder->hash()), status.field_hash());
+  EXPECT_GT(status.removed_mm3(), 0.0);
+  EXPECT_EQ(status.rejected(), 0u);
 }
 
 TEST_F(RoomServerTest, ACutBeyondTheLimitsIsRejectedToItsAuthorAndTheRoomGoesOn) {
@@ -182,7 +191,7 @@ TEST_F(RoomServerTest, ACutBeyondTheLimitsIsRejectedToItsAuthorAndTheRoomGoesOn)
   ASSERT_TRUE(wait_until([&] { return one->own() == 1 && other->seq().value == 2; }, kPatience));
   EXPECT_EQ(one->rejected(), sentence(Rejection::spindle));
   EXPECT_EQ(other->rejected(), "");
-  EXPECT_EQ(one->session().status().value().rejected, 1u);
+  EXPECT_EQ(status_of(one->session().room()).rejected(), 1u);
 }
 
 TEST_F(RoomServerTest, ALateViewerSeesTheBlocksOfAnEarlyOne) {
@@ -229,7 +238,7 @@ TEST_F(RoomServerTest, AKilledClientDisturbsNobody) {
   send(*survivor, strokes(survivor->author(), 20, 7));
   ASSERT_TRUE(wait_until([&] { return survivor->own() == 20; }, kPatience));
   EXPECT_TRUE(watcher.read_to(RoomSeq{25}));
-  EXPECT_EQ(survivor->hash(), survivor->session().status().value().field_hash);
+  EXPECT_EQ(wire::to_wire(survivor->hash()), status_of(survivor->session().room()).field_hash());
   EXPECT_TRUE(wait_until([&] { return server_->health().mesh_streams == 1 && server_->health().sessions == 1; }, kPatience));
 }
 
@@ -414,6 +423,23 @@ TEST_F(RoomServerTest, RefusesAPortInUseAndAddressesOfOtherMachines) {
     EXPECT_FALSE(start(open_to_others).has_value()) << open_to_others;
   for (const char* broken : {"", "127.0.0.1", "127.0.0.1:", ":5", "127.0.0.1:70000", "127.0.0.1:http"})
     EXPECT_EQ(start(broken).error().code, ErrorCode::invalid_input) << broken;
+}
+
+// In a process of its own without the rights that let a test of root's bind anything.
+TEST(RoomServerListen, APortThatTheSystemRefusesIsNotSaidToBeInUse) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    if (::geteuid() == 0 && ::setuid(65534) != 0) ::_exit(2);
+    const Result<void> usable = RoomServer::check_listen("127.0.0.1:1");
+    if (usable) ::_exit(2);
+    const std::string& why = usable.error().message;
+    ::_exit(usable.error().code != ErrorCode::exists && why.find("Permission denied") != std::string::npos ? 0 : 3);
+  }
+  int status = -1;
+  ::waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  if (WEXITSTATUS(status) == 2) GTEST_SKIP() << "this system lets every program listen on port 1";
+  EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 TEST(RoomClient, SaysInOneSentenceThatNobodyAnswers) {
