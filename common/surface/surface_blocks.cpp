@@ -35,19 +35,10 @@ std::vector<BlockKey> SurfaceBlocks::touch(int level, const std::vector<Coord>& 
         for (std::int32_t y = blocks.min.y; y <= blocks.max.y; ++y)
           for (std::int32_t z = blocks.min.z; z <= blocks.max.z; ++z) {
             const BlockKey key{body_, l, {x, y, z}};
-            if (l == 0) {
-              stale.insert(key);
-            } else if (l != level) {
-              if (fine_.contains(key)) stale.insert(key);  // drawn finer or coarser, and its samples changed
-            } else {
-              stale.insert(key);
-              // A block that is drawn from now on takes its cells away from the coarser ones.
-              if (fine_.insert(key).second)
-                for (int coarser = l - 1; coarser >= 0; --coarser) {
-                  const BlockKey parent{body_, coarser, shift_down(key.index, l - coarser)};
-                  if (coarser == 0 || fine_.contains(parent)) stale.insert(parent);
-                }
-            }
+            // At the cut's own level a block is drawn from now on. The coarser blocks from which it takes its cells have
+            // samples in this leaf as well, so they are named by the same rule: drawn, and its samples changed.
+            if (l == level && l > 0) fine_.insert(key);
+            if (l == 0 || fine_.contains(key)) stale.insert(key);
           }
     }
   }
