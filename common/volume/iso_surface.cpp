@@ -265,6 +265,9 @@ class Slab {
 Result<DenseVolume<float>> signed_distance_mm(const DenseVolume<float>& field, float iso, double pitch_mm,
                                               const KeepGoing& keep_going) {
   OSTEON_CHECK(!field.box.empty() && pitch_mm > 0);
+  const auto stopped_by_caller = [] { return failure(ErrorCode::cancelled, "stopped while measuring the bone surface"); };
+  // Asked once before any work: the threads below may be done before they are first looked at.
+  if (!keep_going(0.0)) return stopped_by_caller();
   DenseVolume<float> out;
   out.box = field.box;
   out.values.resize(field.values.size());
@@ -306,7 +309,7 @@ Result<DenseVolume<float>> signed_distance_mm(const DenseVolume<float>& field, f
   for (std::thread& helper : helpers) helper.join();
 
   if (!failed.empty()) return failure(ErrorCode::internal, "the bone surface could not be measured: " + failed);
-  if (cancelled) return failure(ErrorCode::cancelled, "stopped while measuring the bone surface");
+  if (cancelled) return stopped_by_caller();
   return out;
 }
 
