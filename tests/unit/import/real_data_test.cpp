@@ -13,7 +13,7 @@ namespace fs = std::filesystem;
 
 TEST(Skull, LiesInThePatientFrame) {
   const auto file = test::find_skull();
-  if (!file) GTEST_SKIP() << "Cranium.inv3 of the package invesalius-examples is not there";
+  ASSERT_TRUE(file) << "Cranium.inv3 of the package invesalius-examples is not there; run deploy/install";
   auto scan = read_inv3(*file, keep_going);
   ASSERT_TRUE(scan) << scan.error().message;
   EXPECT_EQ(scan->volume.dims, (std::array<int, 3>{256, 256, 108}));
@@ -58,7 +58,7 @@ TEST(Skull, LiesInThePatientFrame) {
 
 TEST(Skull, ImportsToOneHash) {
   const auto file = test::find_skull();
-  if (!file) GTEST_SKIP() << "Cranium.inv3 of the package invesalius-examples is not there";
+  ASSERT_TRUE(file) << "Cranium.inv3 of the package invesalius-examples is not there; run deploy/install";
   std::string hash;
   for (int i = 0; i < 2; ++i) {
     auto scan = read_inv3(*file, keep_going);
