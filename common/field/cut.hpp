@@ -26,8 +26,7 @@ struct Cut {
   std::uint64_t author_seq = 0;   // 1, 2, 3, … for each author
   std::uint64_t lease_epoch = 0;
   BodyId body;
-  Digest tool;                    // hash of the tool's definition
-  CutShape shape;
+  Digest tool;                    // hash of the tool's definition, which names the body that cuts
   int level = 0;
   std::vector<QuantisedPose> path;  // at least one pose; the first is the previous cut's last
   std::uint32_t spindle_rpm = 0;

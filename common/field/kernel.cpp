@@ -122,7 +122,7 @@ float oblique_sweep_distance(const SweptTool::Body& body, const SweptTool::Sweep
 }
 
 float sweep_distance(const SweptTool::Body& body, const SweptTool::Sweep& sweep, float px, float py, float pz) {
-  if (body.kind == ToolKind::round_burr) return sphere_sweep_distance(body, sweep, px, py, pz);
+  if (body.kind == CutKind::ball) return sphere_sweep_distance(body, sweep, px, py, pz);
   if (sweep.search_steps == 0) return axial_sweep_distance(body, sweep, px, py, pz);
   return oblique_sweep_distance(body, sweep, px, py, pz);
 }
@@ -171,12 +171,16 @@ int cut_samples(const SweptTool::Sweep& sweep, Coord origin, double pitch, float
 
 }  // namespace
 
-SweptTool::SweptTool(const Cut& cut, double pitch_mm)
-    : body_{cut.shape.kind, static_cast<float>(cut.shape.radius) / 1024.0f,
-            static_cast<float>(cut.shape.tip_height) / 1024.0f, static_cast<float>(cut.shape.length) / 1024.0f, 0.0f},
+SweptTool::SweptTool(const Cut& cut, const CutBody& body, double pitch_mm)
+    : body_{body.kind, 0.0f, 0.0f, static_cast<float>(-body.lowest[2]) / 1024.0f, 0.0f},
       level_pitch_mm_(osteon::level_pitch_mm(pitch_mm, cut.level)) {
-  OSTEON_CHECK(!cut.path.empty() && cut.level >= 0 && cut.level < kLevels);
-  OSTEON_CHECK(cut.shape.radius > 0 && cut.shape.tip_height > 0 && cut.shape.length >= cut.shape.tip_height);
+  OSTEON_CHECK(!cut.path.empty() && cut.level >= 0 && cut.level < kLevels && body.cuts());
+  if (body.kind == CutKind::ball) {
+    body_.radius = body_.tip_height = static_cast<float>(body.radius) / 1024.0f;
+  } else {
+    body_.radius = static_cast<float>(body.profile[3].r) / 1024.0f;
+    body_.tip_height = static_cast<float>(-body.profile[3].z) / 1024.0f;
+  }
   body_.slant = root(body_.radius * body_.radius + body_.tip_height * body_.tip_height);
 
   const auto position = [&](std::size_t i, double out[3]) {
@@ -211,7 +215,7 @@ SweptTool::SweptTool(const Cut& cut, double pitch_mm)
         start[k] = from[k] + t0 * (to[k] - from[k]);
         end[k] = from[k] + t1 * (to[k] - from[k]);
       }
-      if (body_.kind == ToolKind::drill) {
+      if (body_.kind == CutKind::turned) {
         add_drill_sweep(start, end, axis);
       } else {
         const double radius = static_cast<double>(body_.radius);
@@ -298,7 +302,7 @@ int SweptTool::cut_leaf(Coord origin, std::span<float, kLeafVoxels> values) cons
   for (const Sweep& sweep : sweeps_) {
     if (centre_distance(body_, sweep, origin, pitch) >= reach) continue;  // every sample would be at the band
     // Copies: a compiler that knows that no value written can be one of them keeps them in registers.
-    if (body_.kind == ToolKind::round_burr) {
+    if (body_.kind == CutKind::ball) {
       modified += cut_samples(sweep, origin, pitch, band, values, [body = body_, sweep](float x, float y, float z) {
         return sphere_sweep_distance(body, sweep, x, y, z);
       });

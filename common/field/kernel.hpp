@@ -26,7 +26,8 @@ inline constexpr int kBandVoxels = 4;
 // A cut made ready for one pitch: its path as translations of the cutting body, exact for each.
 class SweptTool {
  public:
-  SweptTool(const Cut& cut, double pitch_mm);  // pitch_mm: h of the case; the level comes from the cut
+  // `body`: of the cut's tool. `pitch_mm`: h of the case; the level comes from the cut.
+  SweptTool(const Cut& cut, const CutBody& body, double pitch_mm);
 
   [[nodiscard]] double level_pitch_mm() const { return level_pitch_mm_; }
   // Leaves (by origin, in samples of the level) that the cut can change; sorted, without repetition.
@@ -47,7 +48,7 @@ class SweptTool {
   };
   // Lengths of the cutting body, mm.
   struct Body {
-    ToolKind kind;
+    CutKind kind;
     float radius, tip_height, length;
     float slant;           // of the cone
   };

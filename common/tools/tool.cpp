@@ -98,13 +98,13 @@ std::vector<SamplePoint> points_with_spacing(const Tool& tool, double spacing) {
 
 const std::array<Tool, 3>& builtins() {
   static const std::array<Tool, 3> tools{{
-      {.name = "drill-3.2", .kind = ToolKind::drill, .diameter_mm = 3.2, .cutting_length_mm = 40.0,
+      {.name = "drill-3.2", .title = "Drill 3.2 mm", .kind = ToolKind::drill, .diameter_mm = 3.2, .cutting_length_mm = 40.0,
        .point_angle_rad = 118.0 * kPi / 180.0, .shank_diameter_mm = 3.2, .shank_length_mm = 40.0,
        .spindle_rpm = 1000.0, .cut_level = 2},
-      {.name = "burr-round-5", .kind = ToolKind::round_burr, .diameter_mm = 5.0, .cutting_length_mm = 5.0,
+      {.name = "burr-round-5", .title = "Round bur 5 mm", .kind = ToolKind::round_burr, .diameter_mm = 5.0, .cutting_length_mm = 5.0,
        .point_angle_rad = 0.0, .shank_diameter_mm = 2.35, .shank_length_mm = 60.0,
        .spindle_rpm = 20000.0, .cut_level = 2},
-      {.name = "burr-round-3.2", .kind = ToolKind::round_burr, .diameter_mm = 3.2, .cutting_length_mm = 3.2,
+      {.name = "burr-round-3.2", .title = "Round bur 3.2 mm", .kind = ToolKind::round_burr, .diameter_mm = 3.2, .cutting_length_mm = 3.2,
        .point_angle_rad = 0.0, .shank_diameter_mm = 2.35, .shank_length_mm = 60.0,
        .spindle_rpm = 30000.0, .cut_level = 2},
   }};
@@ -113,22 +113,46 @@ const std::array<Tool, 3>& builtins() {
 
 }  // namespace
 
-CutShape Tool::cut_shape() const {
+bool Tool::cuts() const {
+  return kind < ToolKind::drill_sleeve || kind == ToolKind::pin || kind == ToolKind::screw || kind == ToolKind::mesh;
+}
+
+CutBody Tool::cut_body() const {
   const std::int32_t radius = quanta(0.5 * diameter_mm);
-  if (kind == ToolKind::round_burr) return {kind, radius, radius, 2 * radius};
-  // Only the lips and the land behind them cut: the flutes above run in the hole that these have made. So a cut costs
-  // what is new, however deep the hole is.
-  const std::int32_t tip_height = quanta(tip_height_mm(*this));
-  return {kind, radius, tip_height, tip_height + radius};
+  CutBody body;
+  if (kind == ToolKind::round_burr) {
+    body.kind = CutKind::ball;
+    body.radius = radius;
+    body.lowest = {-radius, -radius, -2 * radius};
+  } else {
+    // Only the lips and the land behind them cut: the flutes above run in the hole that these have made. So a cut costs
+    // what is new, however deep the hole is.
+    const std::int32_t shoulder = quanta(tip_height_mm(*this)), heel = shoulder + radius;
+    body.kind = CutKind::turned;
+    body.profile = {{0, 0}, {0, -heel}, {radius, -heel}, {radius, -shoulder}};
+    body.lowest = {-radius, -radius, -heel};
+  }
+  body.highest = {radius, radius, 0};
+  return body;
 }
 
 Digest Tool::hash() const {
   Hasher hasher;
   hasher.text(name);
+  hasher.text(title);
   hasher.integer(static_cast<std::uint64_t>(kind));
-  for (const double value : {diameter_mm, cutting_length_mm, point_angle_rad, shank_diameter_mm, shank_length_mm, spindle_rpm})
+  for (const double value :
+       {diameter_mm, cutting_length_mm, point_angle_rad, shank_diameter_mm, shank_length_mm, width_mm, thickness_mm, set_mm, swing_rad,
+        stroke_mm, pivot_mm, taper_rad, corner_mm, bore_mm, thread_pitch_mm, core_diameter_mm, spindle_rpm, feed_mm_per_rev})
     hasher.number(value);
+  hasher.integer(static_cast<std::uint64_t>(teeth));
   hasher.integer(static_cast<std::uint64_t>(cut_level));
+  hasher.integer(mesh ? mesh->values.size() : 0);
+  if (mesh) {
+    for (const std::int32_t value : {mesh->box.min.x, mesh->box.min.y, mesh->box.min.z, mesh->box.max.x, mesh->box.max.y, mesh->box.max.z, mesh->pitch})
+      hasher.integer(static_cast<std::uint32_t>(value));
+    for (const std::int16_t value : mesh->values) hasher.integer(static_cast<std::uint16_t>(value));
+  }
   return hasher.finish();
 }
 
@@ -141,6 +165,29 @@ Result<Tool> find_tool(std::string_view name) {
     known += (known.empty() ? "" : ", ") + tool.name;
   }
   return failure(ErrorCode::not_found, "there is no tool \"" + std::string(name) + "\"; choose one of " + known);
+}
+
+Box local_bounds(const Tool& tool) {
+  const double widest = 0.5 * std::max(tool.diameter_mm, tool.shank_diameter_mm);
+  return {Vec3(-widest, -widest, -tool.reach_mm()), Vec3(widest, widest, 0.0)};
+}
+
+Box world_bounds(const Tool& tool, const Pose& pose_bone_tool) {
+  const Box local = local_bounds(tool);
+  const Eigen::Matrix3d turn = pose_bone_tool.rotation.toRotationMatrix().cwiseAbs();
+  const Vec3 centre = pose_bone_tool.point(local.centre_mm()), half = 0.5 * (turn * local.size_mm());
+  return {centre - half, centre + half};
+}
+
+Vec3 normal(const Tool& tool, const Vec3& point_tool_mm) {
+  constexpr double kStep_mm = 1e-5;
+  Vec3 gradient;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vec3 step = kStep_mm * Vec3::Unit(axis);
+    gradient[axis] = signed_distance_mm(tool, point_tool_mm + step) - signed_distance_mm(tool, point_tool_mm - step);
+  }
+  const double length = gradient.norm();
+  return length > 0.0 ? Vec3(gradient / length) : Vec3::UnitZ();
 }
 
 double signed_distance_mm(const Tool& tool, const Vec3& point_tool_mm) {

@@ -3,6 +3,7 @@
 #pragma once
 #include <compare>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -11,50 +12,78 @@
 #include "common/core/digest.hpp"
 #include "common/core/result.hpp"
 #include "common/geometry/lattice.hpp"
+#include "common/tools/cut_body.hpp"
 
 namespace osteon {
 
 enum class ToolKind : std::uint8_t {
-  drill = 1,       // cone point and cylindrical flutes
-  round_burr = 2,  // sphere on a shank
+  drill = 1,              // cone point and cylindrical flutes
+  round_burr = 2,         // sphere on a shank
+  end_drill = 3,          // flat end: opens the medullary canal
+  barrel_burr = 4,        // bulging cylinder
+  contoured_burr = 5,     // tapered, with a rounded end
+  oscillating_saw = 6,    // a blade that swings about a pivot behind it
+  reciprocating_saw = 7,  // a blade that moves to and fro along its axis
+  sphere_reamer = 8,      // hemisphere for the acetabulum
+  cylinder_reamer = 9,    // for a canal
+  outside_reamer = 10,    // hollow: planes the outside of a femoral head
+  broach = 11,            // tapered stem, driven in by blows
+  drill_sleeve = 12,      // guide 1: a tube that holds a drill
+  distal_block = 13,      // guide 2: distal cutting block, one slot
+  four_in_one_block = 14, // guide 3: four slots for anterior, posterior and chamfer cuts
+  pin = 15,
+  screw = 16,
+  trial_cup = 17,         // trial implant for a reamed acetabulum
+  trial_stem = 18,        // trial implant for a broached canal
+  mesh = 19,              // any solid, from a triangle mesh
 };
 
-// One length step of everything that is replicated: 2^-10 mm.
-inline constexpr double kQuantum_mm = 1.0 / 1024.0;
-
-// The cutting body as it travels and as the kernel cuts with it: integers of kQuantum_mm, so that no
-// trigonometry is left to be computed in two places.
-struct CutShape {
-  ToolKind kind = ToolKind::drill;
-  std::int32_t radius = 0;
-  std::int32_t tip_height = 0;  // drill: from the point to the full radius; round burr: the radius
-  std::int32_t length = 0;      // from the tip to the end of what cuts; a drill's flutes only clear the hole
-  friend auto operator<=>(const CutShape&, const CutShape&) = default;
-};
-
+// Every kind uses the dimensions that its comment names; the others are zero.
 struct Tool {
-  std::string name;
+  std::string name;                // "burr-round-5": lower case, digits, '-' and '.'
+  std::string title;               // shown to people
   ToolKind kind = ToolKind::drill;
-  double diameter_mm = 0;
-  double cutting_length_mm = 0;    // point and flutes of a drill; diameter of a round burr
-  double point_angle_rad = 0;      // full angle of a drill's point; unused by a burr
+  double diameter_mm = 0;          // of the cutting part, of a pin, of a screw's thread, outside of a sleeve or a cup
+  double cutting_length_mm = 0;    // from the tip along the axis; whole length of what does not cut
+  double point_angle_rad = 0;      // drill, pin, screw: full angle of the point
   double shank_diameter_mm = 0;
   double shank_length_mm = 0;
-  double spindle_rpm = 0;
+  double width_mm = 0;             // blade, block, broach: across, along x
+  double thickness_mm = 0;         // blade: plate; block, broach: along y; cup: wall
+  double set_mm = 0;               // saw: by how much its teeth cut wider than the plate, both sides together
+  double swing_rad = 0;            // oscillating saw: full angle of the stroke
+  double stroke_mm = 0;            // reciprocating saw: full way of the stroke
+  double pivot_mm = 0;             // oscillating saw: from the tooth line back to the pivot
+  double taper_rad = 0;            // broach, stem, contoured burr: side against the axis
+  double corner_mm = 0;            // radius of what is rounded: end of a contoured burr, bulge of a barrel, edge of a cup
+  double bore_mm = 0;              // outside reamer, sleeve: inner diameter; blocks: height of a slot
+  double thread_pitch_mm = 0;      // screw: advance in one turn
+  double core_diameter_mm = 0;     // screw: below the thread
+  double spindle_rpm = 0;          // turns, strokes or blows a minute
+  int teeth = 0;                   // flutes, teeth
+  double feed_mm_per_rev = 0;      // what it is made to advance in a turn or stroke
   int cut_level = 2;               // the level its cuts go to: pitch h / 2^level
+  // Kind mesh: shared by all copies of the definition, immutable, up to megabytes. Else null.
+  std::shared_ptr<const SampledDistance> mesh = nullptr;
 
-  [[nodiscard]] CutShape cut_shape() const;
+  [[nodiscard]] bool cuts() const;        // whether it takes bone; guides, cups and stems do not
+  [[nodiscard]] CutBody cut_body() const; // kind none for one that does not cut
   [[nodiscard]] double reach_mm() const { return cutting_length_mm + shank_length_mm; }
-  [[nodiscard]] Digest hash() const;  // over every field
+  [[nodiscard]] Digest hash() const;      // over every field
 };
 
-// The tools that come with Osteon, by name.
+// The tools that come with Osteon, by name: the 24 of Appendix B of the dissertation, and some more.
 [[nodiscard]] std::span<const Tool> builtin_tools();
 [[nodiscard]] Result<Tool> find_tool(std::string_view name);
 
-// The tools as they really are: distance to the whole solid (cutting part and shank) in the tool's frame,
-// negative inside, 1-Lipschitz, exact outside and inside each convex part (§6.1 of the dissertation).
+// The tools as they really are: distance to the whole solid (cutting part and shank) in the tool's frame, negative
+// inside, 1-Lipschitz (§6.1 of the dissertation). Exact where one convex part is nearest.
 [[nodiscard]] double signed_distance_mm(const Tool& tool, const Vec3& point_tool_mm);
+// Unit gradient of the distance: out of the tool (eq. 6.2).
+[[nodiscard]] Vec3 normal(const Tool& tool, const Vec3& point_tool_mm);
+// Box of the whole tool in its frame (Local Bounding Block, §6.1) and round it at a pose (World Bounding Block), mm.
+[[nodiscard]] Box local_bounds(const Tool& tool);
+[[nodiscard]] Box world_bounds(const Tool& tool, const Pose& pose_bone_tool);
 
 struct SamplePoint {
   Vec3 position_mm;   // on the surface, tool frame
@@ -63,7 +92,8 @@ struct SamplePoint {
   bool active;        // on the cutting part
 };
 
-// Points spread evenly over the surface, at least `count` of them on the cutting part.
+// Points spread evenly over the surface, at least `count` of them on the cutting part, or on the whole of a tool that
+// does not cut.
 [[nodiscard]] std::vector<SamplePoint> sample_points(const Tool& tool, int count);
 
 }  // namespace osteon

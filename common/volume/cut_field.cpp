@@ -13,6 +13,7 @@ namespace osteon {
 struct CutField::Grids {
   Case bone;
   BodyId body;
+  std::shared_ptr<const ToolBox> tools;
   std::array<SparseVolume, kLevels> cuts;  // R of each level
 };
 
@@ -87,9 +88,9 @@ std::int16_t to_quanta(float mm) { return static_cast<std::int16_t>(std::lround(
 
 }  // namespace
 
-CutField::CutField(Case bone, BodyId body) {
+CutField::CutField(Case bone, BodyId body, std::shared_ptr<const ToolBox> tools) {
   const double h = bone.pitch_mm();
-  grids_ = std::make_unique<Grids>(Grids{std::move(bone), body,
+  grids_ = std::make_unique<Grids>(Grids{std::move(bone), body, std::move(tools),
                                          {SparseVolume(band_mm(level_pitch_mm(h, 0))), SparseVolume(band_mm(level_pitch_mm(h, 1))),
                                           SparseVolume(band_mm(level_pitch_mm(h, 2)))}});
 }
@@ -98,11 +99,14 @@ CutField::CutField(CutField&&) noexcept = default;
 CutField& CutField::operator=(CutField&&) noexcept = default;
 
 const Case& CutField::bone() const { return grids_->bone; }
+const std::shared_ptr<const ToolBox>& CutField::tools() const { return grids_->tools; }
 
 CutReport CutField::apply(const Cut& cut) {
   OSTEON_CHECK(cut.body == grids_->body);
   SparseVolume& cuts = grids_->cuts[static_cast<std::size_t>(cut.level)];
-  const SweptTool swept(cut, grids_->bone.pitch_mm());
+  const ToolBox::Entry* tool = grids_->tools->find(cut.tool);
+  OSTEON_CHECK(tool != nullptr && tool->body.cuts());
+  const SweptTool swept(cut, tool->body, grids_->bone.pitch_mm());
   CutReport report;
   report.level = cut.level;
   std::array<float, kLeafVoxels> scratch;
@@ -142,6 +146,19 @@ void CutField::restore(const FieldLeaf& leaf) {
   }
   std::ranges::transform(leaf.values, cuts.edit_leaf(leaf.origin),
                          [](std::int16_t v) { return static_cast<float>(v) * static_cast<float>(kQuantum_mm); });
+}
+
+bool CutField::merge(const FieldLeaf& mask) {
+  OSTEON_CHECK(mask.level >= 0 && mask.level < kLevels && mask.values.size() == kLeafVoxels);
+  FieldLeaf merged{mask.body, mask.level, mask.origin, {}};
+  read(merged);
+  bool changed = false;
+  for (std::size_t i = 0; i < mask.values.size(); ++i) {
+    changed |= mask.values[i] < merged.values[i];
+    merged.values[i] = std::min(merged.values[i], mask.values[i]);
+  }
+  if (changed) restore(merged);
+  return changed;
 }
 
 std::vector<FieldLeaf> CutField::leaves() const {

@@ -7,6 +7,7 @@
 
 #include "common/field/cut.hpp"
 #include "common/field/field_hash.hpp"
+#include "common/tools/tool_box.hpp"
 #include "common/volume/case.hpp"
 
 namespace osteon {
@@ -22,15 +23,18 @@ struct CutReport {
 // Not synchronised: one thread writes, or several read.
 class CutField {
  public:
-  CutField(Case bone, BodyId body);
+  // `tools`: those that cuts of this field may name; shared with whoever adds to them.
+  CutField(Case bone, BodyId body, std::shared_ptr<const ToolBox> tools = builtin_tool_box());
   ~CutField();
   CutField(CutField&&) noexcept;
   CutField& operator=(CutField&&) noexcept;
 
-  CutReport apply(const Cut& cut);
+  CutReport apply(const Cut& cut);  // its tool must be in the box, and cut
   void restore(const FieldLeaf& leaf);  // sets one leaf, as on joining
+  bool merge(const FieldLeaf& mask);    // R = min(R, mask), as a split does; whether anything changed
 
   [[nodiscard]] const Case& bone() const;
+  [[nodiscard]] const std::shared_ptr<const ToolBox>& tools() const;
   [[nodiscard]] std::vector<FieldLeaf> leaves() const;  // sorted by (level, origin)
   // The same in two steps, for a reader that cannot hold the field still while it copies: the leaves without values,
   // then the present values of one of them. A leaf stays in its place for ever.

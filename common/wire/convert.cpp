@@ -55,10 +55,6 @@ v1::Cut to_wire(const Cut& cut) {
   out.set_lease_epoch(cut.lease_epoch);
   out.set_body(cut.body.value);
   out.set_tool_hash(to_wire(cut.tool));
-  out.mutable_shape()->set_kind(static_cast<v1::ToolKind>(cut.shape.kind));
-  out.mutable_shape()->set_radius(cut.shape.radius);
-  out.mutable_shape()->set_tip_height(cut.shape.tip_height);
-  out.mutable_shape()->set_length(cut.shape.length);
   out.set_level(static_cast<std::uint32_t>(cut.level));
   for (const QuantisedPose& pose : cut.path) {
     v1::QuantisedPose* knot = out.add_path();
@@ -127,12 +123,6 @@ Result<Cut> from_wire(const v1::Cut& cut) {
   const auto tool = digest_from_wire(cut.tool_hash());
   if (!tool) return bad("tool_hash:", tool.error().message);
   out.tool = *tool;
-  const v1::CutShape& shape = cut.shape();
-  if (shape.kind() != v1::TOOL_KIND_DRILL && shape.kind() != v1::TOOL_KIND_ROUND_BURR)
-    return bad("shape.kind", "is not a kind of tool that this program knows");
-  out.shape = {static_cast<ToolKind>(shape.kind()), shape.radius(), shape.tip_height(), shape.length()};
-  if (shape.radius() <= 0 || shape.tip_height() <= 0 || shape.length() < shape.tip_height())
-    return bad("shape", "needs a radius and a tip height above zero, and a length of at least the tip height");
   if (cut.level() >= static_cast<std::uint32_t>(kLevels)) return bad("level", "must be 0, 1 or 2");
   out.level = static_cast<int>(cut.level());
   if (cut.path().empty()) return bad("path", "needs at least one pose");

@@ -10,7 +10,6 @@ Cut cut_of(const CutPiece& piece, const ToolModel& model, AuthorId author, std::
   cut.author_seq = piece.author_seq;
   cut.lease_epoch = lease_epoch;
   cut.tool = model.tool.hash();
-  cut.shape = model.tool.cut_shape();
   cut.level = model.cut_level;
   cut.path.assign(piece.path.begin(), piece.path.begin() + piece.knots);
   cut.spindle_rpm = piece.spindle_rpm;

@@ -16,10 +16,6 @@ Digest cut_digest(const Cut& cut) {
   hasher.integer(cut.body.value);
   hasher.bytes(std::as_bytes(std::span(cut.tool.bytes)));
   const auto whole = [&](std::int64_t value) { hasher.integer(static_cast<std::uint64_t>(value)); };
-  whole(static_cast<int>(cut.shape.kind));
-  whole(cut.shape.radius);
-  whole(cut.shape.tip_height);
-  whole(cut.shape.length);
   whole(cut.level);
   hasher.integer(cut.path.size());
   for (const QuantisedPose& knot : cut.path) {
@@ -51,7 +47,7 @@ std::string_view sentence(Rejection reason) {
     case Rejection::none: return "the cut was applied";
     case Rejection::body: return "the room has no such body";
     case Rejection::lease: return "the cut was made under a tool lease that is over";
-    case Rejection::tool: return "the tool, or this shape of it, is not registered in the room";
+    case Rejection::tool: return "the tool is not registered in the room, or does not cut";
     case Rejection::level: return "the level is finer than the tool or the case allows";
     case Rejection::path: return "the path has no knots or more than a cut may have";
     case Rejection::rotation: return "a rotation on the path is not a unit quaternion";
@@ -62,8 +58,8 @@ std::string_view sentence(Rejection reason) {
   return "the reason is unknown";
 }
 
-Room::Room(Case bone, CutLimits limits, std::span<const Tool> tools)
-    : limits_(limits), tools_(tools.begin(), tools.end()), field_(std::move(bone), BodyId{0}), surface_(BodyId{0}) {}
+Room::Room(Case bone, CutLimits limits, std::shared_ptr<ToolBox> tools)
+    : limits_(limits), tools_(std::move(tools)), field_(std::move(bone), BodyId{0}, tools_), surface_(BodyId{0}) {}
 
 AuthorId Room::join(MemberKind kind) {
   const AuthorId author{++authors_};
@@ -112,9 +108,9 @@ Result<Outcome> Room::submit(const Cut& cut) {
 Rejection Room::judge(const Cut& cut) const {
   if (cut.body != BodyId{0}) return Rejection::body;
   if (cut.lease_epoch != lease_epoch()) return Rejection::lease;
-  const auto tool = std::find_if(tools_.begin(), tools_.end(), [&](const Tool& t) { return t.hash() == cut.tool; });
-  if (tool == tools_.end() || tool->cut_shape() != cut.shape) return Rejection::tool;
-  if (cut.level < 0 || cut.level > std::min(tool->cut_level, finest_level(bone().pitch_mm()))) return Rejection::level;
+  const ToolBox::Entry* entry = tools_->find(cut.tool);
+  if (!entry || !entry->body.cuts()) return Rejection::tool;
+  if (cut.level < 0 || cut.level > std::min(entry->tool.cut_level, finest_level(bone().pitch_mm()))) return Rejection::level;
   if (cut.path.empty() || cut.path.size() > static_cast<std::size_t>(limits_.path_knots)) return Rejection::path;
   if (cut.spindle_rpm > limits_.spindle_rpm) return Rejection::spindle;
 
@@ -131,7 +127,7 @@ Rejection Room::judge(const Cut& cut) const {
   for (std::size_t i = 1; i < cut.path.size(); ++i) {
     const Pose from = dequantise(cut.path[i - 1]), to = dequantise(cut.path[i]);
     swept_mm += (to.position_mm - from.position_mm).norm() +
-                from.rotation.angularDistance(to.rotation) * cut.shape.length * kQuantum_mm;
+                from.rotation.angularDistance(to.rotation) * entry->body.reach_mm();
   }
   return swept_mm > limits_.swept_mm ? Rejection::sweep : Rejection::none;
 }

@@ -33,7 +33,7 @@ enum class Rejection : std::uint8_t {
   none,
   body,       // no such body
   lease,      // made under a lease that is over
-  tool,       // not a registered tool, or not its shape
+  tool,       // not a registered tool, or one that does not cut
   level,      // finer than the tool or the case allows
   path,       // no knots or too many
   rotation,   // a quaternion far from unit
@@ -62,7 +62,7 @@ struct RoomCounts {
 // Not synchronised: one thread calls the changing functions, or several the const ones.
 class Room {
  public:
-  explicit Room(Case bone, CutLimits limits = {}, std::span<const Tool> tools = builtin_tools());
+  explicit Room(Case bone, CutLimits limits = {}, std::shared_ptr<ToolBox> tools = builtin_tool_box());
 
   // A new identity, never given twice.
   AuthorId join(MemberKind kind);
@@ -97,7 +97,7 @@ class Room {
   [[nodiscard]] Rejection judge(const Cut& cut) const;
 
   CutLimits limits_;
-  std::vector<Tool> tools_;
+  std::shared_ptr<ToolBox> tools_;  // shared with the field and, beyond the room, with those that list tools
   CutField field_;
   SurfaceBlocks surface_;
   std::set<BlockKey> stale_;

@@ -12,7 +12,7 @@ Bytes bytes_of(const std::string& text) { return {text.begin(), text.end()}; }
 
 Cut a_cut() {
   const Tool drill = builtin_tools()[0];
-  return {.author = {1}, .author_seq = 1, .lease_epoch = 1, .body = {}, .tool = drill.hash(), .shape = drill.cut_shape(), .level = 2,
+  return {.author = {1}, .author_seq = 1, .lease_epoch = 1, .body = {}, .tool = drill.hash(), .level = 2,
           .path = {quantise(pose_along({0, 0, 1}, {0, 0, -1})), quantise(pose_along({0, 0, -1}, {0, 0.1, -1}))}, .spindle_rpm = 1000};
 }
 

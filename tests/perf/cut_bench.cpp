@@ -43,7 +43,8 @@ void apply(benchmark::State& state, const Cut& cut) {
 
 // The same samples and the same distances, one voxel at a time.
 void apply_plainly(benchmark::State& state, const Cut& cut) {
-  const SweptTool swept(cut, kPitch_mm);
+  const auto tools = builtin_tool_box();
+  const SweptTool swept(cut, tools->find(cut.tool)->body, kPitch_mm);
   const auto leaves = swept.leaves();
   OSTEON_CHECK(!leaves.empty());
   const float band = band_mm(swept.level_pitch_mm());

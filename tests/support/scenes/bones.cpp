@@ -55,7 +55,6 @@ Cut straight_cut(const Tool& tool, const Vec3& from_tip_mm, const Vec3& to_tip_m
           .lease_epoch = 1,
           .body = {},
           .tool = tool.hash(),
-          .shape = tool.cut_shape(),
           .level = tool.cut_level,
           .path = {quantise(pose_along(from_tip_mm, axis)), quantise(pose_along(to_tip_mm, axis))},
           .spindle_rpm = static_cast<std::uint32_t>(tool.spindle_rpm)};

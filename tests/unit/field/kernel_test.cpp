@@ -10,6 +10,7 @@
 #include <random>
 
 #include "common/field/field_hash.hpp"
+#include "common/tools/tool_box.hpp"
 
 namespace osteon {
 namespace {
@@ -17,16 +18,21 @@ namespace {
 constexpr double kPitch = 0.5;
 
 Cut cut_with(const Tool& tool, std::vector<Pose> path, int level = 2) {
-  Cut cut{.author = {1}, .author_seq = 1, .lease_epoch = 1, .body = {}, .tool = tool.hash(), .shape = tool.cut_shape(), .level = level, .path = {}, .spindle_rpm = 1000};
+  Cut cut{.author = {1}, .author_seq = 1, .lease_epoch = 1, .body = {}, .tool = tool.hash(), .level = level, .path = {}, .spindle_rpm = 1000};
   for (const Pose& pose : path) cut.path.push_back(quantise(pose));
   return cut;
+}
+
+const CutBody& body_of(const Cut& cut) {
+  static const std::shared_ptr<const ToolBox> box = builtin_tool_box();
+  return box->find(cut.tool)->body;
 }
 
 // The tool without shank, its flutes no longer than what cuts, so that the distance of common/tools is that of its
 // cutting part.
 Tool cutting_part(std::string_view name) {
   Tool tool = *find_tool(name);
-  tool.cutting_length_mm = tool.cut_shape().length * kQuantum_mm;
+  tool.cutting_length_mm = -tool.cut_body().lowest[2] * kQuantum_mm;
   tool.shank_diameter_mm = 1e-6;
   tool.shank_length_mm = 1e-6;
   return tool;
@@ -53,7 +59,7 @@ std::vector<Vec3> points_around(const Vec3& centre, double reach, int count, uns
 
 void expect_sweep_matches(std::string_view name, const Pose& a, const Pose& b, double tolerance_mm) {
   const Tool tool = cutting_part(name);
-  const SweptTool swept(cut_with(tool, {a, b}), kPitch);
+  const SweptTool swept(cut_with(tool, {a, b}), tool.cut_body(), kPitch);
   const Pose from = dequantise(quantise(a)), to = dequantise(quantise(b));
   for (const Vec3& point : points_around(0.5 * (a.position_mm + b.position_mm), 6.0, 300, 7)) {
     const double distance = static_cast<double>(swept.distance_mm(point));
@@ -74,7 +80,7 @@ constexpr double kExact_mm = 3.0 * kQuantum_mm;
 TEST(Kernel, ASphereSweptAlongALineIsACapsule) {
   const Tool burr = *find_tool("burr-round-5");
   const Pose a = pose_along({1, 2, 3}, {0, 0, -1}), b = pose_along({9, -2, 5}, {0, 0, -1});
-  const SweptTool swept(cut_with(burr, {a, b}), kPitch);
+  const SweptTool swept(cut_with(burr, {a, b}), burr.cut_body(), kPitch);
   const Vec3 p0 = a.point({0, 0, -2.5}), p1 = b.point({0, 0, -2.5}), along = p1 - p0;
   for (const Vec3& p : points_around({5, 0, 4}, 8.0, 500, 1)) {
     const double t = std::clamp((p - p0).dot(along) / along.squaredNorm(), 0.0, 1.0);
@@ -100,7 +106,8 @@ TEST(Kernel, ATurningToolIsCutAtPosesAQuarterPitchApart) {
 }
 
 TEST(Kernel, ValuesAreWholeQuantaWithinTheBandAndNeverMinusZero) {
-  const SweptTool swept(cut_with(*find_tool("drill-3.2"), {pose_along({0, 0, 0}, {0, 0, -1}), pose_along({0, 0, -2}, {0, 0, -1})}), kPitch);
+  const Tool drill = *find_tool("drill-3.2");
+  const SweptTool swept(cut_with(drill, {pose_along({0, 0, 0}, {0, 0, -1}), pose_along({0, 0, -2}, {0, 0, -1})}), drill.cut_body(), kPitch);
   const float band = band_mm(swept.level_pitch_mm());
   for (const Coord origin : swept.leaves()) {
     std::array<float, kLeafVoxels> values;
@@ -116,7 +123,7 @@ TEST(Kernel, ValuesAreWholeQuantaWithinTheBandAndNeverMinusZero) {
 
 TEST(Kernel, NoLeafWithinTheBandIsLeftOut) {
   const Cut cut = cut_with(*find_tool("burr-round-5"), {pose_along({0, 0, 0}, {0.2, 0.1, -1}), pose_along({3, 1, -0.5}, {0.2, 0.1, -1})});
-  const SweptTool swept(cut, kPitch);
+  const SweptTool swept(cut, body_of(cut), kPitch);
   const auto named = swept.leaves();
   for (std::int32_t x = -16; x < 16; ++x)
     for (std::int32_t y = -16; y < 16; ++y)
@@ -137,7 +144,7 @@ TEST(Kernel, NoLeafWithinTheBandIsLeftOut) {
 class CutSet {
  public:
   void apply(const Cut& cut) {
-    const SweptTool swept(cut, kPitch);
+    const SweptTool swept(cut, body_of(cut), kPitch);
     for (const Coord origin : swept.leaves()) {
       auto [leaf, added] = leaves_.try_emplace({cut.level, origin});
       if (added) leaf->second.fill(band_mm(swept.level_pitch_mm()));

@@ -292,7 +292,6 @@ TEST(Replica, ARejectedCutComesBack) {
     Cut cut;
     cut.author = AuthorId{1};
     cut.author_seq = seq;
-    cut.shape = tool.cut_shape();
     cut.level = tool.cut_level;
     cut.path = {quantise(pose_along({x, 0, 0}, Vec3::UnitZ())), quantise(pose_along({x, 0, 3}, Vec3::UnitZ()))};
     return cut;
@@ -321,7 +320,6 @@ TEST(Replica, RejectionsInARowAreSettledOnce) {
     Cut cut;
     cut.author = AuthorId{author};
     cut.author_seq = seq;
-    cut.shape = tool.cut_shape();
     cut.level = tool.cut_level;
     cut.path = {quantise(pose_along({x, 0, 0}, Vec3::UnitZ())), quantise(pose_along({x, 0, 3}, Vec3::UnitZ()))};
     return cut;

@@ -15,7 +15,6 @@ Cut hole(double depth_mm) {
   Cut cut;
   cut.author = AuthorId{1};
   cut.author_seq = 1;
-  cut.shape = tool.cut_shape();
   cut.level = tool.cut_level;
   cut.path = {quantise(pose_along({0, 0, -1}, Vec3::UnitZ())), quantise(pose_along({0, 0, depth_mm}, Vec3::UnitZ()))};
   return cut;

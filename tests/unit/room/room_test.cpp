@@ -133,7 +133,6 @@ INSTANTIATE_TEST_SUITE_P(
         Breach{"body", Rejection::body, [](Cut& c) { c.body = BodyId{1}; }},
         Breach{"lease", Rejection::lease, [](Cut& c) { ++c.lease_epoch; }},
         Breach{"unknown_tool", Rejection::tool, [](Cut& c) { c.tool.bytes[0] ^= 1; }},
-        Breach{"other_shape", Rejection::tool, [](Cut& c) { ++c.shape.radius; }},
         Breach{"level_too_fine", Rejection::level, [](Cut& c) { c.level = kLevels; }},
         Breach{"level_negative", Rejection::level, [](Cut& c) { c.level = -1; }},
         Breach{"no_path", Rejection::path, [](Cut& c) { c.path.clear(); }},
@@ -150,7 +149,6 @@ INSTANTIATE_TEST_SUITE_P(
         Breach{"many_turns", Rejection::sweep, [](Cut& c) {
                  const Tool drill = test::tool_named("drill-3.2");
                  c.tool = drill.hash();
-                 c.shape = drill.cut_shape();
                  c.path.clear();
                  for (int i = 0; i < 20; ++i) c.path.push_back(quantise(pose_along({0, 0, 0}, i % 2 ? Vec3{1, 0, 0} : Vec3{0, 0, -1})));
                }},

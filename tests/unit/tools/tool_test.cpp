@@ -13,7 +13,7 @@ constexpr double kPi = std::numbers::pi;
 TEST(Tools, DrillsConeIsAsHighAsItsPointAngleSays) {
   const Tool drill = *find_tool("drill-3.2");
   // (D/2) / tan(59°), which force-laws call the ramp of the entry: 0.961 mm.
-  EXPECT_NEAR(drill.cut_shape().tip_height * kQuantum_mm, 0.961, 0.001);
+  EXPECT_NEAR(-drill.cut_body().profile[3].z * kQuantum_mm, 0.961, 0.001);
 }
 
 TEST(Tools, DistanceIsZeroOnEverySamplePointAndItsNormalPointsInward) {

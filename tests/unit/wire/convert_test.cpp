@@ -10,7 +10,7 @@ namespace {
 
 Cut sample_cut() {
   const Tool drill = *find_tool("drill-3.2");
-  return {.author = {7}, .author_seq = 12, .lease_epoch = 3, .body = {2}, .tool = drill.hash(), .shape = drill.cut_shape(), .level = 2,
+  return {.author = {7}, .author_seq = 12, .lease_epoch = 3, .body = {2}, .tool = drill.hash(), .level = 2,
           .path = {quantise(pose_along({1, 2, 3}, {0, 0.3, -1})), quantise(pose_along({-100.5, 2, 3}, {0, 0.3, -1}))},
           .spindle_rpm = 1000};
 }
@@ -64,8 +64,6 @@ TEST(Wire, RefusesBadCutsByTheNameOfTheField) {
   refused([](v1::Cut& c) { c.mutable_path(0)->add_position(4); }, "path");
   refused([](v1::Cut& c) { c.mutable_path(0)->set_rotation(3, 0); }, "path");
   refused([](v1::Cut& c) { c.mutable_path(1)->set_rotation(0, 40000); }, "path");
-  refused([](v1::Cut& c) { c.mutable_shape()->set_radius(0); }, "shape");
-  refused([](v1::Cut& c) { c.mutable_shape()->set_kind(v1::TOOL_KIND_UNSPECIFIED); }, "shape.kind");
 }
 
 TEST(Wire, RefusesPosesAndStatesThatAreNotNumbers) {
