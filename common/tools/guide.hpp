@@ -30,7 +30,11 @@ struct GuideShape {
   std::vector<GuideBore> pin_holes;  // for pins that fix the guide
   std::vector<GuideSlot> slots;      // for saws
 };
-// Of a tool that is a guide; empty for any other.
+// Of a tool that is a guide; empty for any other. The guide's frame is a tool's: its face towards the bone at z = 0, its
+// body before it at z < 0, so that tools go through along +z. Blocks: width along x, thickness along y; the flat of a
+// slot lies along x, pin holes (of diameter_mm) in both ends of x. A 4-in-1 block's slots come in the order anterior
+// (y > 0), posterior, anterior chamfer, posterior chamfer; its thickness should exceed 3.5 times its cutting_length_mm,
+// else the chamfers' slots cross.
 [[nodiscard]] GuideShape guide_shape(const Tool& guide);
 
 struct GuidedPose {
