@@ -37,16 +37,29 @@ struct GuideShape {
 // else the chamfers' slots cross.
 [[nodiscard]] GuideShape guide_shape(const Tool& guide);
 
+// The openings of a shape in one list: bores, then pin holes, then slots. A tool that is in one stays in it until it is
+// drawn out, however hard it is pulled sideways: so whoever moves the tool remembers the opening.
+[[nodiscard]] std::size_t opening_count(const GuideShape& shape) noexcept;
+// Whether this tool goes into this opening at all: what turns on its axis into bores and holes, blades into slots.
+[[nodiscard]] bool fits(const GuideShape& shape, std::size_t opening, const Tool& tool) noexcept;
+// The opening that the tool is in, or whose lead-in its tip has come to; its pose is one that the opening allows.
+[[nodiscard]] std::optional<std::size_t> entered(const GuideShape& shape, const Pose& pose_bone_guide, const Tool& tool,
+                                                 const Pose& pose_bone_tool) noexcept;
+
 struct GuidedPose {
   Pose pose_bone_tool;
-  double play_mm = 0;      // how far the tip may be off the middle at the guide's exit (radius, or half the height)
-  double correction_mm = 0;// how far the tip was moved
+  double depth_mm = 0;       // of the tip below the opening's mouth, along its direction; negative before it
+  double play_mm = 0;        // how far the tip may be off the middle at that depth
+  double correction_mm = 0;  // how far the tip was moved
 };
 
-// The pose next to the wanted one that the guide allows, or nothing while the tool is outside every opening that fits it.
-// A bore leaves turning about and moving along its axis free, and the play c = (bore − tool) / 2 across; a slot leaves
-// its plane free, and the play across. Pure; any thread.
-[[nodiscard]] std::optional<GuidedPose> constrain(const Tool& guide, const GuideShape& shape, const Pose& pose_bone_guide,
-                                                  const Tool& tool, const Pose& wanted_bone_tool);
+// The pose next to the wanted one that the opening allows; nothing once the tip is drawn back beyond the lead-in. A bore
+// leaves turning about the axis and moving along it free, and across it the play c = (bore − tool) / 2 from its mouth to
+// its end or the tip: beyond a bore of length L the tip stays within c (1 + 2 l / L) of the middle, l from the end. A slot
+// holds the blade's plate in the same way across its flat, and by its width along it. Next means: smallest change of the
+// axis in the middle of the opening, and of its slope times four times the opening's length, squared and added; the tip's
+// depth stays. Continuous in the wanted pose; an allowed pose comes back as it is. Pure, no allocation.
+[[nodiscard]] std::optional<GuidedPose> constrain(const GuideShape& shape, std::size_t opening, const Pose& pose_bone_guide,
+                                                  const Tool& tool, const Pose& wanted_bone_tool) noexcept;
 
 }  // namespace osteon
