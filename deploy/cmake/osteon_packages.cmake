@@ -10,7 +10,9 @@ find_package(CLI11 REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(LibArchive REQUIRED)
 find_package(pugixml REQUIRED)
+find_package(yaml-cpp REQUIRED)
 find_package(GDCM REQUIRED)
+find_package(PNG REQUIRED)
 find_package(VTK 9.1 REQUIRED COMPONENTS
   CommonCore CommonDataModel FiltersCore FiltersSources FiltersGeneral IOImage
   InteractionStyle RenderingCore RenderingOpenGL2 RenderingFreeType RenderingAnnotation)
