@@ -1,0 +1,198 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "server/import/case_report.hpp"
+#include "server/import/command.hpp"
+#include "server/import/ct_import.hpp"
+#include "server/import/dicom_reader.hpp"
+#include "server/import/dicom_writer.hpp"
+#include "server/import/inv3_reader.hpp"
+#include "server/import/label_import.hpp"
+#include "server/import/phantom.hpp"
+
+namespace osteon::import {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kPhantomPitch_mm = 0.4;
+
+struct Arguments {
+  std::string input, out, title, layers, kind, dicom, legend, spacing;
+  std::vector<std::string> bone_colours;
+  std::optional<double> pitch_mm, threshold_hu;
+  double width_mm = 20.0;
+  bool json = false;
+};
+
+Result<void> save(const Case& bone, const std::string& out, const StopSignal& stop) {
+  if (stop.requested()) return tl::unexpected(stopped());
+  return bone.save(out);
+}
+
+// Names the input in what went wrong with its content.
+Error about(const std::string& input, const Error& error) {
+  return error.code == ErrorCode::cancelled ? error : Error{error.code, input + ": " + error.message};
+}
+
+Result<std::string> run_ct(const Arguments& a, const StopSignal& stop) {
+  if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
+  std::error_code error;
+  if (!fs::exists(a.input, error)) return failure(ErrorCode::not_found, "there is no file or folder " + a.input + "; give a DICOM folder or an .inv3 file");
+  Bar bar(stop);
+  const auto reading = bar.stage(0.0, 0.2);
+  auto scan = fs::is_directory(a.input, error) ? read_dicom_series(a.input, reading) : read_inv3(a.input, reading);
+  if (!scan) return tl::unexpected(scan.error());
+
+  CtOptions options;
+  options.pitch_mm = a.pitch_mm;
+  if (a.threshold_hu) options.threshold_hu = *a.threshold_hu;
+  if (!a.title.empty()) options.title = a.title;
+  const auto bone = import_ct(std::move(*scan), options, bar.stage(0.2, 0.95));
+  if (!bone) return tl::unexpected(about(a.input, bone.error()));
+  if (auto saved = save(*bone, a.out, stop); !saved) return tl::unexpected(saved.error());
+  bar.stage(1.0, 1.0)(1.0);
+  return report_text(*bone);
+}
+
+Result<std::string> run_phantom(const Arguments& a, const StopSignal& stop) {
+  if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
+  if (!a.dicom.empty())
+    if (auto is_free = check_free(a.dicom); !is_free) return tl::unexpected(is_free.error());
+  auto layers = parse_layers(a.layers);
+  if (!layers) return tl::unexpected(layers.error());
+  Phantom phantom;
+  phantom.kind = a.kind == "tube" ? PhantomKind::tube : PhantomKind::block;
+  phantom.layers = std::move(*layers);
+  phantom.width_mm = a.width_mm;
+  const double pitch_mm = a.pitch_mm.value_or(kPhantomPitch_mm);
+
+  Bar bar(stop);
+  const auto bone = build_phantom_case(phantom, pitch_mm, a.title.empty() ? "Phantom" : a.title, bar.stage(0.0, 0.4));
+  if (!bone) return tl::unexpected(bone.error());
+  if (!a.dicom.empty()) {
+    const auto scan = scan_phantom(phantom, pitch_mm, bar.stage(0.4, 0.6));
+    if (!scan) return tl::unexpected(scan.error());
+    if (auto written = write_dicom_series(*scan, a.dicom, bar.stage(0.6, 0.95)); !written) return tl::unexpected(written.error());
+  }
+  if (auto saved = save(*bone, a.out, stop); !saved) {
+    std::error_code error;
+    if (!a.dicom.empty()) fs::remove_all(a.dicom, error);
+    return tl::unexpected(saved.error());
+  }
+  bar.stage(1.0, 1.0)(1.0);
+  return report_text(*bone);
+}
+
+Result<Vec3> parse_spacing(const std::string& text) {
+  double x = 0, y = 0, z = 0;
+  char rest = 0;
+  const int parts = std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &x, &y, &z, &rest);
+  const Vec3 spacing = parts == 1 && text.find(',') == std::string::npos ? Vec3::Constant(x) : Vec3(x, y, z);
+  if ((parts != 3 && parts != 1) || !(spacing.minCoeff() >= 0.01) || !(spacing.maxCoeff() <= 10.0))
+    return failure(ErrorCode::invalid_input, "--spacing " + text + " is not a voxel size; write X,Y,Z in mm from 0.01 to 10, such as 0.096,0.096,0.096");
+  return spacing;
+}
+
+Result<std::string> run_labels(const Arguments& a, const StopSignal& stop) {
+  if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
+  const auto spacing = parse_spacing(a.spacing);
+  if (!spacing) return tl::unexpected(spacing.error());
+  LabelLegend legend;
+  if (!a.legend.empty()) {
+    auto read = read_legend(a.legend);
+    if (!read) return tl::unexpected(read.error());
+    legend = std::move(*read);
+  }
+  if (!a.bone_colours.empty()) legend.bones.clear();
+  for (const std::string& text : a.bone_colours) {
+    auto colour = parse_bone_colour(text);
+    if (!colour) return tl::unexpected(colour.error());
+    legend.bones.push_back(std::move(*colour));
+  }
+
+  Bar bar(stop);
+  auto stack = read_label_stack(a.input, legend, *spacing, bar.stage(0.0, 0.1));
+  if (!stack) return tl::unexpected(stack.error());
+  const std::vector<ColourCount> colours = stack->colours;
+  LabelOptions options;
+  options.pitch_mm = a.pitch_mm;
+  if (!a.title.empty()) options.title = a.title;
+  const auto made = import_labels(std::move(*stack), legend, options, bar.stage(0.1, 0.95));
+  if (!made) return tl::unexpected(about(a.input, made.error()));
+  if (auto saved = save(made->bone, a.out, stop); !saved) return tl::unexpected(saved.error());
+  bar.stage(1.0, 1.0)(1.0);
+
+  std::string text = report_text(made->bone);
+  char line[200];
+  const double labelled = made->labelled_mm3, kept = made->bone.volume_mm3();
+  std::snprintf(line, sizeof line, "labelled   %.2f cm3; the smoothed bone has %+.2f %% of that more\n", labelled * 1e-3, 100.0 * (kept - labelled) / labelled);
+  text += line;
+  for (std::size_t i = 0; i < colours.size(); ++i) {
+    const ColourCount& c = colours[i];
+    if (c.label == 0 && i >= 12) continue;  // noise
+    const std::string name = c.label == 0 ? "other" : legend.bones[static_cast<std::size_t>(c.label) - 1].name;
+    std::snprintf(line, sizeof line, "colour     %3d,%3d,%3d  %12lld voxels  %s\n", c.rgba[0], c.rgba[1], c.rgba[2], static_cast<long long>(c.voxels), name.c_str());
+    text += line;
+  }
+  return text;
+}
+
+Result<std::string> run_info(const Arguments& a) {
+  const auto bone = Case::load(a.input);
+  if (!bone) return tl::unexpected(bone.error());
+  return a.json ? report_json(*bone) : report_text(*bone);
+}
+
+}  // namespace
+
+Result<void> check_free(const std::string& path) {
+  std::error_code error;
+  if (fs::exists(path, error)) return failure(ErrorCode::exists, path + " is already there; choose another name or remove it first");
+  return {};
+}
+
+void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
+  // Owners: the options that write into it and the command that reads it, both for as long as the program runs.
+  const auto shared = std::make_shared<Arguments>();
+  Arguments& a = *shared;
+
+  CLI::App* ct = app.add_subcommand("ct", "Make a case from a CT scan");
+  ct->add_option("INPUT", a.input, "Folder with one DICOM CT series, or an InVesalius project (.inv3)")->required();
+  ct->add_option("--out", a.out, "Folder of the case, made by this command")->required();
+  ct->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the scan's smallest spacing)")->check(CLI::Range(0.02, 10.0));
+  ct->add_option("--threshold", a.threshold_hu, "Bone is at or above it, HU (default: 226)")->check(CLI::Range(-1000.0, 4000.0));
+  ct->add_option("--title", a.title, "Name shown to people; do not use a patient's");
+  commands.push_back({ct, [shared](const StopSignal& stop) { return run_ct(*shared, stop); }});
+
+  CLI::App* phantom = app.add_subcommand("phantom", "Make a case whose true shape and density are known");
+  phantom->add_option("KIND", a.kind, "block (layers from the top down) or tube (layers from the outside in)")->required()->check(CLI::IsMember({"block", "tube"}));
+  phantom->add_option("--layers", a.layers, "THICKNESS_MM:DENSITY_G_CM3,... such as 5:1.9,20:0.3,5:1.9")->required();
+  phantom->add_option("--width", a.width_mm, "Edge of the block, or length of the tube, mm")->check(CLI::Range(1.0, 1000.0))->capture_default_str();
+  phantom->add_option("--pitch", a.pitch_mm, "Voxel edge, mm (default: 0.4)")->check(CLI::Range(0.02, 10.0));
+  phantom->add_option("--out", a.out, "Folder of the case, made by this command")->required();
+  phantom->add_option("--dicom", a.dicom, "Also write what a CT scanner would see of it, as a DICOM series, to this folder");
+  phantom->add_option("--title", a.title, "Name shown to people");
+  commands.push_back({phantom, [shared](const StopSignal& stop) { return run_phantom(*shared, stop); }});
+
+  CLI::App* labels = app.add_subcommand("labels", "Make a case from a segmented volume: PNG slices whose colours name structures");
+  labels->add_option("DIR", a.input, "Folder with the slices, numbered at the end of their names")->required();
+  labels->add_option("--out", a.out, "Folder of the case, made by this command")->required();
+  labels->add_option("--spacing", a.spacing, "Size of a voxel, mm: X,Y,Z, or one number for all")->required();
+  labels->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the smallest spacing)")->check(CLI::Range(0.02, 10.0));
+  labels->add_option("--bone", a.bone_colours, "R,G,B or R,G,B:DENSITY_G_CM3 of a colour that is bone; may be repeated (default: 255,249,219:1.9)");
+  labels->add_option("--legend", a.legend, "The same from a YAML file");
+  labels->add_option("--title", a.title, "Name shown to people; do not use a patient's");
+  commands.push_back({labels, [shared](const StopSignal& stop) { return run_labels(*shared, stop); }});
+
+  CLI::App* info = app.add_subcommand("info", "Say what a case is");
+  info->add_option("CASE_DIR", a.input, "Folder of the case")->required();
+  info->add_flag("--json", a.json, "For programs");
+  commands.push_back({info, [shared](const StopSignal&) { return run_info(*shared); }});
+}
+
+}  // namespace osteon::import

@@ -1,0 +1,51 @@
+// What the commands of osteon-import share: how they are found, run, shown and stopped.
+#pragma once
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/runtime/progress.hpp"
+#include "common/runtime/stop_signal.hpp"
+#include "common/volume/iso_surface.hpp"
+
+namespace CLI {  // NOLINT(readability-identifier-naming): the library's
+class App;
+}
+
+namespace osteon::import {
+
+// One of them: its part of the command line, and its work, which returns the text for standard output.
+struct Command {
+  CLI::App* app;
+  std::function<Result<std::string>(const StopSignal& stop)> run;
+};
+
+void add_case_commands(CLI::App& app, std::vector<Command>& commands);   // make cases, and say what one is
+void add_bone_commands(CLI::App& app, std::vector<Command>& commands);   // work on a case's bone, and list the tools
+
+// One bar over all stages, shown when the first work is done: a refused input leaves only its sentence.
+class Bar {
+ public:
+  explicit Bar(const StopSignal& stop, const char* what = "importing") : stop_(stop), what_(what) {}
+  [[nodiscard]] KeepGoing stage(double begin, double end) {
+    return [this, begin, end](double fraction) {
+      const double done = begin + (end - begin) * fraction;
+      if (done > 0.0 && !bar_) bar_.emplace(what_);
+      if (bar_) bar_->update(done);
+      return !stop_.requested();
+    };
+  }
+
+ private:
+  const StopSignal& stop_;
+  const char* what_;
+  std::optional<Progress> bar_;
+};
+
+[[nodiscard]] inline Error stopped() { return {ErrorCode::cancelled, "stopped; nothing was written"}; }
+
+// Checked before the work, not after minutes of it. Error: exists.
+[[nodiscard]] Result<void> check_free(const std::string& path);
+
+}  // namespace osteon::import

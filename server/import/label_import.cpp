@@ -1,0 +1,110 @@
+#include "server/import/label_import.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace osteon::import {
+namespace {
+
+constexpr double kLargestLattice = 1.0e9;
+constexpr int kMargin = 5;  // samples beyond the bone: the band and the cell around it
+// Shares of the time that the stages take.
+constexpr double kSmoothEnd = 0.35;
+constexpr double kResampleEnd = 0.4;
+constexpr double kSurfaceEnd = 0.85;
+
+KeepGoing part(const KeepGoing& whole, double begin, double end) {
+  return [&whole, begin, end](double fraction) { return whole(begin + (end - begin) * fraction); };
+}
+
+DenseVolume<std::uint8_t> cropped(const DenseVolume<std::uint8_t>& from, const CoordBox& box) {
+  DenseVolume<std::uint8_t> out;
+  out.box = box;
+  out.values.reserve(static_cast<std::size_t>(box.dims().x) * static_cast<std::size_t>(box.dims().y) * static_cast<std::size_t>(box.dims().z));
+  for (int x = box.min.x; x <= box.max.x; ++x)
+    for (int y = box.min.y; y <= box.max.y; ++y) {
+      const auto line = from.values.begin() + static_cast<std::ptrdiff_t>(from.index({x, y, box.min.z}));
+      out.values.insert(out.values.end(), line, line + box.dims().z);
+    }
+  return out;
+}
+
+// Bone ends where the volume does, half a voxel beyond the outer centres: the intersection of two solids is the maximum
+// of their distances.
+void cap_at_volume(const imaging::LabelVolume& volume, double pitch_mm, DenseVolume<float>& surface_mm) {
+  const CoordBox& box = surface_mm.box;
+  const auto beyond = [&](int first, int last, int axis) {
+    std::vector<float> out;
+    const double spacing = volume.spacing_mm[axis], half = 0.5 * volume.dims[static_cast<std::size_t>(axis)] * spacing;
+    for (int i = first; i <= last; ++i) out.push_back(static_cast<float>(std::abs(i * pitch_mm + 0.5 * spacing - half) - half));
+    return out;
+  };
+  const auto xs = beyond(box.min.x, box.max.x, 0), ys = beyond(box.min.y, box.max.y, 1), zs = beyond(box.min.z, box.max.z, 2);
+  const auto band = static_cast<float>(4.0 * pitch_mm);
+  float* value = surface_mm.values.data();
+  for (const float x : xs)
+    for (const float y : ys)
+      for (const float z : zs) {
+        *value = std::min(band, std::max({*value, x, y, z}));
+        ++value;
+      }
+}
+
+}  // namespace
+
+Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, const LabelOptions& options, const KeepGoing& keep_going) {
+  imaging::LabelVolume& volume = stack.volume;
+  const Vec3 spacing = volume.spacing_mm;
+  const double pitch_mm = options.pitch_mm.value_or(spacing.minCoeff());
+  double labelled_mm3 = 0;
+  for (const ColourCount& colour : stack.colours)
+    if (colour.label != 0) labelled_mm3 += static_cast<double>(colour.voxels) * spacing.prod();
+
+  // Only the bone's box, and what the filter and the band reach beyond it.
+  const CoordBox all = volume.labels.box;
+  CoordBox voxels = imaging::bone_voxels(volume).grown(kMargin);
+  voxels.min = {std::max(voxels.min.x, all.min.x), std::max(voxels.min.y, all.min.y), std::max(voxels.min.z, all.min.z)};
+  voxels.max = {std::min(voxels.max.x, all.max.x), std::min(voxels.max.y, all.max.y), std::min(voxels.max.z, all.max.z)};
+  if (voxels != all) volume.labels = cropped(volume.labels, voxels);
+  const Box bone{position_mm(voxels.min, 1.0).cwiseProduct(spacing), position_mm(voxels.max, 1.0).cwiseProduct(spacing)};
+  const CoordBox box = covering_samples(bone.grown(kMargin * pitch_mm), pitch_mm);
+  const Coord dims = box.dims();
+  const double samples = static_cast<double>(dims.x) * dims.y * dims.z;
+  if (samples > kLargestLattice) {
+    char text[160];
+    std::snprintf(text, sizeof text, "a pitch of %.3g mm needs %.0f million samples, more than %.0f million; give a larger --pitch", pitch_mm,
+                  samples * 1e-6, kLargestLattice * 1e-6);
+    return failure(ErrorCode::invalid_input, text);
+  }
+
+  auto smooth = imaging::smooth_labels(volume, options.smoothing, part(keep_going, 0.0, kSmoothEnd));
+  if (!smooth) return tl::unexpected(smooth.error());
+  auto field = imaging::resample(*smooth, spacing, box, pitch_mm, part(keep_going, kSmoothEnd, kResampleEnd));
+  if (!field) return tl::unexpected(field.error());
+  smooth->values = {};
+  auto surface_mm = signed_distance_mm(*field, 0.0f, pitch_mm, part(keep_going, kResampleEnd, kSurfaceEnd));
+  if (!surface_mm) return tl::unexpected(surface_mm.error());
+  field->values = {};
+  cap_at_volume(volume, pitch_mm, *surface_mm);
+
+  std::vector<float> densities{0.0f};
+  for (const BoneColour& colour : legend.bones) densities.push_back(static_cast<float>(colour.density_g_cm3));
+  auto density = imaging::label_density(volume, densities, box, pitch_mm, part(keep_going, kSurfaceEnd, 0.9));
+  if (!density) return tl::unexpected(density.error());
+  volume.labels = {};
+  if (!keep_going(0.9)) return failure(ErrorCode::cancelled, "stopped before building the case");
+
+  char source[160];
+  std::snprintf(source, sizeof source, "label volume, %dx%dx%d, %.4gx%.4gx%.4g mm", volume.dims[0], volume.dims[1], volume.dims[2], spacing.x(),
+                spacing.y(), spacing.z());
+  CaseInfo info;
+  info.title = options.title;
+  info.source = source;
+  info.pitch_mm = pitch_mm;  // densities are given by label, so there is neither a calibration nor a threshold
+  auto built = Case::build(std::move(info), *surface_mm, *density);
+  if (!built) return tl::unexpected(built.error());
+  return LabelImport{std::move(*built), labelled_mm3};
+}
+
+}  // namespace osteon::import
