@@ -1,9 +1,10 @@
 #include "common/tools/tool.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
+
+#include "common/tools/tool_solid.hpp"
 
 namespace osteon {
 namespace {
@@ -96,19 +97,53 @@ std::vector<SamplePoint> points_with_spacing(const Tool& tool, double spacing) {
   return points;
 }
 
-const std::array<Tool, 3>& builtins() {
-  static const std::array<Tool, 3> tools{{
-      {.name = "drill-3.2", .title = "Drill 3.2 mm", .kind = ToolKind::drill, .diameter_mm = 3.2, .cutting_length_mm = 40.0,
-       .point_angle_rad = 118.0 * kPi / 180.0, .shank_diameter_mm = 3.2, .shank_length_mm = 40.0,
-       .spindle_rpm = 1000.0, .cut_level = 2},
-      {.name = "burr-round-5", .title = "Round bur 5 mm", .kind = ToolKind::round_burr, .diameter_mm = 5.0, .cutting_length_mm = 5.0,
-       .point_angle_rad = 0.0, .shank_diameter_mm = 2.35, .shank_length_mm = 60.0,
-       .spindle_rpm = 20000.0, .cut_level = 2},
-      {.name = "burr-round-3.2", .title = "Round bur 3.2 mm", .kind = ToolKind::round_burr, .diameter_mm = 3.2, .cutting_length_mm = 3.2,
-       .point_angle_rad = 0.0, .shank_diameter_mm = 2.35, .shank_length_mm = 60.0,
-       .spindle_rpm = 30000.0, .cut_level = 2},
-  }};
-  return tools;
+// Rounds a unit normal, and the face so that it goes through the same middle: far from the tip the step of a normal is
+// more than one of an offset.
+HullPlane rounded(const HalfSpace& face, const std::vector<Vec3>& polygon) {
+  HullPlane plane;
+  Vec3 normal;
+  for (int k = 0; k < 3; ++k) {
+    plane.normal[static_cast<std::size_t>(k)] = static_cast<std::int16_t>(std::lround(face.normal[k] / kDirectionStep));
+    normal[k] = plane.normal[static_cast<std::size_t>(k)];
+  }
+  normal.normalize();
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& p : polygon) middle += p / static_cast<double>(polygon.size());
+  plane.offset = quanta(normal.dot(middle));
+  return plane;
+}
+
+void make_hull(CutBody& body, const std::vector<HalfSpace>& faces) {
+  const auto polygons = face_polygons(faces);
+  for (std::size_t i = 0; i < faces.size(); ++i)
+    if (!polygons[i].empty()) body.planes.push_back(rounded(faces[i], polygons[i]));
+  // The box of what the rounded planes enclose.
+  std::vector<HalfSpace> planes;
+  for (const HullPlane& plane : body.planes) {
+    const Vec3 normal = Vec3(plane.normal[0], plane.normal[1], plane.normal[2]).normalized();
+    planes.push_back({normal, plane.offset * kQuantum_mm});
+  }
+  const Box box = box_of(face_polygons(planes));
+  constexpr double kRounding = 1e-6;  // of the corners' own arithmetic
+  for (int k = 0; k < 3; ++k) {
+    body.lowest[static_cast<std::size_t>(k)] = static_cast<std::int32_t>(std::floor(box.min_mm[k] / kQuantum_mm + kRounding));
+    body.highest[static_cast<std::size_t>(k)] = static_cast<std::int32_t>(std::ceil(box.max_mm[k] / kQuantum_mm - kRounding));
+  }
+}
+
+void make_turned(CutBody& body, const CutOutline& outline) {
+  body.dome = quanta(outline.dome_mm);
+  std::int32_t widest = 0, top = outline.profile.empty() ? 0 : quanta(outline.profile.front().z), bottom = top;
+  for (const Corner& corner : outline.profile) {
+    const ProfileCorner rounded_corner{quanta(corner.r), quanta(corner.z)};
+    if (!body.profile.empty() && body.profile.back() == rounded_corner) continue;
+    body.profile.push_back(rounded_corner);
+    widest = std::max(widest, rounded_corner.r);
+    top = std::max(top, rounded_corner.z);
+    bottom = std::min(bottom, rounded_corner.z);
+  }
+  body.lowest = {-widest, -widest, bottom};
+  body.highest = {widest, widest, top};
 }
 
 }  // namespace
@@ -118,21 +153,27 @@ bool Tool::cuts() const {
 }
 
 CutBody Tool::cut_body() const {
-  const std::int32_t radius = quanta(0.5 * diameter_mm);
   CutBody body;
-  if (kind == ToolKind::round_burr) {
-    body.kind = CutKind::ball;
-    body.radius = radius;
-    body.lowest = {-radius, -radius, -2 * radius};
-  } else {
-    // Only the lips and the land behind them cut: the flutes above run in the hole that these have made. So a cut costs
-    // what is new, however deep the hole is.
-    const std::int32_t shoulder = quanta(tip_height_mm(*this)), heel = shoulder + radius;
-    body.kind = CutKind::turned;
-    body.profile = {{0, 0}, {0, -heel}, {radius, -heel}, {radius, -shoulder}};
-    body.lowest = {-radius, -radius, -heel};
+  if (!cuts()) return body;
+  const CutOutline outline = cut_outline(*this);
+  body.kind = outline.kind;
+  switch (outline.kind) {
+    case CutKind::none: break;
+    case CutKind::ball:
+      body.radius = quanta(outline.radius_mm);
+      body.lowest = {-body.radius, -body.radius, -2 * body.radius};
+      body.highest = {body.radius, body.radius, 0};
+      break;
+    case CutKind::turned: make_turned(body, outline); break;
+    case CutKind::hull: make_hull(body, outline.planes); break;
+    case CutKind::sampled: {
+      body.sampled = mesh;
+      const CoordBox& box = mesh->box;
+      body.lowest = {box.min.x * mesh->pitch, box.min.y * mesh->pitch, box.min.z * mesh->pitch};
+      body.highest = {box.max.x * mesh->pitch, box.max.y * mesh->pitch, box.max.z * mesh->pitch};
+      break;
+    }
   }
-  body.highest = {radius, radius, 0};
   return body;
 }
 
@@ -156,21 +197,7 @@ Digest Tool::hash() const {
   return hasher.finish();
 }
 
-std::span<const Tool> builtin_tools() { return builtins(); }
-
-Result<Tool> find_tool(std::string_view name) {
-  std::string known;
-  for (const Tool& tool : builtins()) {
-    if (tool.name == name) return tool;
-    known += (known.empty() ? "" : ", ") + tool.name;
-  }
-  return failure(ErrorCode::not_found, "there is no tool \"" + std::string(name) + "\"; choose one of " + known);
-}
-
-Box local_bounds(const Tool& tool) {
-  const double widest = 0.5 * std::max(tool.diameter_mm, tool.shank_diameter_mm);
-  return {Vec3(-widest, -widest, -tool.reach_mm()), Vec3(widest, widest, 0.0)};
-}
+Box local_bounds(const Tool& tool) { return tool_solid(tool).bounds; }
 
 Box world_bounds(const Tool& tool, const Pose& pose_bone_tool) {
   const Box local = local_bounds(tool);
@@ -179,20 +206,13 @@ Box world_bounds(const Tool& tool, const Pose& pose_bone_tool) {
   return {centre - half, centre + half};
 }
 
-Vec3 normal(const Tool& tool, const Vec3& point_tool_mm) {
-  constexpr double kStep_mm = 1e-5;
-  Vec3 gradient;
-  for (int axis = 0; axis < 3; ++axis) {
-    const Vec3 step = kStep_mm * Vec3::Unit(axis);
-    gradient[axis] = signed_distance_mm(tool, point_tool_mm + step) - signed_distance_mm(tool, point_tool_mm - step);
-  }
-  const double length = gradient.norm();
-  return length > 0.0 ? Vec3(gradient / length) : Vec3::UnitZ();
-}
+Vec3 normal(const Tool& tool, const Vec3& point_tool_mm) { return gradient(tool_solid(tool), point_tool_mm); }
 
 double signed_distance_mm(const Tool& tool, const Vec3& point_tool_mm) {
+  // The two that a hand holds most are asked often: without a solid made first.
+  if (tool.kind != ToolKind::drill && tool.kind != ToolKind::round_burr) return tool_solid(tool)(point_tool_mm);
   const Outline p{std::hypot(point_tool_mm.x(), point_tool_mm.y()), point_tool_mm.z()};
-  const double shank = cylinder_distance(0.5 * tool.shank_diameter_mm, -tool.cutting_length_mm, -tool.reach_mm(), p);
+  const double shank = cylinder_distance(0.5 * tool.shank_diameter_mm, shank_start_mm(tool), -tool.reach_mm(), p);
   const double cutting = tool.kind == ToolKind::drill
                              ? drill_distance(tool, p)
                              : std::hypot(p.r, p.z + 0.5 * tool.diameter_mm) - 0.5 * tool.diameter_mm;

@@ -43,19 +43,19 @@ struct Tool {
   std::string name;                // "burr-round-5": lower case, digits, '-' and '.'
   std::string title;               // shown to people
   ToolKind kind = ToolKind::drill;
-  double diameter_mm = 0;          // of the cutting part, of a pin, of a screw's thread, outside of a sleeve or a cup
-  double cutting_length_mm = 0;    // from the tip along the axis; whole length of what does not cut
+  double diameter_mm = 0;          // of the cutting part, pin, screw's thread; outside of a sleeve or cup; pin holes of blocks
+  double cutting_length_mm = 0;    // from the tip along the axis, of a saw the toothed part; whole length of what does not cut
   double point_angle_rad = 0;      // drill, pin, screw: full angle of the point
   double shank_diameter_mm = 0;
-  double shank_length_mm = 0;
-  double width_mm = 0;             // blade, block, broach: across, along x
-  double thickness_mm = 0;         // blade: plate; block, broach: along y; cup: wall
+  double shank_length_mm = 0;      // saw: the plate behind the toothed part
+  double width_mm = 0;             // blade, block; broach, stem: of the upper end; along x
+  double thickness_mm = 0;         // blade's plate, block; broach, stem: of the upper end; along y. Cup: wall; outside reamer: back
   double set_mm = 0;               // saw: by how much its teeth cut wider than the plate, both sides together
   double swing_rad = 0;            // oscillating saw: full angle of the stroke
   double stroke_mm = 0;            // reciprocating saw: full way of the stroke
   double pivot_mm = 0;             // oscillating saw: from the tooth line back to the pivot
   double taper_rad = 0;            // broach, stem, contoured burr: side against the axis
-  double corner_mm = 0;            // radius of what is rounded: end of a contoured burr, bulge of a barrel, edge of a cup
+  double corner_mm = 0;            // radius of a barrel's bulge, of a canal reamer's edge; bevel of a broach or stem
   double bore_mm = 0;              // outside reamer, sleeve: inner diameter; blocks: height of a slot
   double thread_pitch_mm = 0;      // screw: advance in one turn
   double core_diameter_mm = 0;     // screw: below the thread

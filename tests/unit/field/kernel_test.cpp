@@ -170,7 +170,7 @@ std::vector<Cut> random_cuts(int count) {
   std::uniform_real_distribution<double> place(-4.0, 4.0), step(-1.0, 1.0);
   std::vector<Cut> cuts;
   for (int i = 0; i < count; ++i) {
-    const auto tools = builtin_tools();
+    const auto tools = builtin_tools().first(3);
     const Tool& tool = tools[static_cast<std::size_t>(i) % tools.size()];
     const Vec3 axis{step(random), step(random), -1.5}, tip{place(random), place(random), place(random)};
     const Vec3 turned = axis + 0.02 * Vec3{step(random), step(random), 0.0};

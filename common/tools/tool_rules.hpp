@@ -1,0 +1,43 @@
+// What the definition of each kind of tool may say: its fields, their limits, and how they must fit together. One table
+// for files, for edits and for what comes over the wire.
+#pragma once
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/tools/tool.hpp"
+
+namespace osteon {
+
+struct KindName {
+  ToolKind kind;
+  std::string_view name;
+};
+[[nodiscard]] std::span<const KindName> tool_kinds();
+
+struct FieldRule {
+  std::string_view name;             // of the member of Tool
+  double Tool::*number = nullptr;
+  int Tool::*count = nullptr;        // instead of `number`
+  double lowest = 0, highest = 0;    // both allowed
+  bool required = true;
+  bool editable = false;
+  [[nodiscard]] bool whole() const { return count != nullptr; }
+};
+// The fields of one kind, in the order in which they are written.
+[[nodiscard]] std::vector<FieldRule> field_rules(ToolKind kind);
+
+[[nodiscard]] double get_field(const Tool& tool, const FieldRule& rule);
+void set_field(Tool& tool, const FieldRule& rule, double value);
+// Sets the lengths that follow from others: a round bur's, a sphere reamer's, a trial cup's cutting length.
+void derive_fields(Tool& tool);
+
+// "from 0.5 to 20"; angles in degrees.
+[[nodiscard]] std::string limits_sentence(const FieldRule& rule);
+// What is wrong, as a sentence with the field and the remedy; nothing for a good one.
+[[nodiscard]] std::optional<std::string> value_fault(const FieldRule& rule, double value);
+[[nodiscard]] std::optional<std::string> tool_fault(const Tool& tool);
+
+}  // namespace osteon
