@@ -1,22 +1,104 @@
 // The replicated arithmetic. Everything here must give the same bytes on every compiler and processor: only + − × ÷
 // and square roots (correctly rounded by IEEE 754), comparisons, and conversions of in-range numbers to integers.
+// The loops over samples are written once (kernel_rows.inl) for registers of 4, 8 and 16 floats; the processor's widest
+// is chosen when the program runs, and each gives the same bytes.
 #include "common/field/kernel.hpp"
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cmath>
+#include <cstring>
 
 #include "common/core/check.hpp"
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#define OSTEON_WIDE_ROWS 1
+#endif
+
+#define OSTEON_INLINE static inline __attribute__((always_inline))
+#define OSTEON_INLINE_LAMBDA __attribute__((always_inline))
 
 namespace osteon {
 namespace {
 
-// std::sqrt is the one function taken from the library: IEEE 754 fixes its result.
-float root(float x) { return std::sqrt(x); }
-double root(double x) { return std::sqrt(x); }
+constexpr std::size_t kMostOutlineEdges = kMostProfileCorners + 2;
+constexpr std::size_t kMostSweptPlanes = kMostHullPlanes + (kMostHullPlanes / 2) * (kMostHullPlanes / 2);
 
-float low(float a, float b) { return b < a ? b : a; }
-float high(float a, float b) { return a < b ? b : a; }
-float clamp(float x, float lowest, float highest) { return low(high(x, lowest), highest); }
+namespace narrow {
+constexpr int kLanes = 4;
+#define OSTEON_LANES 4
+#include "common/field/kernel_rows.inl"
+#undef OSTEON_LANES
+}  // namespace narrow
+
+#ifdef OSTEON_WIDE_ROWS
+#if defined(__clang__)
+#pragma clang attribute push(__attribute__((target("avx2"))), apply_to = function)
+#else
+#pragma GCC push_options
+#pragma GCC target("avx2")
+#endif
+namespace wide {
+constexpr int kLanes = 8;
+#define OSTEON_LANES 8
+#include "common/field/kernel_rows.inl"
+#undef OSTEON_LANES
+}  // namespace wide
+#if defined(__clang__)
+#pragma clang attribute pop
+#pragma clang attribute push(__attribute__((target("avx2,avx512f"))), apply_to = function)
+#else
+#pragma GCC pop_options
+#pragma GCC push_options
+#pragma GCC target("avx2,avx512f")
+#endif
+namespace widest {
+constexpr int kLanes = 16;
+#define OSTEON_LANES 16
+#include "common/field/kernel_rows.inl"
+#undef OSTEON_LANES
+}  // namespace widest
+#if defined(__clang__)
+#pragma clang attribute pop
+#else
+#pragma GCC pop_options
+#endif
+#endif
+
+struct Rows {
+  int lanes;
+  decltype(&narrow::middles) middles;
+  decltype(&narrow::point_distance) point_distance;
+  decltype(&narrow::highest) highest;
+  decltype(&narrow::evaluate) evaluate;
+  decltype(&narrow::take_lower) take_lower;
+};
+
+#define OSTEON_ROWS(name) {name::kLanes, name::middles, name::point_distance, name::highest, name::evaluate, name::take_lower}
+constexpr Rows kNarrow = OSTEON_ROWS(narrow);
+#ifdef OSTEON_WIDE_ROWS
+constexpr Rows kWide = OSTEON_ROWS(wide);
+constexpr Rows kWidest = OSTEON_ROWS(widest);
+#endif
+
+const Rows* widest_rows([[maybe_unused]] int lanes) {
+#ifdef OSTEON_WIDE_ROWS
+  if (lanes >= 16 && __builtin_cpu_supports("avx512f")) return &kWidest;
+  if (lanes >= 8 && __builtin_cpu_supports("avx2")) return &kWide;
+#endif
+  return &kNarrow;
+}
+
+std::atomic<const Rows*>& chosen_rows() {
+  static std::atomic<const Rows*> chosen{widest_rows(16)};
+  return chosen;
+}
+
+const Rows& rows() { return *chosen_rows().load(std::memory_order_relaxed); }
+
+double root(double x) { return std::sqrt(x); }
 
 struct Rotation {
   double x, y, z, w;
@@ -28,160 +110,147 @@ Rotation normalised(double x, double y, double z, double w) {
   return {x / length, y / length, z / length, w / length};
 }
 
-// Third column of the rotation matrix: where the tool's +z points.
-void tool_axis(const Rotation& q, double axis[3]) {
-  axis[0] = 2.0 * (q.x * q.z + q.w * q.y);
-  axis[1] = 2.0 * (q.y * q.z - q.w * q.x);
-  axis[2] = 1.0 - 2.0 * (q.x * q.x + q.y * q.y);
+// Columns of the rotation matrix: where the tool's x, y and z point.
+void columns(const Rotation& q, double turn[3][3]) {
+  turn[0][0] = 1.0 - 2.0 * (q.y * q.y + q.z * q.z);
+  turn[0][1] = 2.0 * (q.x * q.y + q.w * q.z);
+  turn[0][2] = 2.0 * (q.x * q.z - q.w * q.y);
+  turn[1][0] = 2.0 * (q.x * q.y - q.w * q.z);
+  turn[1][1] = 1.0 - 2.0 * (q.x * q.x + q.z * q.z);
+  turn[1][2] = 2.0 * (q.y * q.z + q.w * q.x);
+  turn[2][0] = 2.0 * (q.x * q.z + q.w * q.y);
+  turn[2][1] = 2.0 * (q.y * q.z - q.w * q.x);
+  turn[2][2] = 1.0 - 2.0 * (q.x * q.x + q.y * q.y);
 }
 
-double length_of(const double from[3], const double to[3]) {
-  const double dx = to[0] - from[0], dy = to[1] - from[1], dz = to[2] - from[2];
-  return root(dx * dx + dy * dy + dz * dz);
+double length_of(const double v[3]) { return root(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
+double dot_of(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+double mm(std::int32_t quanta) { return quanta * kQuantum_mm; }
+
+// Farthest that any point of the body is from the tip.
+double reach_of(const CutBody& body) {
+  double farthest = 0.0;
+  if (body.kind == CutKind::turned) {
+    for (const ProfileCorner& c : body.profile) farthest = std::max(farthest, root(mm(c.r) * mm(c.r) + mm(c.z) * mm(c.z)));
+    return farthest;
+  }
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double side = std::max(std::abs(mm(body.lowest[k])), std::abs(mm(body.highest[k])));
+    farthest += side * side;
+  }
+  return root(farthest);
 }
 
-// Distance to the drill's outline at distance r from the axis and place s along it (tip at 0, body at s < 0), the
-// flutes made longer by `stretch`.
-float drill_distance(const SweptTool::Body& body, float r, float s, float stretch) {
-  const float bottom = -body.length - stretch;
-  const float cone = (r * body.tip_height + s * body.radius) / body.slant;
-  const float inside = high(high(cone, r - body.radius), bottom - s);
-
-  // Nearest point of each of the three edges: cone, side, back.
-  const float edge_r = body.radius / body.slant, edge_s = -body.tip_height / body.slant;
-  const float w = clamp(r * edge_r + s * edge_s, 0.0f, body.slant);
-  const float cone_r = r - w * edge_r, cone_s = s - w * edge_s;
-  const float side_r = r - body.radius, side_s = s - clamp(s, bottom, -body.tip_height);
-  const float back_r = r - clamp(r, 0.0f, body.radius), back_s = s - bottom;
-  const float outside = root(low(low(cone_r * cone_r + cone_s * cone_s, side_r * side_r + side_s * side_s),
-                                 back_r * back_r + back_s * back_s));
-  return inside <= 0.0f ? inside : outside;
+// An outline with an edge that faces the axis: not convex once it is turned.
+bool is_ring(const CutBody& body) {
+  for (std::size_t i = 0; i < body.profile.size(); ++i) {
+    const ProfileCorner& a = body.profile[i];
+    const ProfileCorner& b = body.profile[(i + 1) % body.profile.size()];
+    if (b.z < a.z && (a.r > 0 || b.r > 0)) return true;
+  }
+  return false;
 }
 
-float sphere_sweep_distance(const SweptTool::Body& body, const SweptTool::Sweep& sweep, float px, float py, float pz) {
-  const float mx = sweep.motion_mm[0], my = sweep.motion_mm[1], mz = sweep.motion_mm[2];
-  const float squared = mx * mx + my * my + mz * mz;
-  const float t = squared > 0.0f ? clamp((px * mx + py * my + pz * mz) / squared, 0.0f, 1.0f) : 0.0f;
-  const float qx = px - t * mx, qy = py - t * my, qz = pz - t * mz;
-  return root(qx * qx + qy * qy + qz * qz) - body.radius;
+void add_edge(std::vector<OutlineEdge>& edges, double r0, double s0, double r1, double s1) {
+  const double dr = r1 - r0, ds = s1 - s0, length = root(dr * dr + ds * ds);
+  if (!(length > 0.0) || (r0 == 0.0 && r1 == 0.0)) return;  // what lies on the axis bounds nothing
+  edges.push_back({static_cast<float>(r0), static_cast<float>(s0), static_cast<float>(dr / length), static_cast<float>(ds / length),
+                   static_cast<float>(length)});
 }
 
-// The point split into its parts along and across the drill's axis. Across is kept as a vector: the difference of two
-// large squares would lose the millimetres near the axis.
-struct AxialPoint {
-  float s, x, y, z;
+// The outline when the body moves along its axis from `down` ≤ 0 to `up` ≥ 0: edges that face forwards move up, those
+// that face backwards move down, and what is between them grows.
+void add_outline(std::vector<OutlineEdge>& edges, const std::vector<ProfileCorner>& profile, double down, double up) {
+  std::array<std::array<double, 2>, 2 * kMostProfileCorners> corners;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < profile.size(); ++i) {
+    const ProfileCorner& a = profile[i];
+    const ProfileCorner& b = profile[(i + 1) % profile.size()];
+    if (a.r == b.r) continue;
+    const double shift = b.r < a.r ? up : down;
+    corners[count++] = {mm(a.r), mm(a.z) + shift};
+    corners[count++] = {mm(b.r), mm(b.z) + shift};
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto& a = corners[i];
+    const auto& b = corners[(i + 1) % count];
+    add_edge(edges, a[0], a[1], b[0], b[1]);
+  }
+}
+
+// Leaves (in units of leaves) that a sweep with its band may touch.
+struct LeafRange {
+  std::int32_t lowest[3], highest[3];
+  [[nodiscard]] bool has(const std::int32_t at[3]) const {
+    for (int k = 0; k < 3; ++k)
+      if (at[k] < lowest[k] || at[k] > highest[k]) return false;
+    return true;
+  }
 };
 
-AxialPoint axial(const SweptTool::Sweep& sweep, float px, float py, float pz) {
-  const float* a = sweep.axis;
-  const float s = px * a[0] + py * a[1] + pz * a[2];
-  return {s, px - s * a[0], py - s * a[1], pz - s * a[2]};
-}
-
-// A motion along the axis stretches the drill: exact, one evaluation.
-float axial_sweep_distance(const SweptTool::Body& body, const SweptTool::Sweep& sweep, float px, float py, float pz) {
-  const AxialPoint p = axial(sweep, px, py, pz);
-  const float forward = high(sweep.along_mm, 0.0f);
-  const float stretch = sweep.along_mm < 0.0f ? -sweep.along_mm : sweep.along_mm;
-  return drill_distance(body, root(p.x * p.x + p.y * p.y + p.z * p.z), p.s - forward, stretch);
-}
-
-// Distance to a convex body is convex along a line, so golden-section search finds the nearest pose. The number of
-// steps is fixed by the cut, and leaves an error below half a quantum because distances change at most as fast as the
-// pose moves.
-float oblique_sweep_distance(const SweptTool::Body& body, const SweptTool::Sweep& sweep, float px, float py, float pz) {
-  const AxialPoint p = axial(sweep, px, py, pz);
-  const AxialPoint m = axial(sweep, sweep.motion_mm[0], sweep.motion_mm[1], sweep.motion_mm[2]);
-  const auto at = [&](float t) {
-    const float x = p.x - t * m.x, y = p.y - t * m.y, z = p.z - t * m.z;
-    return drill_distance(body, root(x * x + y * y + z * z), p.s - t * m.s, 0.0f);
-  };
-  constexpr float kGolden = 0.61803399f;
-  float left = 0.0f, right = 1.0f;
-  float a = right - kGolden * (right - left), b = left + kGolden * (right - left);
-  float fa = at(a), fb = at(b);
-  float best = low(low(at(0.0f), at(1.0f)), low(fa, fb));
-  for (int i = 0; i < sweep.search_steps; ++i) {
-    if (fa < fb) {
-      right = b;
-      b = a;
-      fb = fa;
-      a = right - kGolden * (right - left);
-      fa = at(a);
-      best = low(best, fa);
-    } else {
-      left = a;
-      a = b;
-      fa = fb;
-      b = left + kGolden * (right - left);
-      fb = at(b);
-      best = low(best, fb);
-    }
+LeafRange range_of(const ToolSweep& sweep, double pitch) {
+  const double leaf_mm = kLeafSize * pitch, band = static_cast<double>(band_mm(pitch));
+  LeafRange range;
+  for (int k = 0; k < 3; ++k) {
+    range.lowest[k] = static_cast<std::int32_t>(std::floor((sweep.min_mm[k] - band) / leaf_mm));
+    range.highest[k] = static_cast<std::int32_t>(std::floor((sweep.max_mm[k] + band) / leaf_mm));
   }
-  return best;
+  return range;
 }
 
-float sweep_distance(const SweptTool::Body& body, const SweptTool::Sweep& sweep, float px, float py, float pz) {
-  if (body.kind == CutKind::ball) return sphere_sweep_distance(body, sweep, px, py, pz);
-  if (sweep.search_steps == 0) return axial_sweep_distance(body, sweep, px, py, pz);
-  return oblique_sweep_distance(body, sweep, px, py, pz);
-}
+// The sweep at a leaf, by the distance of its middle.
+struct Candidate {
+  std::uint32_t sweep;
+  float middle_mm;
+};
 
-// Rounds to the nearest quantum, halves away from zero; + 0.0f turns −0 into 0.
-float to_quantum(float mm) {
-  const float scaled = mm * 1024.0f;
-  const auto steps = static_cast<std::int32_t>(scaled < 0.0f ? scaled - 0.5f : scaled + 0.5f);
-  return static_cast<float>(steps) * (1.0f / 1024.0f) + 0.0f;
-}
-
-float centre_distance(const SweptTool::Body& body, const SweptTool::Sweep& sweep, Coord origin, double pitch) {
-  constexpr double kMiddle = 0.5 * (kLeafSize - 1);
-  return sweep_distance(body, sweep, static_cast<float>((origin.x + kMiddle) * pitch - sweep.start_mm[0]),
-                        static_cast<float>((origin.y + kMiddle) * pitch - sweep.start_mm[1]),
-                        static_cast<float>((origin.z + kMiddle) * pitch - sweep.start_mm[2]));
-}
-
-// A leaf whose centre is farther away than this has every sample beyond the band: half its diagonal, the band, and
-// room for the rounding of single-precision distances.
-float leaf_reach(double pitch) {
-  return band_mm(pitch) + static_cast<float>(0.8660254037844387 * kLeafSize * pitch + 0.001);
-}
-
-template <class Distance>
-int cut_samples(const SweptTool::Sweep& sweep, Coord origin, double pitch, float band,
-                std::span<float, kLeafVoxels> values, Distance distance) {
-  float pz[kLeafSize];
-  for (int z = 0; z < kLeafSize; ++z) pz[z] = static_cast<float>((origin.z + z) * pitch - sweep.start_mm[2]);
-  int modified = 0;
-  float* value = values.data();
-  for (int x = 0; x < kLeafSize; ++x) {
-    const float px = static_cast<float>((origin.x + x) * pitch - sweep.start_mm[0]);
-    for (int y = 0; y < kLeafSize; ++y, value += kLeafSize) {
-      const float py = static_cast<float>((origin.y + y) * pitch - sweep.start_mm[1]);
-      float cut[kLeafSize];
-      for (int z = 0; z < kLeafSize; ++z) cut[z] = to_quantum(clamp(distance(px, py, pz[z]), -band, band));
-      for (int z = 0; z < kLeafSize; ++z) {
-        modified += cut[z] < value[z] ? 1 : 0;
-        value[z] = low(value[z], cut[z]);
-      }
-    }
+// Distances change at most as fast as the place, so the distance at a leaf's middle bounds those of its samples: a sweep
+// farther than the band changes none, and one that is everywhere farther than another adds nothing to it.
+void plan_leaf(CutPlan& plan, Coord origin, std::span<const Candidate> candidates, float radius, float band) {
+  float farthest = band;
+  for (const Candidate& c : candidates) farthest = std::min(farthest, c.middle_mm + radius);
+  const auto first = static_cast<std::uint32_t>(plan.near.size());
+  if (farthest <= -band) {
+    plan.leaves.push_back({origin, first, 0, true});
+    return;
   }
-  return modified;
+  for (const Candidate& c : candidates)
+    if (c.middle_mm - radius < farthest) plan.near.push_back({c.sweep, c.middle_mm - radius});
+  const auto count = static_cast<std::uint32_t>(plan.near.size()) - first;
+  if (count > 0) plan.leaves.push_back({origin, first, count, false});
 }
 
 }  // namespace
 
+int limit_kernel_lanes(int lanes) {
+  chosen_rows() = widest_rows(lanes);
+  return rows().lanes;
+}
+
 SweptTool::SweptTool(const Cut& cut, const CutBody& body, double pitch_mm)
-    : body_{body.kind, 0.0f, 0.0f, static_cast<float>(-body.lowest[2]) / 1024.0f, 0.0f},
-      level_pitch_mm_(osteon::level_pitch_mm(pitch_mm, cut.level)) {
+    : level_pitch_mm_(osteon::level_pitch_mm(pitch_mm, cut.level)), sampled_(body.sampled) {
   OSTEON_CHECK(!cut.path.empty() && cut.level >= 0 && cut.level < kLevels && body.cuts());
-  if (body.kind == CutKind::ball) {
-    body_.radius = body_.tip_height = static_cast<float>(body.radius) / 1024.0f;
-  } else {
-    body_.radius = static_cast<float>(body.profile[3].r) / 1024.0f;
-    body_.tip_height = static_cast<float>(-body.profile[3].z) / 1024.0f;
+  OSTEON_CHECK(body.profile.size() <= kMostProfileCorners && body.planes.size() <= kMostHullPlanes);
+  const double quarter = 0.25 * level_pitch_mm_;
+  const double reach = reach_of(body);
+  // The middle of a leaf is half of seven pitches from its outermost samples.
+  double slack = 0.001;
+  if (body.kind == CutKind::turned) slack += 0.06 * level_pitch_mm_;
+  if (body.kind == CutKind::sampled) {
+    OSTEON_CHECK(sampled_ != nullptr && sampled_->box.dims().x > 1 && sampled_->box.dims().y > 1 && sampled_->box.dims().z > 1);
+    // Between samples the distance is off by less than a cell's diagonal.
+    slack += 1.75 * mm(sampled_->pitch);
+    const Coord last = sampled_->box.dims() - Coord{1, 1, 1};
+    std::int32_t least = INT16_MAX;
+    std::size_t i = 0;
+    for (std::int32_t x = 0; x <= last.x; ++x)
+      for (std::int32_t y = 0; y <= last.y; ++y)
+        for (std::int32_t z = 0; z <= last.z; ++z, ++i)
+          if (x == 0 || y == 0 || z == 0 || x == last.x || y == last.y || z == last.z)
+            least = std::min<std::int32_t>(least, sampled_->values[i]);
+    sampled_outside_ = static_cast<float>(mm(least));
   }
-  body_.slant = root(body_.radius * body_.radius + body_.tip_height * body_.tip_height);
+  leaf_radius_mm_ = static_cast<float>(0.8660254037844387 * (kLeafSize - 1) * level_pitch_mm_ + slack);
 
   const auto position = [&](std::size_t i, double out[3]) {
     for (int k = 0; k < 3; ++k) out[k] = cut.path[i].position[static_cast<std::size_t>(k)] * kQuantum_mm;
@@ -193,138 +262,366 @@ SweptTool::SweptTool(const Cut& cut, const CutBody& body, double pitch_mm)
   const std::size_t segments = std::max<std::size_t>(1, cut.path.size() - 1);
   for (std::size_t i = 0; i < segments; ++i) {
     const std::size_t next = std::min(i + 1, cut.path.size() - 1);
-    double from[3], to[3];
+    double from[3], to[3], way[3];
     position(i, from);
     position(next, to);
+    for (int k = 0; k < 3; ++k) way[k] = to[k] - from[k];
     const Rotation a = rotation(i);
     Rotation b = rotation(next);
     if (a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w < 0.0) b = {-b.x, -b.y, -b.z, -b.w};
-    // A turn is cut at sub-poses between which no point of the cutting part moves by more than a quarter pitch:
-    // half the angle is the chord between the quaternions, to second order.
     const double dx = b.x - a.x, dy = b.y - a.y, dz = b.z - a.z, dw = b.w - a.w;
-    const double turn_mm = 2.0 * root(dx * dx + dy * dy + dz * dz + dw * dw) *
-                           (static_cast<double>(body_.length) + static_cast<double>(body_.radius));
-    const int parts = 1 + static_cast<int>(turn_mm / (0.25 * level_pitch_mm_));
+    const auto turn_at = [&](double t, double turn[3][3]) {
+      columns(normalised(a.x + t * dx, a.y + t * dy, a.z + t * dz, a.w + t * dw), turn);
+    };
+    double first_turn[3][3], last_turn[3][3], tilt[3];
+    turn_at(0.0, first_turn);
+    turn_at(1.0, last_turn);
+    for (int k = 0; k < 3; ++k) tilt[k] = last_turn[2][k] - first_turn[2][k];
+
+    // A turn is cut at sub-poses between which no point of the cutting part moves by more than a quarter pitch. Half the
+    // angle is the chord between the quaternions, to second order; a turned body's spin moves none of its points. A
+    // ball's centre runs on an arc, replaced by chords that leave it by less than a 32nd of a pitch.
+    int parts = 1;
+    if (body.kind == CutKind::ball) {
+      parts += static_cast<int>(length_of(tilt) * root(4.0 * mm(body.radius) / level_pitch_mm_));
+    } else if (body.kind == CutKind::turned) {
+      parts += static_cast<int>(length_of(tilt) * reach / quarter);
+    } else {
+      parts += static_cast<int>(2.0 * root(dx * dx + dy * dy + dz * dz + dw * dw) * reach / quarter);
+    }
+    if (body.kind == CutKind::sampled) {
+      // Translations by sub-poses too, both ends among them.
+      parts += static_cast<int>(length_of(way) / quarter);
+      const bool still = from[0] == to[0] && from[1] == to[1] && from[2] == to[2] && parts == 1;
+      for (int part = i > 0 ? 1 : 0; part <= (still ? 0 : parts); ++part) {
+        const double t = static_cast<double>(part) / parts;
+        double turn[3][3], at[3];
+        turn_at(t, turn);
+        for (int k = 0; k < 3; ++k) at[k] = from[k] + t * way[k];
+        add_sampled(body, at, turn);
+      }
+      continue;
+    }
     for (int part = 0; part < parts; ++part) {
       const double t0 = static_cast<double>(part) / parts, t1 = static_cast<double>(part + 1) / parts;
-      const double middle = 0.5 * (t0 + t1);
-      const Rotation q = normalised(a.x + middle * dx, a.y + middle * dy, a.z + middle * dz, a.w + middle * dw);
-      double axis[3], start[3], end[3];
-      tool_axis(q, axis);
+      double turn[3][3], start[3], end[3];
       for (int k = 0; k < 3; ++k) {
-        start[k] = from[k] + t0 * (to[k] - from[k]);
-        end[k] = from[k] + t1 * (to[k] - from[k]);
+        start[k] = from[k] + t0 * way[k];
+        end[k] = from[k] + t1 * way[k];
       }
-      if (body_.kind == CutKind::turned) {
-        add_drill_sweep(start, end, axis);
-      } else {
-        const double radius = static_cast<double>(body_.radius);
+      if (body.kind == CutKind::ball) {
+        const double radius = mm(body.radius);
+        double start_turn[3][3], end_turn[3][3];
+        turn_at(t0, start_turn);
+        turn_at(t1, end_turn);
         for (int k = 0; k < 3; ++k) {
-          start[k] -= radius * axis[k];
-          end[k] -= radius * axis[k];
+          start[k] -= radius * start_turn[2][k];
+          end[k] -= radius * end_turn[2][k];
         }
-        add_sphere_sweep(start, end);
+        sweeps_.push_back({});
+        sweeps_.back().radius = static_cast<float>(radius);
+        add_ball(start, end);
+        continue;
       }
+      turn_at(0.5 * (t0 + t1), turn);
+      if (body.kind == CutKind::turned) add_turned(body, start, end, turn[2]);
+      else add_hull(body, start, end, turn);
     }
   }
 }
 
-void SweptTool::add_sphere_sweep(const double from[3], const double to[3]) {
-  Sweep sweep{};
-  for (int k = 0; k < 3; ++k) {
-    sweep.start_mm[k] = from[k];
-    sweep.motion_mm[k] = static_cast<float>(to[k] - from[k]);
-    sweep.min_mm[k] = std::min(from[k], to[k]) - static_cast<double>(body_.radius);
-    sweep.max_mm[k] = std::max(from[k], to[k]) + static_cast<double>(body_.radius);
-  }
-  sweeps_.push_back(sweep);
-}
-
-void SweptTool::add_drill_sweep(const double from[3], const double to[3], const double axis[3]) {
-  Sweep sweep{};
-  double along = 0.0, motion[3], across[3];
+void SweptTool::add_ball(const double from[3], const double to[3]) {
+  ToolSweep& sweep = sweeps_.back();
+  sweep.kind = SweepKind::ball;
+  double motion[3];
   for (int k = 0; k < 3; ++k) {
     motion[k] = to[k] - from[k];
-    along += motion[k] * axis[k];
-  }
-  for (int k = 0; k < 3; ++k) across[k] = motion[k] - along * axis[k];
-  const double sideways = root(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]);
-  // A hand that drills straight moves sideways only by the rounding of its poses. Then half of that rounding is put
-  // on the start, and the rest of the motion is along the axis.
-  const bool straight = sideways <= 2.0 * kQuantum_mm;
-  for (int k = 0; k < 3; ++k) {
-    sweep.start_mm[k] = straight ? from[k] + 0.5 * across[k] : from[k];
+    sweep.start_mm[k] = from[k];
     sweep.motion_mm[k] = static_cast<float>(motion[k]);
-    sweep.axis[k] = static_cast<float>(axis[k]);
-    const double back = static_cast<double>(body_.length) * axis[k], radius = static_cast<double>(body_.radius);
-    sweep.min_mm[k] = std::min({from[k], to[k], from[k] - back, to[k] - back}) - radius;
-    sweep.max_mm[k] = std::max({from[k], to[k], from[k] - back, to[k] - back}) + radius;
+    sweep.min_mm[k] = std::min(from[k], to[k]) - static_cast<double>(sweep.radius);
+    sweep.max_mm[k] = std::max(from[k], to[k]) + static_cast<double>(sweep.radius);
   }
-  sweep.along_mm = static_cast<float>(along);
-  if (!straight) {
-    double interval = length_of(from, to);
-    while (interval > 0.5 * kQuantum_mm) {
+  // Below half a quantum there is no motion, and a division would lose its digits.
+  const double square = dot_of(motion, motion);
+  sweep.inverse_square = square > 0.25 * kQuantum_mm * kQuantum_mm ? static_cast<float>(1.0 / square) : 0.0f;
+}
+
+void SweptTool::add_turned(const CutBody& body, const double from[3], const double to[3], const double axis[3]) {
+  double motion[3], across[3];
+  for (int k = 0; k < 3; ++k) motion[k] = to[k] - from[k];
+  const double along = dot_of(motion, axis);
+  for (int k = 0; k < 3; ++k) across[k] = motion[k] - along * axis[k];
+  const double sideways = length_of(across);
+  // A hand that moves straight, along or across, leaves that line only by the rounding of its poses. Then half of that
+  // rounding is put on the start.
+  const bool is_axial = sideways <= 2.0 * kQuantum_mm;
+  const bool is_across = !is_axial && std::abs(along) <= 2.0 * kQuantum_mm;
+  if (!is_axial && is_ring(body)) {
+    const int steps = 1 + static_cast<int>(sideways / (0.25 * level_pitch_mm_));
+    for (int step = 0; step < steps; ++step) {
+      // Each step moves along the axis, at the middle of its part of the way across.
+      const double t0 = static_cast<double>(step) / steps, t1 = static_cast<double>(step + 1) / steps, middle = 0.5 * (t0 + t1);
+      double start[3], end[3];
+      for (int k = 0; k < 3; ++k) {
+        start[k] = from[k] + middle * across[k] + t0 * along * axis[k];
+        end[k] = from[k] + middle * across[k] + t1 * along * axis[k];
+      }
+      add_turned(body, start, end, axis);
+    }
+    return;
+  }
+
+  ToolSweep sweep{};
+  sweep.kind = is_axial ? SweepKind::axial : is_across ? SweepKind::across : SweepKind::oblique;
+  double u[3], v[3];
+  if (is_axial) {
+    // Any direction across: from the coordinate axis that is most across.
+    const double x = std::abs(axis[0]), y = std::abs(axis[1]), z = std::abs(axis[2]);
+    const int most = x <= y && x <= z ? 0 : y <= z ? 1 : 2;
+    for (int k = 0; k < 3; ++k) u[k] = (k == most ? 1.0 : 0.0) - axis[most] * axis[k];
+  } else {
+    for (int k = 0; k < 3; ++k) u[k] = across[k];
+  }
+  const double size = length_of(u);
+  for (int k = 0; k < 3; ++k) u[k] = u[k] / size;
+  for (int k = 0; k < 3; ++k) v[k] = axis[(k + 1) % 3] * u[(k + 2) % 3] - axis[(k + 2) % 3] * u[(k + 1) % 3];
+
+  sweep.radius = static_cast<float>(mm(body.highest[0]));
+  for (int k = 0; k < 3; ++k) {
+    sweep.start_mm[k] = from[k] + (is_axial ? 0.5 * across[k] : is_across ? 0.5 * along * axis[k] : 0.0);
+    sweep.axis[k] = static_cast<float>(axis[k]);
+    sweep.u[k] = static_cast<float>(u[k]);
+    sweep.v[k] = static_cast<float>(v[k]);
+    const double top = mm(body.highest[2]) * axis[k], bottom = mm(body.lowest[2]) * axis[k];
+    // A disc across the axis reaches this far in each direction.
+    const double disc = mm(body.highest[0]) * root(std::max(0.0, 1.0 - axis[k] * axis[k])) + 2.0 * kQuantum_mm;
+    sweep.min_mm[k] = std::min(from[k], to[k]) + std::min(top, bottom) - disc;
+    sweep.max_mm[k] = std::max(from[k], to[k]) + std::max(top, bottom) + disc;
+  }
+  sweep.across_mm = is_axial ? 0.0f : static_cast<float>(sideways);
+  sweep.along_mm = is_across ? 0.0f : static_cast<float>(along);
+  sweep.length_mm = static_cast<float>(length_of(motion));
+  sweep.dome = static_cast<float>(mm(body.dome));
+  const double up = is_axial ? std::max(0.0, along) : 0.0, down = is_axial ? std::min(0.0, along) : 0.0;
+  sweep.up_mm = static_cast<float>(up);
+  sweep.down_mm = static_cast<float>(down);
+  if (sweep.kind == SweepKind::oblique) {
+    double interval = length_of(motion);
+    while (interval > 0.05 * level_pitch_mm_) {
       interval *= 0.61803399;
       ++sweep.search_steps;
     }
-    sweep.search_steps = std::max(1, sweep.search_steps);
+  }
+  // All that do not stretch share one outline.
+  if (!is_axial && !sweeps_.empty() && sweeps_.back().kind != SweepKind::axial) {
+    sweep.first = sweeps_.back().first;
+    sweep.count = sweeps_.back().count;
+  } else {
+    sweep.first = static_cast<std::uint32_t>(edges_.size());
+    add_outline(edges_, body.profile, down, up);
+    sweep.count = static_cast<std::uint32_t>(edges_.size()) - sweep.first;
+    OSTEON_CHECK(sweep.count > 0 && sweep.count <= kMostOutlineEdges);
   }
   sweeps_.push_back(sweep);
 }
 
-std::vector<Coord> SweptTool::leaves() const {
-  std::vector<Coord> found;
-  const double leaf_mm = kLeafSize * level_pitch_mm_, band = static_cast<double>(band_mm(level_pitch_mm_));
-  const float reach = leaf_reach(level_pitch_mm_);
-  for (const Sweep& sweep : sweeps_) {
-    std::int32_t lowest[3], highest[3];
-    for (int k = 0; k < 3; ++k) {
-      lowest[k] = static_cast<std::int32_t>(std::floor((sweep.min_mm[k] - band) / leaf_mm));
-      highest[k] = static_cast<std::int32_t>(std::floor((sweep.max_mm[k] + band) / leaf_mm));
-    }
-    for (std::int32_t x = lowest[0]; x <= highest[0]; ++x)
-      for (std::int32_t y = lowest[1]; y <= highest[1]; ++y)
-        for (std::int32_t z = lowest[2]; z <= highest[2]; ++z) {
-          const Coord origin{x * kLeafSize, y * kLeafSize, z * kLeafSize};
-          if (centre_distance(body_, sweep, origin, level_pitch_mm_) < reach) found.push_back(origin);
-        }
+// p is in the swept hull when some t in [0, 1] has n_i · (p − t m) ≤ d_i for all i. Eliminating t (Fourier and Motzkin)
+// leaves: planes that face against the motion as they are, planes that face along it moved with it, and for each pair
+// of the two kinds the plane through their common direction along m.
+void SweptTool::add_hull(const CutBody& body, const double from[3], const double to[3], const double turn[3][3]) {
+  ToolSweep sweep{};
+  sweep.kind = SweepKind::hull;
+  sweep.first = static_cast<std::uint32_t>(planes_.size());
+  double motion[3];
+  for (int k = 0; k < 3; ++k) motion[k] = to[k] - from[k];
+
+  struct Plane {
+    double normal[3], offset, advance;  // how far the motion goes along the normal
+  };
+  std::array<Plane, kMostHullPlanes> planes;
+  const std::size_t count = body.planes.size();
+  const auto add = [&](const double normal[3], double offset) {
+    planes_.push_back({static_cast<float>(normal[0]), static_cast<float>(normal[1]), static_cast<float>(normal[2]), static_cast<float>(offset)});
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    const HullPlane& plane = body.planes[i];
+    const double n[3] = {plane.normal[0] * kDirectionStep, plane.normal[1] * kDirectionStep, plane.normal[2] * kDirectionStep};
+    const double length = length_of(n);
+    OSTEON_CHECK(length > 0.0);
+    Plane& p = planes[i];
+    for (int k = 0; k < 3; ++k) p.normal[k] = (turn[0][k] * n[0] + turn[1][k] * n[1] + turn[2][k] * n[2]) / length;
+    p.offset = mm(plane.offset);
+    p.advance = dot_of(p.normal, motion);
+    add(p.normal, p.offset + std::max(0.0, p.advance));
   }
-  std::ranges::sort(found);
-  found.erase(std::unique(found.begin(), found.end()), found.end());
-  return found;
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t j = 0; j < count; ++j) {
+      const Plane& ahead = planes[i];
+      const Plane& behind = planes[j];
+      if (!(ahead.advance > 0.0) || !(behind.advance < 0.0)) continue;
+      double normal[3];
+      for (int k = 0; k < 3; ++k) normal[k] = ahead.advance * behind.normal[k] - behind.advance * ahead.normal[k];
+      const double length = length_of(normal);
+      // Opposite planes, as the two faces of a blade, say nothing together.
+      if (length <= 0.001 * (ahead.advance - behind.advance)) continue;
+      const double offset = (ahead.advance * behind.offset - behind.advance * ahead.offset) / length;
+      for (int k = 0; k < 3; ++k) normal[k] = normal[k] / length;
+      add(normal, offset);
+    }
+  }
+  sweep.count = static_cast<std::uint32_t>(planes_.size()) - sweep.first;
+  OSTEON_CHECK(sweep.count > 0 && sweep.count <= kMostSweptPlanes);
+  for (int k = 0; k < 3; ++k) {
+    sweep.start_mm[k] = from[k];
+    double centre = 0.0, half = 0.0;
+    for (std::size_t j = 0; j < 3; ++j) {
+      centre += 0.5 * (mm(body.lowest[j]) + mm(body.highest[j])) * turn[j][k];
+      half += 0.5 * (mm(body.highest[j]) - mm(body.lowest[j])) * std::abs(turn[j][k]);
+    }
+    sweep.min_mm[k] = std::min(from[k], to[k]) + centre - half;
+    sweep.max_mm[k] = std::max(from[k], to[k]) + centre + half;
+  }
+  sweeps_.push_back(sweep);
+}
+
+void SweptTool::add_sampled(const CutBody& body, const double at[3], const double turn[3][3]) {
+  ToolSweep sweep{};
+  sweep.kind = SweepKind::sampled;
+  for (int k = 0; k < 3; ++k) {
+    sweep.start_mm[k] = at[k];
+    sweep.u[k] = static_cast<float>(turn[0][k]);
+    sweep.v[k] = static_cast<float>(turn[1][k]);
+    sweep.axis[k] = static_cast<float>(turn[2][k]);
+    double centre = 0.0, half = 0.0;
+    for (std::size_t j = 0; j < 3; ++j) {
+      centre += 0.5 * (mm(body.lowest[j]) + mm(body.highest[j])) * turn[j][k];
+      half += 0.5 * (mm(body.highest[j]) - mm(body.lowest[j])) * std::abs(turn[j][k]);
+    }
+    sweep.min_mm[k] = at[k] + centre - half;
+    sweep.max_mm[k] = at[k] + centre + half;
+  }
+  sweeps_.push_back(sweep);
+}
+
+SweptTool::Body SweptTool::shape() const { return {edges_, planes_, sampled_.get(), sampled_outside_}; }
+
+CutPlan SweptTool::plan() const {
+  CutPlan plan;
+  const float band = band_mm(level_pitch_mm_);
+  const Body body = shape();
+  std::vector<LeafRange> ranges;
+  ranges.reserve(sweeps_.size());
+  for (const ToolSweep& sweep : sweeps_) ranges.push_back(range_of(sweep, level_pitch_mm_));
+  LeafRange all = ranges.front();
+  for (const LeafRange& range : ranges)
+    for (int k = 0; k < 3; ++k) {
+      all.lowest[k] = std::min(all.lowest[k], range.lowest[k]);
+      all.highest[k] = std::max(all.highest[k], range.highest[k]);
+    }
+  const auto in_line = static_cast<std::size_t>(all.highest[2] - all.lowest[2] + 1);
+  plan.visited = static_cast<std::int64_t>(all.highest[0] - all.lowest[0] + 1) * (all.highest[1] - all.lowest[1] + 1) *
+                 static_cast<std::int64_t>(in_line);
+
+  // Leaves line by line along z, so that a line's middles are evaluated together.
+  std::vector<std::uint32_t> crossing;
+  std::vector<float> middles;
+  std::vector<Candidate> candidates;
+  for (std::int32_t x = all.lowest[0]; x <= all.highest[0]; ++x)
+    for (std::int32_t y = all.lowest[1]; y <= all.highest[1]; ++y) {
+      crossing.clear();
+      middles.clear();
+      for (std::uint32_t i = 0; i < sweeps_.size(); ++i) {
+        const LeafRange& range = ranges[i];
+        if (x < range.lowest[0] || x > range.highest[0] || y < range.lowest[1] || y > range.highest[1]) continue;
+        const int count = range.highest[2] - range.lowest[2] + 1;
+        middles.resize(middles.size() + static_cast<std::size_t>(count));
+        rows().middles(sweeps_[i], body, kLeafSize * Coord{x, y, range.lowest[2]}, count, level_pitch_mm_,
+                       middles.data() + (middles.size() - static_cast<std::size_t>(count)));
+        crossing.push_back(i);
+      }
+      if (crossing.empty()) continue;
+      for (std::int32_t z = all.lowest[2]; z <= all.highest[2]; ++z) {
+        candidates.clear();
+        std::size_t at = 0;
+        for (const std::uint32_t i : crossing) {
+          const LeafRange& range = ranges[i];
+          if (z >= range.lowest[2] && z <= range.highest[2])
+            candidates.push_back({i, middles[at + static_cast<std::size_t>(z - range.lowest[2])]});
+          at += static_cast<std::size_t>(range.highest[2] - range.lowest[2] + 1);
+        }
+        if (!candidates.empty()) plan_leaf(plan, kLeafSize * Coord{x, y, z}, candidates, leaf_radius_mm_, band);
+      }
+    }
+  return plan;
+}
+
+CutPlan SweptTool::plan(std::span<const Coord> leaves) const {
+  CutPlan plan;
+  const float band = band_mm(level_pitch_mm_);
+  const Body body = shape();
+  plan.visited = static_cast<std::int64_t>(leaves.size());
+  std::vector<LeafRange> ranges;
+  ranges.reserve(sweeps_.size());
+  for (const ToolSweep& sweep : sweeps_) ranges.push_back(range_of(sweep, level_pitch_mm_));
+  std::vector<Candidate> candidates;
+  for (const Coord origin : leaves) {
+    candidates.clear();
+    const std::int32_t at[3] = {origin.x >> 3, origin.y >> 3, origin.z >> 3};
+    for (std::uint32_t i = 0; i < sweeps_.size(); ++i) {
+      if (!ranges[i].has(at)) continue;
+      float middle = 0.0f;
+      rows().middles(sweeps_[i], body, origin, 1, level_pitch_mm_, &middle);
+      candidates.push_back({i, middle});
+    }
+    if (!candidates.empty()) plan_leaf(plan, origin, candidates, leaf_radius_mm_, band);
+  }
+  return plan;
+}
+
+std::vector<Coord> SweptTool::leaves() const {
+  const CutPlan all = plan();
+  std::vector<Coord> origins;
+  origins.reserve(all.leaves.size());
+  for (const CutPlan::Leaf& leaf : all.leaves) origins.push_back(leaf.origin);
+  return origins;
+}
+
+LeafChange SweptTool::cut_leaf(const CutPlan& plan, const CutPlan::Leaf& leaf, std::span<float, kLeafVoxels> values) const {
+  const float band = band_mm(level_pitch_mm_);
+  if (leaf.removed) {
+    LeafChange change{0, false, true};
+    for (float& value : values) {
+      if (value == -band) continue;
+      value = -band;
+      ++change.modified;
+    }
+    return change;
+  }
+  // What is nowhere below the leaf's highest value cannot change it.
+  const float enough = rows().highest(values.data());
+  alignas(64) float distances[kLeafVoxels];
+  const Body body = shape();
+  bool first = true;
+  for (std::uint32_t i = 0; i < leaf.count; ++i) {
+    const CutPlan::Near& near = plan.near[leaf.first + i];
+    if (near.nearest_mm >= enough) continue;
+    rows().evaluate(sweeps_[near.sweep], body, leaf.origin, level_pitch_mm_, leaf_radius_mm_, first, enough, band, distances);
+    first = false;
+  }
+  if (first) return {};
+  return rows().take_lower(distances, band, values.data());
 }
 
 int SweptTool::cut_leaf(Coord origin, std::span<float, kLeafVoxels> values) const {
-  const float band = band_mm(level_pitch_mm_);
-  const double pitch = level_pitch_mm_;
-  const float reach = leaf_reach(pitch);
-  int modified = 0;
-  for (const Sweep& sweep : sweeps_) {
-    if (centre_distance(body_, sweep, origin, pitch) >= reach) continue;  // every sample would be at the band
-    // Copies: a compiler that knows that no value written can be one of them keeps them in registers.
-    if (body_.kind == CutKind::ball) {
-      modified += cut_samples(sweep, origin, pitch, band, values, [body = body_, sweep](float x, float y, float z) {
-        return sphere_sweep_distance(body, sweep, x, y, z);
-      });
-    } else if (sweep.search_steps == 0) {
-      modified += cut_samples(sweep, origin, pitch, band, values, [body = body_, sweep](float x, float y, float z) {
-        return axial_sweep_distance(body, sweep, x, y, z);
-      });
-    } else {
-      modified += cut_samples(sweep, origin, pitch, band, values, [body = body_, sweep](float x, float y, float z) {
-        return oblique_sweep_distance(body, sweep, x, y, z);
-      });
-    }
-  }
-  return modified;
+  const CutPlan only = plan(std::span(&origin, 1));
+  return only.leaves.empty() ? 0 : cut_leaf(only, only.leaves.front(), values).modified;
 }
 
 float SweptTool::distance_mm(const Vec3& point) const {
+  const double at[3] = {point.x(), point.y(), point.z()};
+  const Body body = shape();
   float nearest = 1e9f;
-  for (const Sweep& sweep : sweeps_)
-    nearest = low(nearest, sweep_distance(body_, sweep, static_cast<float>(point.x() - sweep.start_mm[0]),
-                                          static_cast<float>(point.y() - sweep.start_mm[1]),
-                                          static_cast<float>(point.z() - sweep.start_mm[2])));
+  for (const ToolSweep& sweep : sweeps_) nearest = std::min(nearest, rows().point_distance(sweep, body, at));
   return nearest;
 }
 
