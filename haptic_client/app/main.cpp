@@ -42,13 +42,16 @@ json means(const LayerMeans& m) {
 
 json step_summary(const ReadyStep& step, const StepResult& result, double removed_mm3) {
   json out{{"completed", result.completed}, {"duration_s", result.duration_s}};
-  if (step.plan.action == Action::wait) {
-    out["action"] = "wait";
+  out["action"] = name(step.plan.action);
+  if (step.plan.action == Action::wait) return out;
+  if (step.plan.action == Action::place) {
+    out["tool"] = step.plan.tool;
+    out["entry_mm"] = vector(step.site.entry_mm);
+    out["axis"] = vector(step.site.axis);
     return out;
   }
   const bool drill = step.plan.action == Action::drill;
   constexpr const char* kHands[] = {"expert", "novice", "rig"};
-  out["action"] = drill ? "drill" : "burr";
   out["tool"] = step.plan.tool;
   out["hand"] = kHands[static_cast<int>(step.plan.hand)];
   out["spindle_rpm"] = step.spindle_rpm;

@@ -82,11 +82,20 @@ PlanStep read_step(const json& object) {
     step.seconds = number(object, "seconds", 0.0, 0.0, 3600.0);
     return step;
   }
+  if (action == "place") {
+    only(object, {"action", "tool", "entry", "seconds"});
+    step.action = Action::place;
+    step.tool = text(object, "tool", "guide-1");
+    if (const Result<Tool> known = find_tool(step.tool); !known) throw Wrong("\"tool\": " + known.error().message);
+    step.seconds = number(object, "seconds", 0.5, 0.0, 3600.0);
+    step.entry = read_entry(object);
+    return step;
+  }
   if (action != "drill" && action != "burr")
-    throw Wrong("\"action\" is \"" + action + "\"; choose \"drill\", \"burr\" or \"wait\"");
+    throw Wrong("\"action\" is \"" + action + "\"; choose \"drill\", \"burr\", \"place\" or \"wait\"");
   const bool drill = action == "drill";
   only(object, {"action", "tool", "spindle_rpm", "hand", "feed_mm_per_s", "push_n", "entry", "beyond_mm", "window_mm",
-                "depth_mm", "sweep_mm_per_s", "wear"});
+                "depth_mm", "sweep_mm_per_s", "wear", "guide", "tremor_mm", "to_mm"});
   step.action = drill ? Action::drill : Action::burr;
   step.tool = text(object, "tool", drill ? "drill-3.2" : "burr-round-5");
   if (const Result<Tool> known = find_tool(step.tool); !known) throw Wrong("\"tool\": " + known.error().message);
@@ -99,6 +108,7 @@ PlanStep read_step(const json& object) {
   step.feed_mm_per_s = number(object, "feed_mm_per_s", step.feed_mm_per_s, 0.01, 20.0);
   step.push_n = number(object, "push_n", step.push_n, 1.0, 200.0);
   step.beyond_mm = number(object, "beyond_mm", step.beyond_mm, 0.0, 40.0);
+  step.to_mm = number(object, "to_mm", step.to_mm, 0.1, 200.0);
   step.depth_mm = number(object, "depth_mm", step.depth_mm, 0.1, 20.0);
   step.sweep_mm_per_s = number(object, "sweep_mm_per_s", step.sweep_mm_per_s, 0.5, 60.0);
   step.wear = number(object, "wear", step.wear, 1.0, 5.0);
@@ -109,7 +119,13 @@ PlanStep read_step(const json& object) {
     step.window_u_mm = window[0];
     step.window_v_mm = window[1];
   }
-  step.entry = read_entry(object);
+  step.tremor_mm = number(object, "tremor_mm", 0.0, 0.0, 5.0);
+  if (object.contains("guide")) {
+    if (!object.at("guide").is_boolean() || !drill) throw Wrong("\"guide\" must be true or false, and belongs to a drill");
+    step.through_guide = object.at("guide").get<bool>();
+  }
+  if (step.through_guide && object.contains("entry")) throw Wrong("\"entry\" and \"guide\" exclude each other: the guide says where");
+  if (!step.through_guide) step.entry = read_entry(object);
   return step;
 }
 

@@ -22,6 +22,7 @@ void HapticLoop::take_up(int tool, const Pose& pose_bone_tool, const WorkspaceMa
   mapping_ = mapping;
   coupling_n_per_mm_ = std::min(params_.stiffness_n_per_mm, params_.device_n_per_mm / (params_.force_scale * mapping.scale()));
   proxy_.place(pose_bone_tool);
+  guiding_.release();
   recorder_.end();
   spindle_ = {};
   torque_nmm_ = 0.0;
@@ -31,7 +32,7 @@ void HapticLoop::take_up(int tool, const Pose& pose_bone_tool, const WorkspaceMa
   placed_ = true;
 }
 
-LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch) noexcept {
+LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::span<const PlacedGuide> guides) noexcept {
   LoopReport report;
   report.tool = tool_;
   report.state_seq = ++ticks_;
@@ -45,6 +46,16 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch) noexcept
   Pose pose_bone_device = mapping_.pose_bone_tool(input.pose_device_tool);
   if (input.clutch) pose_bone_device = proxy_.pose();
 
+  // A guide lets the tool go only where its opening does; the hand feels the guide as the way that it is kept from.
+  Pose pose_bone_wanted = pose_bone_device;
+  bool held_back = false;
+  if (const auto guided = guiding_.step(guides, model.tool, pose_bone_device)) {
+    pose_bone_wanted = guided->pose_bone_tool;
+    held_back = guided->correction_mm > 0.0;
+    report.guide_play_mm = guided->play_mm;
+    report.events |= kGuided;
+  }
+
   spindle_.step(model.spindle, input.link_ok && placed_ ? input.spindle_rpm : 0.0, torque_nmm_, params_.dt_s);
 
   ProxyStep step;
@@ -52,7 +63,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch) noexcept
   else {
     const bool cuts_waiting = proxy_.sweeps_full() || pieces_.size() >= 60;
     if (cuts_waiting) report.events |= kCutsWaiting;
-    step = proxy_.step(model, patch, pose_bone_device, spindle_.rpm, coupling_n_per_mm_,
+    step = proxy_.step(model, patch, pose_bone_wanted, spindle_.rpm, coupling_n_per_mm_,
                        input.link_ok && !input.clutch && !cuts_waiting, params_.dt_s);
   }
   if (!step.covered) report.events |= kUncovered;
@@ -78,7 +89,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch) noexcept
   // Physical: the coupling's spring, as far as the device could ever show it.
   const double s = params_.force_scale;
   const double limit_n = input.device_warm ? params_.continuous_n : params_.peak_n;
-  const bool touching = step.contact && step.covered && !input.clutch;
+  const bool touching = (step.contact || held_back) && step.covered && !input.clutch;
   const Vec3 extension_mm = pose_bone_device.position_mm - proxy_.pose().position_mm;
   if (touching) report.force_physical_n = -coupling_n_per_mm_ * extension_mm;
   if (s * report.force_physical_n.norm() > limit_n) {

@@ -3,6 +3,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "common/core/id.hpp"
@@ -10,6 +11,7 @@
 #include "common/mechanics/spindle.hpp"
 #include "common/runtime/event_queue.hpp"
 #include "haptic_client/control/cut_recorder.hpp"
+#include "haptic_client/control/guiding.hpp"
 #include "haptic_client/control/proxy.hpp"
 #include "haptic_client/control/workspace_mapping.hpp"
 
@@ -46,6 +48,7 @@ enum LoopEvent : std::uint32_t {
   kCutsWaiting = 8,      // too many cuts wait for the replica: the tool rubs until it follows
   kMissedTicks = 16,
   kHeelContact = 32,
+  kGuided = 64,          // a guide holds the tool
 };
 
 struct LoopReport {
@@ -54,6 +57,7 @@ struct LoopReport {
   Vec3 cutting_force_n = Vec3::Zero();   // of the tool on the bone, the law's part, bone frame
   Vec3 moved_mm = Vec3::Zero();          // of the proxy in this tick
   Pose pose_bone_proxy, pose_bone_device;
+  double guide_play_mm = 0;              // while guided: how far the tip may be off the opening's middle
   double spindle_rpm = 0, feed_mm_per_s = 0, density_g_cm3 = 0, engaged = 0, torque_nmm = 0;
   CuttingPhase phase = CuttingPhase::idle;
   int tool = 0;
@@ -68,8 +72,8 @@ class HapticLoop {
 
   // [haptic] Takes up a tool in free air, with the handle at a place of the device.
   void take_up(int tool, const Pose& pose_bone_tool, const WorkspaceMapping& mapping) noexcept;
-  // [haptic] `patch`: the newest there is.
-  LoopReport tick(const LoopInput& input, const Patch& patch) noexcept;
+  // [haptic] `patch`: the newest there is; `guides`: those that stand on the bone.
+  LoopReport tick(const LoopInput& input, const Patch& patch, std::span<const PlacedGuide> guides = {}) noexcept;
 
   // [replica] Closed cuts in order.
   [[nodiscard]] bool take_piece(CutPiece& piece) noexcept { return pieces_.try_pop(piece); }
@@ -93,6 +97,7 @@ class HapticLoop {
   EventQueue<CutPiece, 64> pieces_;
   WorkspaceMapping mapping_;
   Proxy proxy_;
+  Guiding guiding_;
   Spindle spindle_;
   CutRecorder recorder_;
   int tool_ = 0;

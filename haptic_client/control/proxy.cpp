@@ -31,11 +31,8 @@ bool Proxy::begin_sweep(const ToolModel& model) noexcept {
   sweeping_ = true;
   const Tool& tool = model.tool;
   Sweep& sweep = sweeps_[static_cast<std::size_t>(sweep_count_++)];
-  sweep.kind = tool.kind;
+  sweep.outline = model.axial ? &model.outline : nullptr;
   sweep.radius_mm = 0.5 * tool.diameter_mm;
-  sweep.length_mm = tool.cutting_length_mm;
-  if (tool.kind == ToolKind::drill) sweep.cone_height_mm = sweep.radius_mm / std::tan(0.5 * tool.point_angle_rad);
-  sweep.cone_slant_mm = std::hypot(sweep.radius_mm, sweep.cone_height_mm);
   sweep.own_cut = 0;
   sweep.open = true;
   sweep.deepest = pose_;
@@ -51,7 +48,7 @@ void Proxy::closed(const ToolModel& model, std::uint64_t own_cut) noexcept {
   constexpr double kSameAxis_rad = 1e-6, kSameAxis_mm = 0.02;
   const Vec3 away_mm = pose_.position_mm - sweep.deepest.position_mm;
   const Vec3 axis = pose_.direction(Vec3::UnitZ());
-  if (sweep.kind == ToolKind::drill && pose_.rotation.angularDistance(sweep.deepest.rotation) < kSameAxis_rad &&
+  if (sweep.outline && pose_.rotation.angularDistance(sweep.deepest.rotation) < kSameAxis_rad &&
       (away_mm - away_mm.dot(axis) * axis).norm() < kSameAxis_mm)
     return;
   sweep.open = false;
@@ -85,12 +82,8 @@ void Proxy::forget_contained(const Patch& patch) noexcept {
 }
 
 double Proxy::distance_mm(const Sweep& sweep, const Vec3& point_mm) noexcept {
-  if (sweep.kind == ToolKind::round_burr) return segment_distance_mm(point_mm, sweep.from_mm, sweep.to_mm) - sweep.radius_mm;
-  // Exact inside and before faces; too small before edges, where only the sign is asked for.
-  const Vec3 p = sweep.pose_deepest_bone.point(point_mm);
-  const double r = std::sqrt(p.x() * p.x() + p.y() * p.y());
-  return std::max({(r * sweep.cone_height_mm + p.z() * sweep.radius_mm) / sweep.cone_slant_mm, r - sweep.radius_mm,
-                   -p.z() - sweep.length_mm});
+  if (!sweep.outline) return segment_distance_mm(point_mm, sweep.from_mm, sweep.to_mm) - sweep.radius_mm;
+  return sweep.outline->distance_mm(sweep.pose_deepest_bone.point(point_mm));
 }
 
 bool Proxy::solid(const Patch& patch, const Vec3& point_mm, double& solid_mm) const noexcept {
@@ -137,7 +130,7 @@ Proxy::Engagement Proxy::engagement(const ToolModel& model, const Patch& patch, 
     const double density = patch.density_at(probe_mm);
     result.engaged_mm2 += area_mm2;
     result.density += area_mm2 * density;
-    if (model.tool.kind == ToolKind::round_burr)
+    if (!model.axial)
       result.milling += milling_resistance(model.milling, area_mm2, point.axis_distance_mm, density);
   }
   if (result.engaged_mm2 > 0.0) result.density /= result.engaged_mm2;
@@ -218,15 +211,14 @@ void Proxy::advance(const ToolModel& model, const Patch& patch, const Vec3& dire
       report.density_g_cm3 = now.density;
       if (!may_cut) break;
       const RevolutionsPerMinute speed{spindle_rpm};
-      const bool drill = model.tool.kind == ToolKind::drill;
-      const FeedLaw law = drill ? drilling_law(model.drilling, speed, GramsPerCm3{now.density}, report.engaged)
+      const FeedLaw law = model.axial ? drilling_law(model.drilling, speed, GramsPerCm3{now.density}, report.engaged)
                                 : milling_law(model.milling, speed, now.milling, GramsPerCm3{now.density}, report.engaged);
       const FeedSolution solution = solve_feed(law, stiffness_n_per_mm, extension_mm, left_s);
       if (!(solution.feed_mm_per_s > 0.0)) break;
       report.cutting = true;
       report.heel_contact = solution.heel_contact;
       report.cutting_force_n = solution.cutting_n * direction;
-      report.torque_nmm = (drill ? drilling_torque(model.drilling, Newtons{solution.cutting_n})
+      report.torque_nmm = (model.axial ? drilling_torque(model.drilling, Newtons{solution.cutting_n})
                                  : milling_torque(model.milling, Newtons{solution.cutting_n})).value();
       // Engagement is asked again before the face has moved half a pitch.
       step_mm = std::min(solution.feed_mm_per_s * left_s, 0.5 * model.fine_pitch_mm);
@@ -234,10 +226,10 @@ void Proxy::advance(const ToolModel& model, const Patch& patch, const Vec3& dire
       if (left_s < 1e-9) left_s = 0.0;
       cut_mm += step_mm;
     }
-    // The shank blocks even where the cutting part goes on; a drill's walls cannot block along its axis.
+    // The shank blocks even where the cutting part goes on; walls no wider than what cuts cannot block along the axis.
     Vec3 by_mm = step_mm * direction;
     bool blocked = false;
-    if (model.tool.kind != ToolKind::drill) by_mm = slide(model, patch, by_mm, false, nullptr, blocked, report.covered);
+    if (!model.axial || model.tool.shank_diameter_mm > model.tool.diameter_mm) by_mm = slide(model, patch, by_mm, false, nullptr, blocked, report.covered);
     if (blocked) report.contact = true;
     pose_.position_mm += by_mm;
     report.moved_mm += by_mm;
@@ -267,7 +259,7 @@ ProxyStep Proxy::step(const ToolModel& model, const Patch& patch, const Pose& po
 
   const bool cuts = may_cut && spindle_rpm >= kMinCuttingRpm;
   const Vec3 away_mm = pose_bone_device.position_mm - pose_.position_mm;
-  if (model.tool.kind == ToolKind::drill) {
+  if (model.axial) {
     // Across its axis a drill only blocks; along it, it feeds.
     const Vec3 axis = pose_.direction(Vec3::UnitZ());
     const double along_mm = away_mm.dot(axis);

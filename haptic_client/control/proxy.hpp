@@ -44,12 +44,12 @@ class Proxy {
   [[nodiscard]] const Pose& pose() const noexcept { return pose_; }
 
  private:
-  // What the cutting part has taken away since a patch was built. A sphere: from one place to another. A drill cuts
-  // along its axis, so its deepest place holds all others, and one sweep goes on for as long as it is not turned.
+  // What the cutting part has taken away since a patch was built. A sphere: from one place to another. A drill or
+  // reamer cuts along its axis, so its deepest place holds all others, and one sweep goes on for as long as it is not turned.
   struct Sweep {
-    ToolKind kind = ToolKind::drill;
-    double radius_mm = 0, cone_height_mm = 0, cone_slant_mm = 0, length_mm = 0;
-    Pose deepest;                // drill, pose_bone_tool
+    const SweptOutline* outline = nullptr;  // of the tool in hand; null for a sphere
+    double radius_mm = 0;        // sphere
+    Pose deepest;                // pose_bone_tool
     Pose pose_deepest_bone;      // its inverse
     Vec3 from_mm, to_mm;         // sphere: its centre
     std::uint64_t own_cut = 0;   // newest cut that holds it all; 0: none yet

@@ -8,7 +8,7 @@ SimulatedSession::SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& 
       loop_(loop_params(device.limits.peak_n, device.limits.continuous_n, device.limits.stiffness_n_per_mm, force_scale),
             surgeon_.plan().tools) {}
 
-SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok, int periods) noexcept {
+SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok, int periods, const std::vector<PlacedGuide>* room_guides) noexcept {
   const double dt_s = loop_.params().dt_s;
   SessionTick result;
   result.order = surgeon_.act(last_, dt_s);
@@ -28,9 +28,9 @@ SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok, int periods
     }
     const WorkspaceMapping& mapping = loop_.mapping();
     HandCommand command = result.order.hand;
-    command.target_mm = mapping.pose_device_tool({command.target_mm, step.rotation}).position_mm;
+    command.target_mm = mapping.pose_device_tool({command.target_mm, result.order.rotation}).position_mm;
     command.axis = mapping.to_device(command.axis);
-    device_.command(command, mapping.pose_device_tool({Vec3::Zero(), step.rotation}).rotation,
+    device_.command(command, mapping.pose_device_tool({Vec3::Zero(), result.order.rotation}).rotation,
                     result.order.spindle_rpm > 0.0 ? kSpindlePedal : 0u);
     device_.step(dt_s);
   }
@@ -44,7 +44,9 @@ SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok, int periods
   input.device_warm = reading.status == DeviceStatus::warm;
   input.link_ok = link_ok;
   input.periods = periods;
-  result.report = last_ = loop_.tick(input, patch);
+  const std::vector<PlacedGuide>& own = surgeon_.plan().guides;
+  const std::span<const PlacedGuide> guides = room_guides ? std::span(*room_guides) : std::span(own).first(surgeon_.guides_placed());
+  result.report = last_ = loop_.tick(input, patch, guides);
   device_.write(result.report.force_device_n);
   return result;
 }

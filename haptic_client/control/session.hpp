@@ -14,9 +14,10 @@ class SimulatedSession {
  public:
   SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale);
 
-  // [haptic] `link_ok` false ends force and spindle; `periods`: of 1 ms since the last tick, 1 when on time. The simulated hand lives on these ticks: while none comes, as when
-  // the machine stalls, no time passes for it.
-  SessionTick tick(const Patch& patch, bool link_ok, int periods = 1) noexcept;
+  // [haptic] `link_ok` false ends force and spindle; `periods`: of 1 ms since the last tick, 1 when on time. The
+  // simulated hand lives on these ticks: while none comes, as when the machine stalls, no time passes for it.
+  // `room_guides`: those of the room's scene. Null: the plan's own, from the step on that places them.
+  SessionTick tick(const Patch& patch, bool link_ok, int periods = 1, const std::vector<PlacedGuide>* room_guides = nullptr) noexcept;
   [[nodiscard]] bool done() const noexcept { return surgeon_.done(); }
 
   [[nodiscard]] HapticLoop& loop() noexcept { return loop_; }

@@ -30,6 +30,19 @@ Result<Site> find_site(const Case& bone, const PlanEntry& entry, const Site* las
   return failure(ErrorCode::invalid_input, "entry is missing; give {\"toward\": [x, y, z]} or {\"point_mm\": [...], \"axis\": [...]}");
 }
 
+constexpr double kTremorArm_mm = 80.0;  // from the tip to where the hand holds the tool: a stray hand also tilts it
+
+// A slow wander and the 9 Hz of a trembling hand, together at most 1 in size.
+struct Stray {
+  double u = 0, v = 0;
+};
+Stray stray(double time_s, double phase) {
+  const auto wave = [&](double shift) {
+    return 0.6 * std::sin(2.0 * std::numbers::pi * 0.7 * time_s + shift) + 0.4 * std::sin(2.0 * std::numbers::pi * 9.0 * time_s + 2.0 * shift);
+  };
+  return {wave(phase + 0.8) / std::numbers::sqrt2, wave(phase + 2.5) / std::numbers::sqrt2};
+}
+
 // The time that a phase may take. What moves by its own clock gets twice that and a margin; the rest, what waits for bone
 // or spindle, as long as any bone could ask for.
 double most_s(const ReadyStep& step, SurgeonPhase phase) {
@@ -80,42 +93,101 @@ void plan_sweep(const Case& bone, const Tool& tool, ReadyStep& step) {
   }
 }
 
+std::string sentence(const Tool& tool, std::string_view why) { return "tool \"" + tool.name + "\" " + std::string(why); }
+
+bool is_guide(ToolKind kind) {
+  return kind == ToolKind::drill_sleeve || kind == ToolKind::distal_block || kind == ToolKind::four_in_one_block;
+}
+
+// Whether the tool is one for this action.
+Result<void> suits(const Tool& tool, Action action) {
+  if (action == Action::place && !is_guide(tool.kind))
+    return failure(ErrorCode::invalid_input, sentence(tool, "is not a guide; choose a drill sleeve or a cutting block"));
+  if (action == Action::drill && !feeds_along_axis(tool.kind))
+    return failure(ErrorCode::invalid_input, sentence(tool, "cannot do this action; choose a drill, reamer or pin"));
+  if (action == Action::burr && tool.kind != ToolKind::round_burr)
+    return failure(ErrorCode::invalid_input, sentence(tool, "cannot do this action; choose a round burr"));
+  return {};
+}
+
+// A guide with its face on the bone at a site, its z axis into the bone, x and y along the site's.
+PlacedGuide stand(const Tool& guide, const Site& site, std::uint32_t id) {
+  Eigen::Matrix3d axes;
+  axes << site.across_u, site.across_v, site.axis;
+  return placed_guide(id, guide, {site.entry_mm, Eigen::Quaterniond(axes).normalized()});
+}
+
+// The first hole of the guide that takes the tool.
+const GuideBore* hole_for(const PlacedGuide& guide, const Tool& tool) {
+  const std::size_t bores = guide.shape.bores.size(), holes = bores + guide.shape.pin_holes.size();
+  for (std::size_t i = 0; i < holes; ++i)
+    if (fits(guide.shape, i, tool)) return i < bores ? &guide.shape.bores[i] : &guide.shape.pin_holes[i - bores];
+  return nullptr;
+}
+
+// Where a tool that goes through the guide meets the bone.
+Result<Site> find_site_through(const Case& bone, const std::vector<PlacedGuide>& guides, const Tool& tool, double& length_mm) {
+  if (guides.empty()) return failure(ErrorCode::invalid_input, "\"guide\" needs a step before it that places a guide");
+  const GuideBore* hole = hole_for(guides.back(), tool);
+  if (!hole) return failure(ErrorCode::invalid_input, sentence(tool, "does not go through the guide placed last; choose one that fits its hole"));
+  length_mm = hole->length_mm;
+  const Pose& pose = guides.back().pose_bone_guide;
+  return find_site_at(bone, pose.point(hole->entry_mm + hole->length_mm * hole->direction), pose.direction(hole->direction));
+}
+
+// One step with its site found. `last`: the site of the step before, or null.
+Result<ReadyStep> make_ready(const PlanStep& plan, const Case& bone, const ToolFinder& find, const Site* last, ReadyPlan& ready) {
+  ReadyStep step;
+  step.plan = plan;
+  if (plan.action == Action::wait) return step;
+  const Result<Tool> tool = find(plan.tool);
+  if (!tool) return tl::unexpected(tool.error());
+  if (const Result<void> suited = suits(*tool, plan.action); !suited) return tl::unexpected(suited.error());
+  double guide_length_mm = 0.0;
+  const Result<Site> site = plan.through_guide ? find_site_through(bone, ready.guides, *tool, guide_length_mm) : find_site(bone, plan.entry, last);
+  if (!site) return tl::unexpected(site.error());
+  step.site = *site;
+  step.stand_off_mm = kStandOff_mm + guide_length_mm;
+  if (plan.action == Action::place) {
+    step.guide = static_cast<int>(ready.guides.size());
+    ready.guides.push_back(stand(*tool, step.site, static_cast<std::uint32_t>(ready.guides.size() + 1)));
+    ready.guide_tools.push_back(*tool);
+    return step;
+  }
+  step.spindle_rpm = plan.spindle_rpm > 0.0 ? plan.spindle_rpm : tool->spindle_rpm;
+  step.tool = static_cast<int>(ready.tools.size());
+  ready.tools.emplace_back(*tool, bone.pitch_mm(), plan.wear);
+  ready.tools.back().spindle.full_rpm = std::max(1.0, step.spindle_rpm);
+  if (plan.action == Action::burr) {
+    plan_sweep(bone, *tool, step);
+    return step;
+  }
+  step.rotation = pose_along(Vec3::Zero(), step.site.axis).rotation;
+  const double deepest_mm = plan.to_mm > 0.0 ? plan.to_mm : plan.hand == HandKind::rig ? step.site.thickness_mm + plan.beyond_mm : 0.0;
+  if (deepest_mm + guide_length_mm > tool->reach_mm())
+    return failure(ErrorCode::invalid_input, plan.to_mm > 0.0 ? "to_mm is deeper than the tool is long; choose a smaller one"
+                                                              : "the bone is thicker here than the drill is long; choose another entry");
+  return step;
+}
+
 }  // namespace
 
-Result<ReadyPlan> make_ready(const std::vector<PlanStep>& plan, const Case& bone) {
+Result<ReadyPlan> make_ready(const std::vector<PlanStep>& plan, const Case& bone, const ToolFinder& find) {
   ReadyPlan ready;
   const Site* last = nullptr;
   ready.steps.reserve(plan.size());  // `last` points into it
   for (std::size_t i = 0; i < plan.size(); ++i) {
-    ReadyStep step;
-    step.plan = plan[i];
-    if (step.plan.action != Action::wait) {
-      const Result<Tool> tool = find_tool(step.plan.tool);
-      if (!tool) return failure(tool.error().code, at_step(i) + tool.error().message);
-      const ToolKind needed = step.plan.action == Action::drill ? ToolKind::drill : ToolKind::round_burr;
-      if (tool->kind != needed)
-        return failure(ErrorCode::invalid_input, at_step(i) + "tool \"" + tool->name + "\" cannot do this action; choose a " +
-                                                     (needed == ToolKind::drill ? "drill" : "round burr"));
-      Result<Site> site = find_site(bone, step.plan.entry, last);
-      if (!site) return failure(site.error().code, at_step(i) + site.error().message);
-      step.site = *site;
-      step.spindle_rpm = step.plan.spindle_rpm > 0.0 ? step.plan.spindle_rpm : tool->spindle_rpm;
-      step.tool = static_cast<int>(ready.tools.size());
-      ready.tools.emplace_back(*tool, bone.pitch_mm(), step.plan.wear);
-      ready.tools.back().spindle.full_rpm = std::max(1.0, step.spindle_rpm);
-      if (needed == ToolKind::drill) {
-        step.rotation = pose_along(Vec3::Zero(), step.site.axis).rotation;
-        step.tip_height_mm = 0.5 * tool->diameter_mm / std::tan(0.5 * tool->point_angle_rad);
-        if (step.plan.hand == HandKind::rig && step.site.thickness_mm + step.plan.beyond_mm > tool->reach_mm())
-          return failure(ErrorCode::invalid_input, at_step(i) + "the bone is thicker here than the drill is long; choose another entry");
-      } else {
-        plan_sweep(bone, *tool, step);
-      }
-    }
-    ready.steps.push_back(std::move(step));
-    if (ready.steps.back().plan.action != Action::wait) last = &ready.steps.back().site;
+    Result<ReadyStep> step = make_ready(plan[i], bone, find, last, ready);
+    if (!step) return failure(step.error().code, at_step(i) + step.error().message);
+    ready.steps.push_back(std::move(*step));
+    if (plan[i].action != Action::wait) last = &ready.steps.back().site;
   }
   return ready;
+}
+
+const char* name(Action action) {
+  constexpr const char* kNames[] = {"drill", "burr", "wait", "place"};
+  return kNames[static_cast<int>(action)];
 }
 
 const char* name(SurgeonPhase phase) {
@@ -133,7 +205,7 @@ void LayerMeans::add(double force, double feed, double density) noexcept {
 }
 
 Surgeon::Surgeon(ReadyPlan plan) : plan_(std::move(plan)), results_(plan_.steps.size()) {
-  if (!plan_.steps.empty() && plan_.steps[0].plan.action == Action::wait) phase_ = SurgeonPhase::wait;
+  if (!plan_.steps.empty() && !plan_.steps[0].takes_tool()) phase_ = SurgeonPhase::wait;
 }
 
 HandParams Surgeon::hand_for(const PlanStep& plan) {
@@ -149,7 +221,7 @@ WorkspaceMapping Surgeon::mapping_for(const ReadyStep& step, double workspace_ra
   view.col(0) = site.across_u;
   view.col(2) = -site.axis;
   view.col(1) = view.col(2).cross(view.col(0));
-  const double reach_mm = std::max(kStandOff_mm, std::min(site.thickness_mm, 60.0) + 15.0);
+  const double reach_mm = std::max(step.stand_off_mm, std::min(site.thickness_mm, 60.0) + 15.0);
   WorkspaceMapping mapping;
   const double scale = std::max(std::min(1.0, stiff_enough), reach_mm / workspace_radius_mm);
   mapping.align(Eigen::Quaterniond(view).normalized(), scale, Vec3::Zero(), site.entry_mm);
@@ -202,6 +274,7 @@ void Surgeon::drill(const ReadyStep& step, const LoopReport& report, double dt_s
   const double force_n = -report.force_physical_n.dot(step.site.axis);
   const double depth = depth_mm(step, report.pose_bone_proxy.position_mm);
   const bool rig = step.plan.hand == HandKind::rig;
+  const double to_mm = step.plan.to_mm;
   switch (phase_) {
     case SurgeonPhase::seek:
       if (rig) {
@@ -210,14 +283,20 @@ void Surgeon::drill(const ReadyStep& step, const LoopReport& report, double dt_s
         carry_to_depth(step, step.site.thickness_mm + kBeyondGone_mm, kSeekSpeed_mm_per_s, dt_s);
         if (force_n > 0.3) enter(SurgeonPhase::push);
         // Nothing was met all the way: the hole is there already.
-        else if (depth > step.site.thickness_mm) enter(SurgeonPhase::retract);
+        else if (depth > (to_mm > 0.0 ? to_mm : step.site.thickness_mm)) enter(SurgeonPhase::retract);
       }
       break;
     case SurgeonPhase::feed:
-      if (carry_to_depth(step, step.site.thickness_mm + step.plan.beyond_mm, step.plan.feed_mm_per_s, dt_s)) enter(SurgeonPhase::retract);
+      if (carry_to_depth(step, to_mm > 0.0 ? to_mm : step.site.thickness_mm + step.plan.beyond_mm, step.plan.feed_mm_per_s, dt_s))
+        enter(SurgeonPhase::retract);
       break;
     case SurgeonPhase::push:
       hand_.mode = HandMode::push;
+      if (to_mm > 0.0 && depth >= to_mm) {
+        target_depth_mm_ = depth;
+        enter(SurgeonPhase::retract);
+        break;
+      }
       // The lips are in the far cortex and the resistance has gone: the bone gives way.
       if (depth > step.site.thickness_mm && force_n < 0.5 * step.plan.push_n) {
         hand_.mode = HandMode::release;
@@ -275,7 +354,7 @@ bool Surgeon::work(const ReadyStep& step, const LoopReport& report, double dt_s)
       break;
     case SurgeonPhase::retract: {
       const Vec3 lateral = hand_.target_mm - step.site.entry_mm - (hand_.target_mm - step.site.entry_mm).dot(step.site.axis) * step.site.axis;
-      if (carry_to_depth(step, -kStandOff_mm, kCarrySpeed_mm_per_s, dt_s)) enter(SurgeonPhase::lift);
+      if (carry_to_depth(step, -step.stand_off_mm, kCarrySpeed_mm_per_s, dt_s)) enter(SurgeonPhase::lift);
       hand_.target_mm += lateral;
       break;
     }
@@ -299,6 +378,15 @@ bool Surgeon::give_up(const ReadyStep& step, const LoopReport& report) noexcept 
   return false;
 }
 
+void Surgeon::tremble(const ReadyStep& step, SurgeonOrder& order) const noexcept {
+  const Site& site = step.site;
+  const Stray place = stray(time_s_, 0.0), tilt = stray(time_s_, 1.3);
+  order.hand.target_mm += step.plan.tremor_mm * (place.u * site.across_u + place.v * site.across_v);
+  const Vec3 turn_rad = (step.plan.tremor_mm / kTremorArm_mm) * (tilt.u * site.across_u + tilt.v * site.across_v);
+  const double angle_rad = turn_rad.norm();
+  if (angle_rad > 0.0) order.rotation = (Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, turn_rad / angle_rad)) * step.rotation).normalized();
+}
+
 SurgeonOrder Surgeon::act(const LoopReport& report, double dt_s) noexcept {
   SurgeonOrder order;
   if (done()) return order;
@@ -307,15 +395,17 @@ SurgeonOrder Surgeon::act(const LoopReport& report, double dt_s) noexcept {
   order.step = step_;
   bool finished = false;
 
-  if (step.plan.action == Action::wait) {
+  time_s_ += dt_s;
+  if (!step.takes_tool()) {
     phase_ = SurgeonPhase::wait;
+    if (step.guide >= 0) guides_placed_ = static_cast<std::size_t>(step.guide) + 1;
     results_[step_].duration_s = in_phase_s_;
     results_[step_].completed = finished = in_phase_s_ >= step.plan.seconds;
   } else if (phase_ == SurgeonPhase::take_up) {
     if (in_phase_s_ <= 1.5 * dt_s) {
       // Above the first place that the tool goes to, along the axis of the site.
       const Vec3 first = step.sweep_mm.empty() ? step.site.entry_mm : step.sweep_mm.front();
-      hand_ = {HandMode::carry, first - kStandOff_mm * step.site.axis, step.site.axis};
+      hand_ = {HandMode::carry, first - step.stand_off_mm * step.site.axis, step.site.axis};
       target_depth_mm_ = depth_mm(step, hand_.target_mm);
       last_engaged_mm_ = -1.0;
       spindle_rpm_ = 0.0;
@@ -333,6 +423,8 @@ SurgeonOrder Surgeon::act(const LoopReport& report, double dt_s) noexcept {
 
   order.phase = phase_;
   order.hand = hand_;
+  order.rotation = step.rotation;
+  if (step.plan.tremor_mm > 0.0 && step.takes_tool()) tremble(step, order);
   order.spindle_rpm = spindle_rpm_;
   if (finished) {
     ++step_;

@@ -1,8 +1,11 @@
 // The simulated surgeon: carries out a plan by moving the hand, a tick at a time. Knows the bone only through where the
 // plan's sites are and what the tool reports.
 #pragma once
+#include <array>
+#include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/mechanics/hand.hpp"
@@ -11,7 +14,8 @@
 
 namespace osteon::haptic {
 
-enum class Action : std::uint8_t { drill, burr, wait };
+enum class Action : std::uint8_t { drill, burr, wait, place };
+[[nodiscard]] const char* name(Action action);
 enum class HandKind : std::uint8_t { expert, novice, rig };
 
 struct PlanEntry {
@@ -28,10 +32,13 @@ struct PlanStep {
   double push_n = 29;                 // hand
   double feed_mm_per_s = 1;           // rig
   double beyond_mm = 5;               // rig: past the far side
+  double to_mm = 0;                   // drill: as deep as this; 0: through the bone
   double window_u_mm = 12, window_v_mm = 8, depth_mm = 2, sweep_mm_per_s = 15;  // burr
   double wear = 1;
+  bool through_guide = false;         // drill: through the guide that was placed last, at its site unless an entry is given
+  double tremor_mm = 0;               // of the hand: how far it strays at most, across the axis
   PlanEntry entry;
-  double seconds = 0;                 // wait
+  double seconds = 0;                 // wait, place
 };
 
 // A step with its place on the bone found and its path worked out.
@@ -40,18 +47,23 @@ struct ReadyStep {
   Site site;
   int tool = 0;                       // place in the loop's tools
   double spindle_rpm = 0;
-  double tip_height_mm = 0;           // of a drill's point
+  double stand_off_mm = 0;            // where the tool is taken up, above the surface
+  int guide = -1;                     // place: which of the plan's guides
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // of the tool, bone frame
   std::vector<Vec3> sweep_mm;         // places of the tip, burr
   double sweep_length_mm = 0;         // from the first to the last of them
+  [[nodiscard]] bool takes_tool() const { return plan.action == Action::drill || plan.action == Action::burr; }
 };
 
 struct ReadyPlan {
   std::vector<ReadyStep> steps;
   std::vector<ToolModel> tools;
+  std::vector<PlacedGuide> guides;    // in the order in which the steps place them
+  std::vector<Tool> guide_tools;      // their definitions
 };
+using ToolFinder = std::function<Result<Tool>(std::string_view name)>;
 // Error invalid_input or not_found: names the step, the field and the remedy.
-[[nodiscard]] Result<ReadyPlan> make_ready(const std::vector<PlanStep>& plan, const Case& bone);
+[[nodiscard]] Result<ReadyPlan> make_ready(const std::vector<PlanStep>& plan, const Case& bone, const ToolFinder& find = find_tool);
 
 enum class SurgeonPhase : std::uint8_t { take_up, approach, spin_up, seek, push, feed, react, sweep, retract, lift, wait, done };
 [[nodiscard]] const char* name(SurgeonPhase phase);
@@ -62,6 +74,7 @@ struct SurgeonOrder {
   std::size_t step = 0;
   HandCommand hand;
   double spindle_rpm = 0;
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // of the handle, as the hand holds it
   bool take_up = false;      // the tool is taken up at hand.target_mm
 };
 
@@ -91,6 +104,8 @@ class Surgeon {
   SurgeonOrder act(const LoopReport& report, double dt_s) noexcept;
   [[nodiscard]] bool done() const noexcept { return step_ >= plan_.steps.size(); }
   [[nodiscard]] const ReadyPlan& plan() const { return plan_; }
+  // How many of the plan's guides stand on the bone now.
+  [[nodiscard]] std::size_t guides_placed() const noexcept { return guides_placed_; }
   [[nodiscard]] const std::vector<StepResult>& results() const { return results_; }
   // The mapping that puts a step's site into the middle of the workspace, seen along the tool. A small workspace needs a
   // scale above 1; a soft device gets one below, down to `stiff_enough`, as far as its workspace reaches.
@@ -107,14 +122,16 @@ class Surgeon {
   bool work(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept;
   // The phase has had its time: draws the tool out, or ends the step (true) where that too takes too long.
   bool give_up(const ReadyStep& step, const LoopReport& report) noexcept;
+  // The hand strays from where it means to be, and tilts the tool.
+  void tremble(const ReadyStep& step, SurgeonOrder& order) const noexcept;
   void drill(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept;
   void burr(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept;
 
   ReadyPlan plan_;
   std::vector<StepResult> results_;
-  std::size_t step_ = 0;
+  std::size_t step_ = 0, guides_placed_ = 0;
   SurgeonPhase phase_ = SurgeonPhase::take_up;
-  double in_phase_s_ = 0;
+  double in_phase_s_ = 0, time_s_ = 0;
   HandCommand hand_;
   double spindle_rpm_ = 0;
   double target_depth_mm_ = 0;

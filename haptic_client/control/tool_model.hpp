@@ -1,5 +1,6 @@
 // A tool made ready for the haptic loop: its contact points and the law by which it cuts.
 #pragma once
+#include <array>
 #include <vector>
 
 #include "common/mechanics/drilling.hpp"
@@ -17,8 +18,26 @@ struct ContactPoint {
   double axis_distance_mm;
 };
 
+// What a body of revolution leaves free behind it when it goes along its axis: the half-planes of its outline that do not
+// look back, in (distance from the axis, place along it), and a ball that rounds its end.
+struct SweptOutline {
+  struct Plane {
+    double r = 0, z = 0, offset_mm = 0;
+  };
+  std::array<Plane, kMostProfileCorners + 3> planes;
+  int count = 0;
+  double dome_mm = 0;
+  // Of a point in the tool's frame: exact inside and before faces, too small before edges, where only the sign counts.
+  [[nodiscard]] double distance_mm(const Vec3& point_mm) const noexcept;
+};
+
+// Whether the hand feeds it along its axis into the hole that it makes; the others cut sideways too, or not at all.
+[[nodiscard]] bool feeds_along_axis(ToolKind kind) noexcept;
+
 struct ToolModel {
   Tool tool;
+  bool axial = false;                   // feeds_along_axis
+  SweptOutline outline;                 // axial
   int cut_level = 0;                    // the level of its cuts: the tool's own or the finest of the case
   double fine_pitch_mm = 0;             // of that level
   double inset = 0;                     // mm, see ContactPoint

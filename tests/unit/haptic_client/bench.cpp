@@ -40,7 +40,10 @@ ReadyPlan ready(const std::vector<PlanStep>& plan, const Case& bone) {
 
 Bench::Bench(const Case& bone, const std::vector<PlanStep>& plan, const SimulatedDeviceParams& device, double force_scale,
              const BenchDelays& delays)
-    : delays_(delays), session_(ready(plan, bone), device, force_scale), replica_(bone, BodyId{}) {}
+    : Bench(bone, ready(plan, bone), device, force_scale, delays) {}
+
+Bench::Bench(const Case& bone, ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale, const BenchDelays& delays)
+    : delays_(delays), session_(std::move(plan), device, force_scale), replica_(bone, BodyId{}) {}
 
 SessionTick Bench::tick() {
   last_ = session_.tick(patch_, true);

@@ -23,6 +23,8 @@ class Bench {
  public:
   Bench(const Case& bone, const std::vector<PlanStep>& plan, const SimulatedDeviceParams& device = {}, double force_scale = 0.0,
         const BenchDelays& delays = {});
+  Bench(const Case& bone, ReadyPlan plan, const SimulatedDeviceParams& device = {}, double force_scale = 0.0,
+        const BenchDelays& delays = {});
 
   // One millisecond; `after_tick` sees it before replica and patches follow.
   SessionTick tick();

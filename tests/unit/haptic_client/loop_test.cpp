@@ -292,6 +292,7 @@ TEST(Replica, ARejectedCutComesBack) {
     Cut cut;
     cut.author = AuthorId{1};
     cut.author_seq = seq;
+    cut.tool = tool.hash();
     cut.level = tool.cut_level;
     cut.path = {quantise(pose_along({x, 0, 0}, Vec3::UnitZ())), quantise(pose_along({x, 0, 3}, Vec3::UnitZ()))};
     return cut;
@@ -320,6 +321,7 @@ TEST(Replica, RejectionsInARowAreSettledOnce) {
     Cut cut;
     cut.author = AuthorId{author};
     cut.author_seq = seq;
+    cut.tool = tool.hash();
     cut.level = tool.cut_level;
     cut.path = {quantise(pose_along({x, 0, 0}, Vec3::UnitZ())), quantise(pose_along({x, 0, 3}, Vec3::UnitZ()))};
     return cut;

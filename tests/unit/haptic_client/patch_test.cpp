@@ -15,6 +15,7 @@ Cut hole(double depth_mm) {
   Cut cut;
   cut.author = AuthorId{1};
   cut.author_seq = 1;
+  cut.tool = tool.hash();
   cut.level = tool.cut_level;
   cut.path = {quantise(pose_along({0, 0, -1}, Vec3::UnitZ())), quantise(pose_along({0, 0, depth_mm}, Vec3::UnitZ()))};
   return cut;

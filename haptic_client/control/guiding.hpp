@@ -1,0 +1,39 @@
+// The guides that stand on the bone, as the haptic loop feels them: once a tool has entered an opening it stays there until
+// it is drawn out, and goes only where the opening lets it.
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/tools/guide.hpp"
+
+namespace osteon::haptic {
+
+// Made ready off the haptic thread, which only reads it.
+struct PlacedGuide {
+  std::uint32_t id = 0;  // of the scene's item
+  Pose pose_bone_guide;
+  GuideShape shape;
+};
+[[nodiscard]] inline PlacedGuide placed_guide(std::uint32_t id, const Tool& guide, const Pose& pose_bone_guide) {
+  return {id, pose_bone_guide, guide_shape(guide)};
+}
+
+class Guiding {
+ public:
+  // [haptic] Another tool is taken up.
+  void release() noexcept { held_ = false; }
+  // [haptic] Where an opening lets the tool go that is wanted there; nothing while it is in none.
+  [[nodiscard]] std::optional<GuidedPose> step(std::span<const PlacedGuide> guides, const Tool& tool, const Pose& wanted_bone_tool) noexcept;
+  [[nodiscard]] bool held() const noexcept { return held_; }
+  // Of the guide that holds the tool, while one does.
+  [[nodiscard]] std::uint32_t guide_id() const noexcept { return id_; }
+
+ private:
+  bool held_ = false;
+  std::uint32_t id_ = 0;
+  std::size_t opening_ = 0;
+};
+
+}  // namespace osteon::haptic
