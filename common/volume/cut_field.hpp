@@ -12,12 +12,21 @@
 
 namespace osteon {
 
+// Counts of samples as in §5.4, where whole leaves are passed over together: computed ones are those whose distance was
+// evaluated. That a leaf lies beyond the tool's band, wholly within it, or has nothing left that this cut could lower is
+// seen at its middle, so its samples are visited only; those wholly within it are modified without being computed.
 struct CutReport {
-  std::int64_t visited = 0;    // samples of leaves within the cut's reach (§5.4)
-  std::int64_t computed = 0;   // samples whose distance was evaluated
-  std::int64_t modified = 0;   // samples that changed
+  std::int64_t visited = 0;    // of the leaves of the swept tool's world bounding block, grown by the band
+  std::int64_t computed = 0;
+  std::int64_t modified = 0;   // those that changed
   int level = 0;
   std::vector<Coord> changed_leaves;  // origins, samples of the level
+  std::vector<Coord> reached_leaves;  // those of bone that the cut can change, on any field of the case: reach()
+};
+
+// Memory for gathering that a caller keeps, so that nothing is allocated once it has grown.
+struct GatherScratch {
+  std::vector<float> coarse, lines, cut;
 };
 
 // Not synchronised: one thread writes, or several read.
@@ -29,11 +38,19 @@ class CutField {
   CutField(CutField&&) noexcept;
   CutField& operator=(CutField&&) noexcept;
 
-  CutReport apply(const Cut& cut);  // its tool must be in the box, and cut
+  // Its tool must be in the box, and cut. Large cuts are shared out to as many threads as oneTBB may use
+  // (tbb::global_control); the field and the report are the same for any number.
+  CutReport apply(const Cut& cut);
+  // To these leaves of its level only, as if it reached no others.
+  CutReport apply_to(const Cut& cut, std::span<const Coord> leaves);
+  void reset(int level, Coord origin);  // a leaf as it is before any cut
   void restore(const FieldLeaf& leaf);  // sets one leaf, as on joining
   bool merge(const FieldLeaf& mask);    // R = min(R, mask), as a split does; whether anything changed
 
+  // The leaves of its level that a cut can change, whatever was cut before: within its reach, and of bone. Sorted.
+  [[nodiscard]] std::vector<Coord> reach(const Cut& cut) const;
   [[nodiscard]] const Case& bone() const;
+  [[nodiscard]] BodyId body() const;
   [[nodiscard]] const std::shared_ptr<const ToolBox>& tools() const;
   [[nodiscard]] std::vector<FieldLeaf> leaves() const;  // sorted by (level, origin)
   // The same in two steps, for a reader that cannot hold the field still while it copies: the leaves without values,
@@ -47,11 +64,14 @@ class CutField {
   void gather_cuts(int level, const CoordBox& box, std::span<float> out) const;
   // S of the case on the samples of a level, trilinear between those of level 0.
   void gather_surface(int level, const CoordBox& box, std::span<float> out) const;
+  void gather_surface(int level, const CoordBox& box, std::span<float> out, GatherScratch& scratch) const;
   // f = max(S, −R₀, −R₁, −R₂) on the samples of a level: negative where bone is left, mm. Where no cut is within the
   // band of a level, its R says nothing and f has the depth of S.
   void gather_solid(int level, const CoordBox& box, std::span<float> out) const;
+  void gather_solid(int level, const CoordBox& box, std::span<float> out, GatherScratch& scratch) const;
   // f at a point, each grid trilinear.
   [[nodiscard]] double solid_mm(const Vec3& point_mm) const;
+  [[nodiscard]] std::size_t memory_bytes() const;  // of R: leaves, constants and the trees over them
   // Bone removed so far, by integrating the solid fraction of cells at the finest level that was cut, mm³.
   [[nodiscard]] double removed_mm3() const;
 

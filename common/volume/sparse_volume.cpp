@@ -73,6 +73,43 @@ void SparseVolume::gather(const CoordBox& box, std::span<float> out) const {
       }
 }
 
+void SparseVolume::gather_every(std::int32_t stride, const CoordBox& box, std::span<float> out) const {
+  if (box.empty()) return;
+  const Coord dims = box.dims();
+  OSTEON_CHECK(stride > 0 && kLeafSize % stride == 0);
+  OSTEON_CHECK(out.size() == static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z));
+  const Grid::ConstUnsafeAccessor accessor = impl_->grid->getConstUnsafeAccessor();
+  const std::int32_t in_leaf = kLeafSize / stride;  // samples of ours along a leaf
+  const Coord first = floor_to(box.min, in_leaf);
+  for (std::int32_t lx = first.x; lx <= box.max.x; lx += in_leaf)
+    for (std::int32_t ly = first.y; ly <= box.max.y; ly += in_leaf)
+      for (std::int32_t lz = first.z; lz <= box.max.z; lz += in_leaf) {
+        const openvdb::Coord origin(lx * stride, ly * stride, lz * stride);
+        const Leaf* leaf = accessor.probeConstLeaf(origin);
+        const float* data = leaf ? leaf->buffer().data() : nullptr;
+        const float constant = leaf ? 0.0f : accessor.getValue(origin);
+        for (std::int32_t x = std::max(lx, box.min.x); x <= std::min(lx + in_leaf - 1, box.max.x); ++x)
+          for (std::int32_t y = std::max(ly, box.min.y); y <= std::min(ly + in_leaf - 1, box.max.y); ++y) {
+            float* row = out.data() + (static_cast<std::size_t>(x - box.min.x) * static_cast<std::size_t>(dims.y) +
+                                       static_cast<std::size_t>(y - box.min.y)) * static_cast<std::size_t>(dims.z);
+            for (std::int32_t z = std::max(lz, box.min.z); z <= std::min(lz + in_leaf - 1, box.max.z); ++z)
+              row[z - box.min.z] = data ? data[((x - lx) * 64 + (y - ly) * 8 + (z - lz)) * stride] : constant;
+          }
+      }
+}
+
+bool SparseVolume::any_stored(const CoordBox& box) const {
+  const Grid::ConstUnsafeAccessor accessor = impl_->grid->getConstUnsafeAccessor();
+  const Coord first = floor_to(box.min, kLeafSize);
+  for (std::int32_t x = first.x; x <= box.max.x; x += kLeafSize)
+    for (std::int32_t y = first.y; y <= box.max.y; y += kLeafSize)
+      for (std::int32_t z = first.z; z <= box.max.z; z += kLeafSize) {
+        const openvdb::Coord origin(x, y, z);
+        if (accessor.probeConstLeaf(origin) || accessor.getValue(origin) != background()) return true;
+      }
+  return false;
+}
+
 double SparseVolume::trilinear(const Vec3& index) const {
   const Grid::ConstUnsafeAccessor accessor = impl_->grid->getConstUnsafeAccessor();
   const double fx = std::floor(index.x()), fy = std::floor(index.y()), fz = std::floor(index.z());
@@ -122,6 +159,31 @@ std::vector<Coord> SparseVolume::constants() const {
   std::ranges::sort(origins);
   return origins;
 }
+
+void SparseVolume::find(std::span<const Coord> origins, std::span<Place> places) {
+  OSTEON_CHECK(origins.size() == places.size());
+  Grid::UnsafeAccessor accessor(impl_->grid->tree());
+  for (std::size_t i = 0; i < origins.size(); ++i) {
+    const openvdb::Coord origin = vdb(origins[i]);
+    Leaf* leaf = accessor.probeLeaf(origin);
+    places[i] = leaf ? Place{leaf->buffer().data(), 0.0f} : Place{nullptr, accessor.getValue(origin)};
+  }
+}
+
+void SparseVolume::LeafDeleter::operator()(void* leaf) const { delete static_cast<Leaf*>(leaf); }
+
+SparseVolume::NewLeaf SparseVolume::make_leaf(Coord origin, std::span<const float, kLeafVoxels> samples) {
+  // Made without samples, so that they are not filled twice.
+  NewLeaf made(new Leaf(openvdb::PartialCreate(), vdb(origin), 0.0f, true));
+  auto* leaf = static_cast<Leaf*>(made.get());
+  leaf->allocate();
+  std::memcpy(leaf->buffer().data(), samples.data(), sizeof(float) * kLeafVoxels);
+  return made;
+}
+
+void SparseVolume::put(NewLeaf leaf) { impl_->grid->tree().addLeaf(static_cast<Leaf*>(leaf.release())); }
+
+std::size_t SparseVolume::memory_bytes() const { return impl_->grid->tree().memUsage(); }
 
 Result<void> save_volumes(const std::filesystem::path& file, double pitch_mm,
                           const std::vector<std::pair<std::string, const SparseVolume*>>& volumes) {

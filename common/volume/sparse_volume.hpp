@@ -23,6 +23,10 @@ class SparseVolume {
   [[nodiscard]] float background() const;
   [[nodiscard]] float value(Coord sample) const;
   void gather(const CoordBox& box, std::span<float> out) const;  // z fastest
+  // Only every `stride`th sample, a power of two up to kLeafSize: those at stride · box.
+  void gather_every(std::int32_t stride, const CoordBox& box, std::span<float> out) const;
+  // Whether any leaf, or constant other than the background, meets the box.
+  [[nodiscard]] bool any_stored(const CoordBox& box) const;
   [[nodiscard]] double trilinear(const Vec3& index) const;       // at a point in samples
 
   // Leaves are named by their first sample, a multiple of kLeafSize. Without a leaf, all its samples have value().
@@ -31,6 +35,22 @@ class SparseVolume {
   void set_constant(Coord origin, float value);         // a leaf's worth of one value, stored without samples
   [[nodiscard]] std::vector<Coord> leaves() const;      // sorted
   [[nodiscard]] std::vector<Coord> constants() const;   // places of set_constant() other than the background; sorted
+
+  // Many leaves at once: where each one's samples are, or null and the value that all of them have.
+  struct Place {
+    float* samples;
+    float constant;
+  };
+  void find(std::span<const Coord> origins, std::span<Place> places);
+  // A leaf made outside the volume, by any thread, and put in by the one that writes.
+  struct LeafDeleter {
+    void operator()(void* leaf) const;
+  };
+  using NewLeaf = std::unique_ptr<void, LeafDeleter>;
+  [[nodiscard]] static NewLeaf make_leaf(Coord origin, std::span<const float, kLeafVoxels> samples);
+  void put(NewLeaf leaf);  // in place of what was there
+
+  [[nodiscard]] std::size_t memory_bytes() const;       // of the whole tree
 
   struct Impl;
 
