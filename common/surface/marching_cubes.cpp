@@ -1,6 +1,7 @@
 #include "common/surface/marching_cubes.hpp"
 
 #include <utility>
+#include <vector>
 
 #include "common/core/check.hpp"
 
@@ -37,7 +38,7 @@ std::array<int, kCellEdges> next_edges(const MarchingCubesTable& table, int soli
 }
 
 MarchingCubesTable derive() {
-  MarchingCubesTable table;
+  MarchingCubesTable table{};
   int e = 0;
   for (std::uint8_t axis = 0; axis < 3; ++axis)
     for (std::uint8_t corner = 0; corner < 8; ++corner)
@@ -50,8 +51,12 @@ MarchingCubesTable derive() {
         loop.push_back(static_cast<std::uint8_t>(at));
         at = std::exchange(next[static_cast<std::size_t>(at)], -1);
       }
+      CellCase& cell = table.cases[static_cast<std::size_t>(solid)];
       for (std::size_t i = 2; i < loop.size(); ++i)
-        table.triangles[static_cast<std::size_t>(solid)].push_back({loop[0], loop[i - 1], loop[i]});
+        for (const std::uint8_t edge : {loop[0], loop[i - 1], loop[i]}) {
+          OSTEON_CHECK(cell.corners < cell.edges.size());
+          cell.edges[cell.corners++] = edge;
+        }
     }
   }
   return table;

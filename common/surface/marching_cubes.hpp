@@ -3,7 +3,6 @@
 #pragma once
 #include <array>
 #include <cstdint>
-#include <vector>
 
 namespace osteon {
 
@@ -13,12 +12,19 @@ struct CellEdge {
   std::uint8_t axis;    // 0, 1, 2: towards +x, +y, +z
 };
 inline constexpr int kCellEdges = 12;
+inline constexpr int kCaseTriangles = 5;  // no case has more
+
+// Triangles of a case as edge numbers, three by three, counter-clockwise seen from outside the solid.
+struct CellCase {
+  std::uint8_t corners = 0;  // three for each triangle
+  std::array<std::uint8_t, 3 * kCaseTriangles> edges{};
+};
 
 struct MarchingCubesTable {
   std::array<CellEdge, kCellEdges> edges;
-  // Triangles of each case as edge numbers, counter-clockwise seen from outside the solid. On a face with two solid
-  // corners across from each other the surface separates them; as the rule sees only the face, neighbours agree.
-  std::array<std::vector<std::array<std::uint8_t, 3>>, 256> triangles;
+  // On a face with two solid corners across from each other the surface separates them; as the rule sees only the face,
+  // neighbours agree.
+  std::array<CellCase, 256> cases;
 };
 
 [[nodiscard]] const MarchingCubesTable& marching_cubes_table();

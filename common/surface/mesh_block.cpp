@@ -1,67 +1,149 @@
 #include "common/surface/mesh_block.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <string>
+
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
 
 #include "common/core/check.hpp"
-#include "common/surface/marching_cubes.hpp"
+#include "common/surface/contour.hpp"
 
 namespace osteon {
 namespace {
 
-// Payload: solid bit of each of 17³ samples, the covered groups, then for each vertex in the order of its edge its
-// place along the edge, its normal, and at last one cut bit each.
+// Payload: flags; the covered groups and the seams where there are any; the solid bits as below; then for each vertex in
+// the order of the contour its place along the edge, its normal, and one cut bit where vertices differ in it.
 constexpr int kN = kBlockSamples;
-constexpr std::size_t kSamples = static_cast<std::size_t>(kN) * kN * kN;
-constexpr std::size_t kSignBytes = (kSamples + 7) / 8;
-constexpr std::size_t kCoveredBytes = sizeof(CoveredGroups);
-constexpr std::size_t kEdges = 3 * kSamples;
-constexpr std::size_t kStride[3] = {static_cast<std::size_t>(kN) * kN, static_cast<std::size_t>(kN), 1};
-constexpr float kEdgeSteps = 255.0f;
+constexpr std::uint8_t kHasCovered = 1, kHasSeams = 2, kAllCut = 4, kSomeCut = 8, kFlags = 15;
+constexpr std::size_t kGathered = static_cast<std::size_t>(kBlockApron) * kBlockApron * kBlockApron;
 
-using Signs = std::array<std::uint8_t, kSamples>;
+// Solid bits go row by row, x slowest, as the difference from what the three rows before suggest: a plane continues. One
+// byte is a run of rows without difference, or one run of differing bits by length and start; other rows take four.
+constexpr unsigned kSameRows = 64, kDifferenceLengths = 11, kRawRow = 255;
 
-std::size_t sample_index(int x, int y, int z) {
-  return static_cast<std::size_t>(x) * kStride[0] + static_cast<std::size_t>(y) * kStride[1] + static_cast<std::size_t>(z);
+std::uint32_t expected_row(const SolidRows& rows, std::size_t x, std::size_t y) {
+  const std::uint32_t a = y > 0 ? rows[x][y - 1] : 0, b = x > 0 ? rows[x - 1][y] : 0, c = x > 0 && y > 0 ? rows[x - 1][y - 1] : 0;
+  return (a & b) | (~c & (a ^ b));
 }
 
-bool is_covered(CoveredGroups covered, int x, int y, int z) {
-  return (covered >> ((x / 4 * 4 + y / 4) * 4 + z / 4) & 1) != 0;
-}
-
-std::size_t edge_of(std::size_t sample, CellEdge edge) {
-  const std::size_t corner = sample + ((edge.corner & 4) ? kStride[0] : 0) + ((edge.corner & 2) ? kStride[1] : 0) +
-                             ((edge.corner & 1) ? kStride[2] : 0);
-  return 3 * corner + edge.axis;
-}
-
-// Calls visit(first sample, case) for every cell that is drawn and crossed, in the order of samples.
-template <class Visit>
-void for_crossed_cells(const Signs& solid, CoveredGroups covered, Visit visit) {
-  for (int x = 0; x < kBlockCells; ++x)
-    for (int y = 0; y < kBlockCells; ++y)
-      for (int z = 0; z < kBlockCells; ++z) {
-        const std::size_t s = sample_index(x, y, z);
-        int cell = 0;
-        for (int i = 0; i < 8; ++i)
-          cell |= solid[s + ((i & 4) ? kStride[0] : 0) + ((i & 2) ? kStride[1] : 0) + ((i & 1) ? kStride[2] : 0)] << i;
-        if (cell == 0 || cell == 255 || is_covered(covered, x, y, z)) continue;
-        visit(s, cell);
+void write_rows(const SolidRows& rows, std::vector<std::uint8_t>& out) {
+  unsigned same = 0;
+  const auto flush = [&] {
+    if (same > 0) out.push_back(static_cast<std::uint8_t>(same - 1));
+    same = 0;
+  };
+  for (std::size_t x = 0; x < kN; ++x)
+    for (std::size_t y = 0; y < kN; ++y) {
+      const std::uint32_t difference = rows[x][y] ^ expected_row(rows, x, y);
+      if (difference == 0) {
+        if (++same == kSameRows) flush();
+        continue;
       }
+      flush();
+      const auto start = static_cast<unsigned>(std::countr_zero(difference));
+      const std::uint32_t run = difference >> start;
+      if ((run & (run + 1)) == 0 && std::bit_width(run) <= static_cast<int>(kDifferenceLengths)) {
+        out.push_back(static_cast<std::uint8_t>(kSameRows + (static_cast<unsigned>(std::bit_width(run)) - 1) * kN + start));
+      } else {
+        for (const std::uint32_t byte : {kRawRow, difference & 255u, difference >> 8 & 255u, difference >> 16})
+          out.push_back(static_cast<std::uint8_t>(byte));
+      }
+    }
+  flush();
 }
 
-// Edges that carry a vertex, ascending: this order names the vertices on both sides of the wire.
-std::vector<std::uint32_t> vertex_edges(const Signs& solid, CoveredGroups covered) {
-  const MarchingCubesTable& table = marching_cubes_table();
-  std::vector<bool> used(kEdges, false);
-  for_crossed_cells(solid, covered, [&](std::size_t s, int cell) {
-    for (const auto& triangle : table.triangles[static_cast<std::size_t>(cell)])
-      for (const std::uint8_t e : triangle) used[edge_of(s, table.edges[e])] = true;
-  });
-  std::vector<std::uint32_t> edges;
-  for (std::size_t e = 0; e < kEdges; ++e)
-    if (used[e]) edges.push_back(static_cast<std::uint32_t>(e));
-  return edges;
+// Takes bytes from the front; false where they are not what write_rows() writes.
+bool read_rows(std::span<const std::uint8_t>& bytes, SolidRows& rows) {
+  constexpr std::uint32_t kRow = (1u << kN) - 1;
+  unsigned same = 0;
+  const auto take = [&]() -> unsigned {
+    const unsigned byte = bytes.front();
+    bytes = bytes.subspan(1);
+    return byte;
+  };
+  for (std::size_t x = 0; x < kN; ++x)
+    for (std::size_t y = 0; y < kN; ++y) {
+      std::uint32_t difference = 0;
+      if (same > 0) {
+        --same;
+      } else {
+        if (bytes.empty()) return false;
+        const unsigned byte = take();
+        if (byte < kSameRows) {
+          same = byte;
+        } else if (byte < kSameRows + kDifferenceLengths * kN) {
+          const unsigned length = (byte - kSameRows) / kN + 1, start = (byte - kSameRows) % kN;
+          difference = ((1u << length) - 1) << start;
+        } else {
+          if (byte != kRawRow || bytes.size() < 3) return false;
+          difference = take();
+          difference |= take() << 8;
+          difference |= take() << 16;
+        }
+        if (difference > kRow) return false;
+      }
+      rows[x][y] = (difference ^ expected_row(rows, x, y)) & kRow;
+    }
+  return same == 0;
+}
+
+void write_seams(const Seams& seams, std::vector<std::uint8_t>& out) {
+  std::uint64_t where = 0;
+  for (std::size_t i = 0; i < seams.coarser.size(); ++i)
+    if (seams.coarser[i] != 0) where |= std::uint64_t{1} << i;
+  for (int i = 0; i < 8; ++i) out.push_back(static_cast<std::uint8_t>(where >> (8 * i)));
+  bool half = false;
+  for (const std::uint8_t steps : seams.coarser) {
+    if (steps == 0) continue;
+    if (half)
+      out.back() = static_cast<std::uint8_t>(out.back() | steps << 4);
+    else
+      out.push_back(steps);
+    half = !half;
+  }
+}
+
+// A coarse face as large as the block has one neighbour, or its quarters would not agree on it.
+bool whole_faces(const Seams& seams) {
+  const SeamRule rule(seams);
+  for (int axis = 0; axis < 3; ++axis)
+    for (const int side : {0, 4}) {
+      int largest = 0;
+      for (int i = 0; i < 4; ++i) {
+        std::array<int, 3> place{};
+        place[static_cast<std::size_t>(axis)] = side;
+        place[static_cast<std::size_t>((axis + 1) % 3)] = 1 + 2 * (i / 2);
+        place[static_cast<std::size_t>((axis + 2) % 3)] = 1 + 2 * (i % 2);
+        largest += rule.steps(place[0], place[1], place[2]) == kSeamSteps;
+      }
+      if (largest != 0 && largest != 4) return false;
+    }
+  return true;
+}
+
+bool read_seams(std::span<const std::uint8_t>& bytes, Seams& seams) {
+  if (bytes.size() < 8) return false;
+  std::uint64_t where = 0;
+  for (std::size_t i = 0; i < 8; ++i) where |= std::uint64_t{bytes[i]} << (8 * i);
+  bytes = bytes.subspan(8);
+  const auto count = static_cast<std::size_t>(std::popcount(where));
+  if (bytes.size() < (count + 1) / 2) return false;
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < seams.coarser.size(); ++i) {
+    if ((where >> i & 1) == 0) continue;
+    const unsigned steps = bytes[n / 2] >> (n % 2 * 4) & 15u;
+    ++n;
+    const std::size_t x = i / 16, y = i / 4 % 4, z = i % 4;
+    const bool inner = (x == 1 || x == 2) && (y == 1 || y == 2) && (z == 1 || z == 2);
+    if (inner || steps == 0 || steps > kSeamSteps) return false;
+    seams.coarser[i] = static_cast<std::uint8_t>(steps);
+  }
+  bytes = bytes.subspan((count + 1) / 2);
+  return whole_faces(seams);
 }
 
 // Unit vectors on the octahedron unfolded into a square (Meyer et al., On floating-point normal vectors, 2010).
@@ -74,7 +156,7 @@ std::array<std::uint8_t, 2> encode_normal(std::array<float, 3> n) {
     v = (1.0f - std::abs(u)) * (v < 0.0f ? -1.0f : 1.0f);
     u = folded;
   }
-  const auto byte = [](float t) { return static_cast<std::uint8_t>(std::lround((t * 0.5f + 0.5f) * 255.0f)); };
+  const auto byte = [](float t) { return static_cast<std::uint8_t>((t * 0.5f + 0.5f) * 255.0f + 0.5f); };
   return {byte(u), byte(v)};
 }
 
@@ -90,24 +172,191 @@ std::array<float, 3> decode_normal(std::uint8_t a, std::uint8_t b) {
   return {u / length, v / length, w / length};
 }
 
-// The block's own samples within the gathered ones, which have one more on every side.
-struct Apron {
-  std::span<const float> values;
-  static constexpr std::size_t kRow = kBlockApron, kSlab = static_cast<std::size_t>(kBlockApron) * kBlockApron;
-  static std::size_t at(std::size_t sample) {
-    const std::size_t x = sample / kStride[0], y = sample / kStride[1] % kN, z = sample % kN;
-    return (x + 1) * kSlab + (y + 1) * kRow + z + 1;
-  }
-  [[nodiscard]] std::array<float, 3> gradient(std::size_t i) const {
-    return {values[i + kSlab] - values[i - kSlab], values[i + kRow] - values[i - kRow], values[i + 1] - values[i - 1]};
-  }
+// Which of the 17 samples of a row are solid; reads nothing after them.
+std::uint32_t solid_bits(const float* row) {
+  std::uint32_t bits = row[16] < 0.0f ? 1u << 16 : 0u;
+#if defined(__SSE2__)
+  const __m128 zero = _mm_setzero_ps();
+  for (int i = 0; i < 4; ++i)
+    bits |= static_cast<std::uint32_t>(_mm_movemask_ps(_mm_cmplt_ps(_mm_loadu_ps(row + 4 * i), zero))) << (4 * i);
+#else
+  for (int i = 0; i < 16; ++i) bits |= (row[i] < 0.0f ? 1u : 0u) << i;
+#endif
+  return bits;
+}
+
+constexpr std::size_t kSlab = static_cast<std::size_t>(kBlockApron) * kBlockApron, kRow = kBlockApron;
+constexpr std::array<std::size_t, 3> kNeighbour{kSlab, kRow, 1};
+
+std::size_t gathered(std::size_t x, std::size_t y, std::size_t z) { return (x + 1) * kSlab + (y + 1) * kRow + z + 1; }
+
+std::array<float, 3> gradient_between(const float* a, const float* b, float t, std::size_t slab, std::size_t row) {
+  const auto axis = [&](std::size_t n) {
+    const float at_a = a[n] - *(a - n), at_b = b[n] - *(b - n);
+    return at_a + t * (at_b - at_a);
+  };
+  return {axis(slab), axis(row), axis(1)};
+}
+
+struct Vertex {
+  int place = 0;  // along its edge, 252ths
+  std::array<float, 3> gradient{};
+  bool cut = false;
 };
 
-Signs unpack_signs(std::span<const std::uint8_t> bytes) {
-  Signs solid;
-  for (std::size_t i = 0; i < kSamples; ++i) solid[i] = bytes[i / 8] >> (i % 8) & 1;
-  return solid;
+// The field around one block, its contour, and the vertices on it.
+class Mesher {
+ public:
+  // False where the block has no surface.
+  bool begin(const BlockSamples& samples) { return begin(samples, samples.solid_mm, samples.surface_mm, samples.covered, samples.seams); }
+
+  bool begin(const BlockSamples& samples, std::span<const float> solid, std::span<const float> surface, CoveredGroups covered,
+             const Seams& seams) {
+    if (covered == kWhollyCovered) return false;
+    OSTEON_CHECK(solid.size() == kGathered && surface.size() == kGathered);
+    samples_ = &samples;
+    raw_ = field_ = solid.data();
+    surface_ = surface.data();
+    rule_ = SeamRule(seams);
+    if (rule_.any()) {
+      std::ranges::copy(solid, ruled_.begin());
+      take_coarse_contour(rule_, ruled_);
+      field_ = ruled_.data();
+    }
+    std::uint32_t any = 0, all = ~0u;
+    for (std::size_t x = 0; x < kN; ++x)
+      for (std::size_t y = 0; y < kN; ++y) {
+        const std::uint32_t row = solid_bits(field_ + gathered(x, y, 0));
+        rows_[x][y] = row;
+        any |= row;
+        all &= row;
+      }
+    if (any == 0 || all == (1u << kN) - 1) return false;
+    contour_.build(rows_, covered, rule_);
+    return !contour_.vertex_edges().empty();
+  }
+
+  [[nodiscard]] const SolidRows& rows() const { return rows_; }
+  [[nodiscard]] const Contour& contour() const { return contour_; }
+
+  // visit(number, x, y, z, axis, vertex) for every vertex in order.
+  template <class Visit>
+  void for_vertices(double level_pitch_mm, Visit visit) const {
+    const auto edges = contour_.vertex_edges();
+    // On the imported surface S is zero up to the rounding of the vertex's place.
+    const float below_surface = -static_cast<float>(level_pitch_mm) / 32.0f;
+    for (std::size_t v = 0; v < edges.size(); ++v) {
+      const unsigned axis = edges[v] / kBlockSampleCount, sample = edges[v] % kBlockSampleCount;
+      const unsigned x = sample / (kN * kN), y = sample / kN % kN, z = sample % kN;
+      Vertex vertex;
+      if (!rule_.any() || !on_coarse_edge({static_cast<int>(x), static_cast<int>(y), static_cast<int>(z)}, axis, below_surface, vertex)) {
+        const std::size_t a = gathered(x, y, z), b = a + kNeighbour[axis];
+        const float t = field_[a] / (field_[a] - field_[b]);
+        vertex.place = edge_place(field_[a], field_[b]);
+        vertex.gradient = gradient_between(raw_ + a, raw_ + b, t, kSlab, kRow);
+        vertex.cut = surface_[a] + t * (surface_[b] - surface_[a]) < below_surface;
+      }
+      visit(v, x, y, z, axis, vertex);
+    }
+  }
+
+ private:
+  // The vertex that the ruling level has on the coarse edge that this edge is a piece of.
+  bool on_coarse_edge(const std::array<int, 3>& at, unsigned axis, float below_surface, Vertex& vertex) const {
+    std::array<int, 3> place;
+    for (unsigned k = 0; k < 3; ++k) place[k] = k == axis ? SeamRule::of_cell(at[k]) : SeamRule::of_sample(at[k]);
+    const int steps = rule_.steps(place[0], place[1], place[2]);
+    if (steps == 0) return false;
+    const int cells = 1 << steps;
+    std::array<int, 3> from = at;
+    from[axis] = at[axis] / cells * cells;
+    for (const int c : from)
+      if (c % cells != 0) return false;
+    const std::size_t a = gathered(static_cast<std::size_t>(from[0]), static_cast<std::size_t>(from[1]), static_cast<std::size_t>(from[2]));
+    const std::size_t b = a + static_cast<std::size_t>(cells) * kNeighbour[axis];
+    const float fa = field_[a], fb = field_[b];
+    if ((fa < 0.0f) == (fb < 0.0f)) return false;
+    const float t = fa / (fa - fb);
+    vertex.place = std::clamp(cells * edge_place(fa, fb) - kEdgePlaces * (at[axis] - from[axis]), 0, kEdgePlaces);
+    vertex.cut = surface_[a] + t * (surface_[b] - surface_[a]) < static_cast<float>(cells) * below_surface;
+    // The coarse level's own gradient, as its block has it.
+    const std::vector<float>& coarse = samples_->coarse_mm[static_cast<std::size_t>(steps - 1)];
+    const auto side = static_cast<std::size_t>(kBlockCells / cells + 3);
+    OSTEON_CHECK(coarse.size() == side * side * side);
+    const std::array<std::size_t, 3> stride{side * side, side, 1};
+    std::size_t c = 0;
+    for (unsigned k = 0; k < 3; ++k) c += static_cast<std::size_t>(from[k] / cells + 1) * stride[k];
+    vertex.gradient = gradient_between(coarse.data() + c, coarse.data() + c + stride[axis], t, stride[0], stride[1]);
+    return true;
+  }
+
+  const BlockSamples* samples_ = nullptr;
+  const float* raw_ = nullptr;      // as gathered
+  const float* field_ = nullptr;    // with the seams' contour
+  const float* surface_ = nullptr;
+  SeamRule rule_{Seams{}};
+  SolidRows rows_{};
+  std::array<float, kGathered> ruled_;
+  Contour contour_;
+};
+
+// One for each thread: making a block allocates nothing but its result.
+Mesher& mesher() {
+  static thread_local Mesher one;
+  return one;
 }
+
+BlockPayload encode(Mesher& at, CoveredGroups covered, const Seams& seams, double level_pitch_mm) {
+  BlockPayload payload;
+  std::vector<std::uint8_t>& bytes = payload.bytes;
+  const std::size_t count = at.contour().vertex_edges().size();
+  bytes.reserve(512 + 4 * count);
+  const bool has_seams = seams.most() > 0;
+  bytes.push_back(static_cast<std::uint8_t>((covered != 0 ? kHasCovered : 0) | (has_seams ? kHasSeams : 0)));
+  if (covered != 0)
+    for (std::size_t i = 0; i < sizeof covered; ++i) bytes.push_back(static_cast<std::uint8_t>(covered >> (8 * i)));
+  if (has_seams) write_seams(seams, bytes);
+  write_rows(at.rows(), bytes);
+
+  const std::size_t first = bytes.size(), cut_bytes = (count + 7) / 8;
+  bytes.resize(first + 3 * count + cut_bytes);
+  std::uint8_t* places = bytes.data() + first;
+  std::uint8_t* normals = places + count;
+  std::uint8_t* cuts = normals + 2 * count;
+  std::size_t cut = 0;
+  at.for_vertices(level_pitch_mm, [&](std::size_t v, unsigned, unsigned, unsigned, unsigned, const Vertex& vertex) {
+    places[v] = static_cast<std::uint8_t>(vertex.place);
+    const auto normal = encode_normal(vertex.gradient);
+    normals[2 * v] = normal[0];
+    normals[2 * v + 1] = normal[1];
+    if (vertex.cut) cuts[v / 8] = static_cast<std::uint8_t>(cuts[v / 8] | 1 << (v % 8));
+    cut += vertex.cut;
+  });
+  if (cut == 0 || cut == count)
+    bytes.resize(bytes.size() - cut_bytes);
+  bytes[0] = static_cast<std::uint8_t>(bytes[0] | (cut == 0 ? 0 : cut == count ? kAllCut : kSomeCut));
+  return payload;
+}
+
+// Where a vertex lies, from global integers, so that blocks of all levels place one that they share on the same bits.
+class Places {
+ public:
+  Places(const BlockKey& key, double level_pitch_mm) : unit_mm_(level_pitch_mm / kEdgePlaces) {
+    const std::array<std::int32_t, 3> index{key.index.x, key.index.y, key.index.z};
+    for (std::size_t k = 0; k < 3; ++k) first_[k] = std::int64_t{index[k]} * kBlockCells * kEdgePlaces;
+  }
+  [[nodiscard]] std::array<float, 3> at(unsigned x, unsigned y, unsigned z, unsigned axis, int place) const {
+    std::array<std::int64_t, 3> whole{first_[0] + std::int64_t{x} * kEdgePlaces, first_[1] + std::int64_t{y} * kEdgePlaces,
+                                      first_[2] + std::int64_t{z} * kEdgePlaces};
+    whole[axis] += place;
+    return {static_cast<float>(static_cast<double>(whole[0]) * unit_mm_), static_cast<float>(static_cast<double>(whole[1]) * unit_mm_),
+            static_cast<float>(static_cast<double>(whole[2]) * unit_mm_)};
+  }
+
+ private:
+  std::array<std::int64_t, 3> first_;
+  double unit_mm_;
+};
 
 }  // namespace
 
@@ -116,91 +365,86 @@ CoordBox block_samples(const BlockKey& key) {
   return {first - Coord{1, 1, 1}, first + Coord{kBlockCells + 1, kBlockCells + 1, kBlockCells + 1}};
 }
 
+CoordBox coarse_samples(const BlockKey& key, int steps) {
+  const Coord first = shift_down(kBlockCells * key.index, steps);
+  const std::int32_t cells = kBlockCells >> steps;
+  return {first - Coord{1, 1, 1}, first + Coord{cells + 1, cells + 1, cells + 1}};
+}
+
+BlockPayload encode_block(const BlockSamples& samples) {
+  Mesher& at = mesher();
+  return at.begin(samples) ? encode(at, samples.covered, samples.seams, samples.level_pitch_mm) : BlockPayload{};
+}
+
 BlockPayload encode_block(std::span<const float> solid_mm, std::span<const float> surface_mm, CoveredGroups covered,
                           double level_pitch_mm) {
-  constexpr std::size_t kGathered = Apron::kSlab * kBlockApron;
-  OSTEON_CHECK(solid_mm.size() == kGathered && surface_mm.size() == kGathered);
-  const Apron f{solid_mm};
-  Signs solid;
-  bool any = false, all = true;
-  for (std::size_t i = 0; i < kSamples; ++i) {
-    solid[i] = solid_mm[Apron::at(i)] < 0.0f;
-    any |= solid[i] != 0;
-    all &= solid[i] != 0;
-  }
-  if (!any || all) return {};
-  const std::vector<std::uint32_t> edges = vertex_edges(solid, covered);
-  if (edges.empty()) return {};
+  const BlockSamples no_seams;
+  Mesher& at = mesher();
+  return at.begin(no_seams, solid_mm, surface_mm, covered, {}) ? encode(at, covered, {}, level_pitch_mm) : BlockPayload{};
+}
 
-  const std::size_t count = edges.size();
-  BlockPayload payload;
-  payload.bytes.assign(kSignBytes + kCoveredBytes + 3 * count + (count + 7) / 8, 0);
-  std::uint8_t* out = payload.bytes.data();
-  for (std::size_t i = 0; i < kSamples; ++i) out[i / 8] = static_cast<std::uint8_t>(out[i / 8] | solid[i] << (i % 8));
-  out += kSignBytes;
-  for (std::size_t i = 0; i < kCoveredBytes; ++i) out[i] = static_cast<std::uint8_t>(covered >> (8 * i));
-  std::uint8_t* places = out + kCoveredBytes;
-  std::uint8_t* normals = places + count;
-  std::uint8_t* cuts = normals + 2 * count;
-
-  constexpr std::size_t kNeighbour[3] = {Apron::kSlab, Apron::kRow, 1};
-  // On the imported surface S is zero up to the rounding of the vertex's place.
-  const float below_surface = -static_cast<float>(level_pitch_mm) / 32.0f;
-  for (std::size_t v = 0; v < count; ++v) {
-    const std::size_t a = Apron::at(edges[v] / 3), b = a + kNeighbour[edges[v] % 3];
-    const float t = solid_mm[a] / (solid_mm[a] - solid_mm[b]);
-    places[v] = static_cast<std::uint8_t>(std::lround(t * kEdgeSteps));
-    const auto ga = f.gradient(a), gb = f.gradient(b);
-    const auto normal = encode_normal({ga[0] + t * (gb[0] - ga[0]), ga[1] + t * (gb[1] - ga[1]), ga[2] + t * (gb[2] - ga[2])});
-    normals[2 * v] = normal[0];
-    normals[2 * v + 1] = normal[1];
-    const float s = surface_mm[a] + t * (surface_mm[b] - surface_mm[a]);
-    if (s < below_surface) cuts[v / 8] = static_cast<std::uint8_t>(cuts[v / 8] | 1 << (v % 8));
-  }
-  return payload;
+void mesh_block(const BlockSamples& samples, Mesh& mesh) {
+  Mesher& at = mesher();
+  const bool any = at.begin(samples);
+  const std::size_t count = any ? at.contour().vertex_edges().size() : 0;
+  mesh.positions_mm.resize(count);
+  mesh.normals.resize(count);
+  mesh.cut_face.resize(count);
+  mesh.triangles.clear();
+  if (!any) return;
+  const Places places(samples.key, samples.level_pitch_mm);
+  at.for_vertices(samples.level_pitch_mm, [&](std::size_t v, unsigned x, unsigned y, unsigned z, unsigned axis, const Vertex& vertex) {
+    mesh.positions_mm[v] = places.at(x, y, z, axis, vertex.place);
+    const auto& g = vertex.gradient;
+    const float squared = g[0] * g[0] + g[1] * g[1] + g[2] * g[2], scale = squared > 0.0f ? 1.0f / std::sqrt(squared) : 0.0f;
+    mesh.normals[v] = {g[0] * scale, g[1] * scale, squared > 0.0f ? g[2] * scale : 1.0f};
+    mesh.cut_face[v] = vertex.cut;
+  });
+  mesh.triangles.reserve(2 * count + 64);
+  at.contour().for_triangles([&](std::uint32_t a, std::uint32_t b, std::uint32_t c) { mesh.triangles.push_back({a, b, c}); });
 }
 
 Result<Mesh> decode_block(const BlockKey& key, const BlockPayload& payload, double level_pitch_mm) {
   Mesh mesh;
   if (payload.bytes.empty()) return mesh;
-  const std::span bytes(payload.bytes);
-  if (bytes.size() < kSignBytes + kCoveredBytes)
-    return failure(ErrorCode::invalid_input, "a mesh block of " + std::to_string(bytes.size()) + " bytes is too short");
-  const Signs solid = unpack_signs(bytes);
+  std::span<const std::uint8_t> bytes(payload.bytes);
+  const auto broken = [&](const std::string& why) {
+    return failure(ErrorCode::invalid_input, "a mesh block of " + std::to_string(payload.bytes.size()) + " bytes " + why);
+  };
+  const unsigned flags = bytes.front();
+  bytes = bytes.subspan(1);
+  if (flags > kFlags || (flags & (kAllCut | kSomeCut)) == (kAllCut | kSomeCut)) return broken("has flags that mean nothing");
   CoveredGroups covered = 0;
-  for (std::size_t i = 0; i < kCoveredBytes; ++i) covered |= CoveredGroups{bytes[kSignBytes + i]} << (8 * i);
-  const std::vector<std::uint32_t> edges = vertex_edges(solid, covered);
+  if (flags & kHasCovered) {
+    if (bytes.size() < sizeof covered) return broken("ends before its covered groups");
+    for (std::size_t i = 0; i < sizeof covered; ++i) covered |= CoveredGroups{bytes[i]} << (8 * i);
+    bytes = bytes.subspan(sizeof covered);
+  }
+  Seams seams;
+  if ((flags & kHasSeams) && !read_seams(bytes, seams)) return broken("has seams that cannot be");
+  SolidRows rows;
+  if (!read_rows(bytes, rows)) return broken("has broken solid bits");
+  thread_local Contour contour;
+  contour.build(rows, covered, SeamRule(seams));
+  const auto edges = contour.vertex_edges();
   const std::size_t count = edges.size();
-  if (bytes.size() != kSignBytes + kCoveredBytes + 3 * count + (count + 7) / 8)
-    return failure(ErrorCode::invalid_input, "a mesh block of " + std::to_string(bytes.size()) + " bytes does not fit its " +
-                       std::to_string(count) + " vertices");
-  const auto places = bytes.subspan(kSignBytes + kCoveredBytes, count);
-  const auto normals = bytes.subspan(kSignBytes + kCoveredBytes + count, 2 * count);
-  const auto cuts = bytes.subspan(kSignBytes + kCoveredBytes + 3 * count);
+  const bool some_cut = (flags & kSomeCut) != 0;
+  if (bytes.size() != 3 * count + (some_cut ? (count + 7) / 8 : 0)) return broken("does not fit its " + std::to_string(count) + " vertices");
+  const auto place_bytes = bytes.first(count), normals = bytes.subspan(count, 2 * count), cuts = bytes.subspan(3 * count);
 
-  std::vector<std::uint32_t> vertex(kEdges);
   mesh.positions_mm.resize(count);
   mesh.normals.resize(count);
   mesh.cut_face.resize(count);
-  const Coord first = kBlockCells * key.index;
+  const Places places(key, level_pitch_mm);
   for (std::size_t v = 0; v < count; ++v) {
-    vertex[edges[v]] = static_cast<std::uint32_t>(v);
-    const std::size_t sample = edges[v] / 3;
-    // From global integers, so that two blocks place a vertex that they share on the same bits.
-    double place[3] = {static_cast<double>(first.x + static_cast<std::int32_t>(sample / kStride[0])),
-                       static_cast<double>(first.y + static_cast<std::int32_t>(sample / kStride[1] % kN)),
-                       static_cast<double>(first.z + static_cast<std::int32_t>(sample % kN))};
-    place[edges[v] % 3] += static_cast<double>(places[v]) / static_cast<double>(kEdgeSteps);
-    for (std::size_t k = 0; k < 3; ++k) mesh.positions_mm[v][k] = static_cast<float>(place[k] * level_pitch_mm);
+    if (place_bytes[v] > kEdgePlaces) return broken("has a vertex beyond its edge");
+    const unsigned axis = edges[v] / kBlockSampleCount, sample = edges[v] % kBlockSampleCount;
+    mesh.positions_mm[v] = places.at(sample / (kN * kN), sample / kN % kN, sample % kN, axis, place_bytes[v]);
     mesh.normals[v] = decode_normal(normals[2 * v], normals[2 * v + 1]);
-    mesh.cut_face[v] = cuts[v / 8] >> (v % 8) & 1;
+    mesh.cut_face[v] = some_cut ? cuts[v / 8] >> (v % 8) & 1 : (flags & kAllCut) != 0;
   }
-  const MarchingCubesTable& table = marching_cubes_table();
-  for_crossed_cells(solid, covered, [&](std::size_t s, int cell) {
-    for (const auto& t : table.triangles[static_cast<std::size_t>(cell)])
-      mesh.triangles.push_back({vertex[edge_of(s, table.edges[t[0]])], vertex[edge_of(s, table.edges[t[1]])],
-                                vertex[edge_of(s, table.edges[t[2]])]});
-  });
+  mesh.triangles.reserve(2 * count);
+  contour.for_triangles([&](std::uint32_t a, std::uint32_t b, std::uint32_t c) { mesh.triangles.push_back({a, b, c}); });
   return mesh;
 }
 

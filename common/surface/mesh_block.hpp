@@ -17,11 +17,13 @@ namespace osteon {
 inline constexpr int kBlockCells = 16;                  // cells along a block's edge: 2 leaves
 inline constexpr int kBlockSamples = kBlockCells + 1;   // samples along it
 inline constexpr int kBlockApron = kBlockCells + 3;     // with one more on every side, for normals
+inline constexpr int kCoarsestLevel = -2;               // pitch 4 h, for what is far away
+inline constexpr int kSeamSteps = kLevels - 1 - kCoarsestLevel;  // levels between the finest and the coarsest
 
 struct BlockKey {
   BodyId body;
-  int level = 0;
-  Coord index;  // the block's first sample is index · 16, at that level
+  int level = 0;  // kCoarsestLevel to kLevels - 1
+  Coord index;    // the block's first sample is index · 16, at that level
   friend auto operator<=>(const BlockKey&, const BlockKey&) = default;
 };
 
@@ -38,6 +40,29 @@ struct Mesh {
 
 // Cells of a coarse block that a finer level draws: one bit for each of 4³ groups of 4³ cells, (x·4 + y)·4 + z.
 using CoveredGroups = std::uint64_t;
+inline constexpr CoveredGroups kWhollyCovered = ~CoveredGroups{0};
+
+// By how many levels what lies around a block is drawn coarser than the block, in half blocks: 4³ of them,
+// (x·4 + y)·4 + z, of which the inner 2³ are the block itself and stay 0. Finer or equal surroundings are 0.
+struct Seams {
+  std::array<std::uint8_t, 64> coarser{};
+  [[nodiscard]] int most() const;  // 0: no seam
+  friend bool operator==(const Seams&, const Seams&) = default;
+};
+
+// What a block is made from: a copy, so that it is made while the bone goes on changing.
+struct BlockSamples {
+  BlockKey key;
+  double level_pitch_mm = 0;
+  std::vector<float> solid_mm;     // f on block_samples(key), negative where bone is left
+  std::vector<float> surface_mm;   // S on the same samples: a vertex below the imported surface lies on a cut face
+  CoveredGroups covered = 0;       // kWhollyCovered: the block is not drawn, and nothing else here is read
+  Seams seams;
+  // For each number of levels that seams has: f on coarse_samples(key, steps), for the normals on that seam.
+  std::array<std::vector<float>, kSeamSteps> coarse_mm;
+};
+// The samples of a level `steps` coarser that lie on the block, and one more on every side.
+[[nodiscard]] CoordBox coarse_samples(const BlockKey& key, int steps);
 
 // The canonical bytes of one block. From them `decode` rebuilds the same mesh everywhere.
 struct BlockPayload {
@@ -45,13 +70,18 @@ struct BlockPayload {
   friend bool operator==(const BlockPayload&, const BlockPayload&) = default;
 };
 
-// Marching cubes on `solid_mm` (kBlockApron³ samples, z fastest, negative inside), leaving out covered cells.
-// `surface_mm` is S on the same samples: a vertex below the imported surface lies on a cut face. Vertex places are
-// quantised along their edges, so neighbouring blocks of one level meet bit for bit.
+// Marching cubes, leaving out covered cells. Vertex places are quantised along their edges, so neighbouring blocks of one
+// level meet bit for bit; on a seam the finer block takes the coarser one's contour, so they do as well.
+[[nodiscard]] BlockPayload encode_block(const BlockSamples& samples);
+// The same for a block without seams.
 [[nodiscard]] BlockPayload encode_block(std::span<const float> solid_mm, std::span<const float> surface_mm,
                                         CoveredGroups covered, double level_pitch_mm);
 // Error invalid_input: bytes that no encoder wrote.
 [[nodiscard]] Result<Mesh> decode_block(const BlockKey& key, const BlockPayload& payload, double level_pitch_mm);
+// The mesh without a payload between: as decode_block(encode_block()), but for normals that are not quantised. Reuses
+// what `mesh` has room for.
+void mesh_block(const BlockSamples& samples, Mesh& mesh);
+
 // The payload's digest, by which viewers check what they hold.
 [[nodiscard]] Digest mesh_hash(const BlockPayload& payload);
 // One name for a whole surface: over the mesh hashes of its blocks that are not empty, in the order of their keys.

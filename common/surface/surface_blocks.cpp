@@ -1,19 +1,31 @@
 #include "common/surface/surface_blocks.hpp"
 
 #include <algorithm>
+#include <map>
+#include <set>
+
+#include "common/core/check.hpp"
 
 namespace osteon {
 namespace {
 
-std::int32_t floor_div(std::int32_t a, std::int32_t b) { return a >= 0 ? a / b : -((-a + b - 1) / b); }
+constexpr int kFinest = kLevels - 1;
+static_assert(kBlockCells == 1 << 4 && kFinest == 2 && kCoarsestLevel == -2);
 
-// Blocks of a level whose samples, apron included, meet a box of that level's samples.
-CoordBox blocks_around(const CoordBox& samples) {
-  // Block b has the samples from 16 b − 1 to 16 b + 17.
-  const auto first = [](std::int32_t lowest) { return floor_div(lowest - 2, kBlockCells); };
-  const auto last = [](std::int32_t highest) { return floor_div(highest + 1, kBlockCells); };
-  return {{first(samples.min.x), first(samples.min.y), first(samples.min.z)},
-          {last(samples.max.x), last(samples.max.y), last(samples.max.z)}};
+Coord shift_up(Coord c, int shift) { return (1 << shift) * c; }
+Coord at_shift(Coord c, int up) { return up >= 0 ? shift_up(c, up) : shift_down(c, -up); }
+
+template <class Visit>
+void for_each(const CoordBox& box, Visit visit) {
+  for (std::int32_t x = box.min.x; x <= box.max.x; ++x)
+    for (std::int32_t y = box.min.y; y <= box.max.y; ++y)
+      for (std::int32_t z = box.min.z; z <= box.max.z; ++z) visit(Coord{x, y, z});
+}
+
+// Blocks of a level that read samples of a box of that level: block b reads from 16 b − reach to 16 b + 16 + reach.
+CoordBox readers(const CoordBox& samples, std::int32_t reach) {
+  const Coord below{reach + 1, reach + 1, reach + 1}, above{reach, reach, reach};
+  return {shift_down(samples.min - below, 4), shift_down(samples.max + above, 4)};
 }
 
 // The box of samples of `to` that covers a box of samples of `from`.
@@ -23,39 +35,185 @@ CoordBox at_level(const CoordBox& box, int from, int to) {
   return {fine * box.min - Coord{fine, fine, fine}, fine * box.max + Coord{fine, fine, fine}};
 }
 
+double distance_mm(const Box& box, const Vec3& point) {
+  return (point - point.cwiseMax(box.min_mm).cwiseMin(box.max_mm)).norm();
+}
+
 }  // namespace
+
+int SurfaceBlocks::base_level(Coord block) const {
+  for (int level = kCoarsestLevel; level < 0; ++level) {
+    const Indices& drawn = coarse_[static_cast<std::size_t>(-1 - level)];
+    if (!drawn.empty() && drawn.contains(shift_down(block, -level))) return level;
+  }
+  return 0;
+}
+
+int SurfaceBlocks::level_at(Coord finest) const {
+  if (const int base = base_level(shift_down(finest, kFinest)); base < 0) return base;
+  for (int level = kFinest; level > 0; --level)
+    if (cut_at(level, shift_down(finest, kFinest - level))) return level;
+  return 0;
+}
+
+bool SurfaceBlocks::drawn(const BlockKey& key) const {
+  if (key.level < 0) return coarse_at(key.level, key.index);
+  return base_level(shift_down(key.index, key.level)) == 0 && (key.level == 0 || cut_at(key.level, key.index));
+}
+
+CoveredGroups SurfaceBlocks::covered(const BlockKey& key) const {
+  if (!drawn(key)) return kWhollyCovered;
+  CoveredGroups groups = 0;
+  if (key.level < 0) return groups;
+  for (int finer = key.level + 1; finer < kLevels; ++finer) {
+    if (fine_[static_cast<std::size_t>(finer - 1)].empty()) continue;
+    // A block one level finer covers 2³ groups of 4³ cells, one two levels finer a single one.
+    const int shift = finer - key.level;
+    const std::int32_t blocks = 1 << shift, wide = 4 / blocks;
+    const Coord first = shift_up(key.index, shift);
+    for_each({{0, 0, 0}, {blocks - 1, blocks - 1, blocks - 1}}, [&](Coord at) {
+      if (!cut_at(finer, first + at)) return;
+      for_each({wide * at, wide * at + Coord{wide - 1, wide - 1, wide - 1}},
+               [&](Coord g) { groups |= CoveredGroups{1} << ((g.x * 4 + g.y) * 4 + g.z); });
+    });
+  }
+  return groups;
+}
+
+Seams SurfaceBlocks::seams(const BlockKey& key) const {
+  Seams seams;
+  const bool no_coarse = std::ranges::all_of(coarse_, [](const Indices& drawn) { return drawn.empty(); });
+  if (key.level == kCoarsestLevel || (key.level <= 0 && no_coarse)) return seams;
+  // At the finest level both halves of a neighbour are one block.
+  const int wide = key.level == kFinest ? 2 : 1;
+  const auto around = [&](int i) { return wide == 2 ? (i == 0 ? -1 : i == 3 ? 1 : 0) : i - 1; };
+  for (int x = 0; x < 4; ++x)
+    for (int y = 0; y < 4; ++y)
+      for (int z = 0; z < 4; ++z) {
+        if ((x == 1 || x == 2) && (y == 1 || y == 2) && (z == 1 || z == 2)) continue;
+        std::uint8_t& steps = seams.coarser[static_cast<std::size_t>((x * 4 + y) * 4 + z)];
+        if (wide == 2 && (x == 2 || y == 2 || z == 2)) {
+          const auto other = [](int i) { return i == 2 ? 1 : i; };
+          steps = seams.coarser[static_cast<std::size_t>((other(x) * 4 + other(y)) * 4 + other(z))];
+          continue;
+        }
+        const Coord offset{around(x), around(y), around(z)};
+        const Coord finest = wide == 2 ? key.index + offset : at_shift(2 * key.index + offset, kFinest - 1 - key.level);
+        steps = static_cast<std::uint8_t>(std::max(0, key.level - level_at(finest)));
+      }
+  return seams;
+}
 
 std::vector<BlockKey> SurfaceBlocks::touch(int level, const std::vector<Coord>& changed_leaves) {
   std::set<BlockKey> stale;
-  for (const Coord origin : changed_leaves) {
-    const CoordBox leaf{origin, origin + Coord{kLeafSize - 1, kLeafSize - 1, kLeafSize - 1}};
-    for (int l = 0; l < kLevels; ++l) {
-      const CoordBox blocks = blocks_around(at_level(leaf, level, l));
-      for (std::int32_t x = blocks.min.x; x <= blocks.max.x; ++x)
-        for (std::int32_t y = blocks.min.y; y <= blocks.max.y; ++y)
-          for (std::int32_t z = blocks.min.z; z <= blocks.max.z; ++z) {
-            const BlockKey key{body_, l, {x, y, z}};
-            // At the cut's own level a block is drawn from now on. The coarser blocks from which it takes its cells have
-            // samples in this leaf as well, so they are named by the same rule: drawn, and its samples changed.
-            if (l == level && l > 0) fine_.insert(key);
-            if (l == 0 || fine_.contains(key)) stale.insert(key);
-          }
+  std::map<BlockKey, int> readers_over_seams;  // and the least reach with which they read a change
+  std::vector<Coord> fresh;
+  const bool any_coarse = std::ranges::any_of(coarse_, [](const Indices& drawn) { return !drawn.empty(); });
+  const auto box_of = [](Coord origin) { return CoordBox{origin, origin + Coord{kLeafSize - 1, kLeafSize - 1, kLeafSize - 1}}; };
+  if (level > 0)
+    for (const Coord origin : changed_leaves)
+      for_each(readers(box_of(origin), 1), [&](Coord index) {
+        if (fine_[static_cast<std::size_t>(level - 1)].insert(index).second) fresh.push_back(index);
+      });
+
+  for (const Coord origin : changed_leaves)
+    for (int l = any_coarse ? kCoarsestLevel : 0; l < kLevels; ++l) {
+      const CoordBox samples = at_level(box_of(origin), level, l);
+      const CoordBox near = readers(samples, 1);
+      for_each(near, [&](Coord index) {
+        if (const BlockKey key{body_, l, index}; drawn(key)) stale.insert(key);
+      });
+      // The normals on a seam come from the coarser level's samples, which reach further.
+      for (int steps = 1; steps <= (any_coarse ? l - kCoarsestLevel : l); ++steps)
+        for_each(readers(samples, 1 << steps), [&](Coord index) {
+          if (const BlockKey key{body_, l, index}; !near.contains(index) && drawn(key)) readers_over_seams.try_emplace(key, steps);
+        });
+    }
+  for (const auto& [key, steps] : readers_over_seams)
+    if (!stale.contains(key) && seams(key).most() >= steps) stale.insert(key);
+
+  // Where a block is drawn for the first time, the coarser ones give up their cells and the others change their seams.
+  for (const Coord index : fresh) {
+    for (int l = 0; l < level; ++l)
+      if (const BlockKey key{body_, l, shift_down(index, level - l)}; drawn(key)) stale.insert(key);
+    for (int l = 1; l < kLevels; ++l) {
+      const std::int32_t wide = l > level ? 1 << (l - level) : 1;
+      const Coord first = at_shift(index, l - level);
+      for_each({first - Coord{1, 1, 1}, first + Coord{wide, wide, wide}}, [&](Coord at) {
+        if (const BlockKey key{body_, l, at}; drawn(key)) stale.insert(key);
+      });
     }
   }
   return {stale.begin(), stale.end()};
 }
 
-CoveredGroups SurfaceBlocks::covered(const BlockKey& key) const {
-  CoveredGroups groups = 0;
-  for (int i = 0; i < 64; ++i) {
-    const Coord group = 4 * key.index + Coord{i >> 4, i >> 2 & 3, i & 3};
-    for (int finer = key.level + 1; finer < kLevels; ++finer) {
-      // A group of 4 cells of this level is 4 · 2^(finer − level) cells of the finer one: half a block or a whole.
-      const Coord index = finer == key.level + 1 ? shift_down(group, 1) : group;
-      if (fine_.contains({body_, finer, index})) groups |= CoveredGroups{1} << i;
-    }
+std::vector<BlockKey> SurfaceBlocks::focus(std::span<const Focus> focuses, const CoordBox& bone_samples, double pitch_mm) {
+  std::set<BlockKey> stale;
+  if (bone_samples.empty()) return {};
+  const auto near = [&](int level, Coord index, double Focus::*limit, bool is_finer) {
+    if (focuses.empty()) return true;
+    const double edge_mm = kBlockCells * level_pitch_mm(pitch_mm, level);
+    const Vec3 first_mm(index.x * edge_mm, index.y * edge_mm, index.z * edge_mm);
+    const Box box{first_mm, first_mm.array() + edge_mm};
+    return std::ranges::any_of(focuses, [&](const Focus& f) {
+      return distance_mm(box, f.position_mm) <= f.*limit * (is_finer ? kFocusHysteresis : 1.0);
+    });
+  };
+  // Cells reach one sample beyond the block, so a surface may lie in the block below the first sample.
+  const auto blocks_of_bone = [&](int level) {
+    return CoordBox{shift_down(bone_samples.min - Coord{1, 1, 1}, 4 - level), shift_down(bone_samples.max, 4 - level)};
+  };
+  Indices& halves = coarse_[0];
+  Indices& quarters = coarse_[1];
+  std::set<Coord> changed;  // blocks of level -1 whose level became another
+  for_each(blocks_of_bone(kCoarsestLevel), [&](Coord root) {
+    const bool was_quarter = quarters.contains(root);
+    const bool quarter = !near(kCoarsestLevel, root, &Focus::half_mm, !was_quarter);
+    for_each({2 * root, 2 * root + Coord{1, 1, 1}}, [&](Coord child) {
+      const bool was_half = halves.contains(child);
+      const bool half = !quarter && !near(-1, child, &Focus::full_mm, !was_quarter && !was_half);
+      if (quarter != was_quarter || half != was_half) changed.insert(child);
+      if (half) halves.insert(child);
+      else halves.erase(child);
+    });
+    if (quarter) quarters.insert(root);
+    else quarters.erase(root);
+  });
+  if (changed.empty()) return {};
+
+  // All blocks in what changed, and beside it those whose seams did.
+  std::set<Coord> around;
+  for (const Coord at : changed)
+    for_each({at - Coord{1, 1, 1}, at + Coord{1, 1, 1}}, [&](Coord c) { around.insert(c); });
+  const CoordBox full = blocks_of_bone(0), half = blocks_of_bone(-1);
+  for (const Coord at : around) {
+    const bool inside = changed.contains(at);
+    if (inside) stale.insert({body_, kCoarsestLevel, shift_down(at, 1)});
+    if (half.contains(at) && (inside || drawn({body_, -1, at}))) stale.insert({body_, -1, at});
+    for_each({2 * at, 2 * at + Coord{1, 1, 1}}, [&](Coord block) {
+      if (full.contains(block) && (inside || drawn({body_, 0, block}))) stale.insert({body_, 0, block});
+    });
   }
-  return groups;
+  for (int level = 1; level < kLevels; ++level)
+    for (const Coord index : fine_[static_cast<std::size_t>(level - 1)])
+      if (around.contains(shift_down(index, level + 1))) stale.insert({body_, level, index});
+  return {stale.begin(), stale.end()};
+}
+
+std::vector<BlockKey> SurfaceBlocks::fine_blocks() const {
+  std::vector<BlockKey> keys;
+  for (int level = 1; level < kLevels; ++level)
+    for (const Coord index : fine_[static_cast<std::size_t>(level - 1)]) keys.push_back({body_, level, index});
+  std::ranges::sort(keys);
+  return keys;
+}
+
+std::vector<BlockKey> SurfaceBlocks::coarse_blocks() const {
+  std::vector<BlockKey> keys;
+  for (int level = kCoarsestLevel; level < 0; ++level)
+    for (const Coord index : coarse_[static_cast<std::size_t>(-1 - level)]) keys.push_back({body_, level, index});
+  std::ranges::sort(keys);
+  return keys;
 }
 
 }  // namespace osteon

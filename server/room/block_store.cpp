@@ -5,7 +5,7 @@
 namespace osteon {
 
 BlockPayload make_block(const BlockSamples& samples) {
-  return encode_block(samples.solid_mm, samples.surface_mm, samples.covered, samples.level_pitch_mm);
+  return encode_block(samples);
 }
 
 const StoredBlock* BlockStore::put(const BlockKey& key, BlockPayload payload) {

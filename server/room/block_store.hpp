@@ -8,15 +8,6 @@
 
 namespace osteon {
 
-// What a block is made from: a copy, so that it is encoded while the room goes on.
-struct BlockSamples {
-  BlockKey key;
-  double level_pitch_mm = 0;
-  std::vector<float> solid_mm;     // f on block_samples(key), negative where bone is left
-  std::vector<float> surface_mm;   // S on the same samples
-  CoveredGroups covered = 0;
-};
-
 [[nodiscard]] BlockPayload make_block(const BlockSamples& samples);
 
 struct StoredBlock {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include "common/surface/block_source.hpp"
+
 namespace osteon {
 namespace {
 
@@ -34,11 +36,6 @@ double norm(const QuantisedPose& knot) {
 
 // Rounding to steps of 1/32767 moves the norm by less than 1e-4.
 constexpr double kUnitTolerance = 0.01;
-
-std::vector<float> samples_of(const CoordBox& box) {
-  const Coord n = box.dims();
-  return std::vector<float>(static_cast<std::size_t>(n.x) * static_cast<std::size_t>(n.y) * static_cast<std::size_t>(n.z));
-}
 
 }  // namespace
 
@@ -155,10 +152,8 @@ std::vector<BlockKey> Room::bone_blocks() const {
 }
 
 BlockSamples Room::gather_block(const BlockKey& key) const {
-  const CoordBox box = block_samples(key);
-  BlockSamples out{key, level_pitch_mm(bone().pitch_mm(), key.level), samples_of(box), samples_of(box), surface_.covered(key)};
-  field_.gather_solid(key.level, box, out.solid_mm);
-  field_.gather_surface(key.level, box, out.surface_mm);
+  BlockSamples out;
+  osteon::gather_block(field_, surface_, key, bone().pitch_mm(), out);
   return out;
 }
 

@@ -12,7 +12,8 @@
 #include <random>
 #include <set>
 
-#include "common/surface/surface_blocks.hpp"
+#include "common/surface/block_source.hpp"
+#include "common/surface/weld.hpp"
 #include "common/volume/cut_field.hpp"
 #include "tests/support/scenes/bones.hpp"
 
@@ -159,8 +160,13 @@ TEST(MarchingCubes, NoiseToo) {
 TEST(BlockCodec, RefusesBytesThatNoEncoderWrote) {
   auto payload = blocks_of(sphere, 0.4, 1).begin()->second;
   ASSERT_FALSE(payload.bytes.empty());
+  const std::vector<std::uint8_t> whole = payload.bytes;
   payload.bytes.pop_back();
   EXPECT_FALSE(decode_block({}, payload, 0.4));
+  payload.bytes = whole;
+  payload.bytes[0] = 255;
+  EXPECT_FALSE(decode_block({}, payload, 0.4));
+  payload.bytes = whole;
   payload.bytes.resize(10);
   EXPECT_FALSE(decode_block({}, payload, 0.4));
 }
@@ -182,11 +188,9 @@ struct DrawnSurface {
   SurfaceBlocks blocks{BodyId{}};
 
   BlockPayload make(const BlockKey& key) const {
-    const CoordBox box = block_samples(key);
-    std::vector<float> solid(static_cast<std::size_t>(kBlockApron * kBlockApron * kBlockApron)), surface(solid.size());
-    field.gather_solid(key.level, box, solid);
-    field.gather_surface(key.level, box, surface);
-    return encode_block(solid, surface, blocks.covered(key), level_pitch_mm(field.bone().pitch_mm(), key.level));
+    BlockSamples samples;
+    gather_block(field, blocks, key, field.bone().pitch_mm(), samples);
+    return encode_block(samples);
   }
   std::map<BlockKey, BlockPayload> all() const {
     std::map<BlockKey, BlockPayload> made;
@@ -195,7 +199,12 @@ struct DrawnSurface {
       for (int y = (b.min.y >> 4) - 1; y <= (b.max.y >> 4) + 1; ++y)
         for (int z = (b.min.z >> 4) - 1; z <= (b.max.z >> 4) + 1; ++z) made[{{}, 0, {x, y, z}}] = make({{}, 0, {x, y, z}});
     for (const BlockKey& key : blocks.fine_blocks()) made[key] = make(key);
+    for (const BlockKey& key : blocks.coarse_blocks()) made[key] = make(key);
     return made;
+  }
+  void cut(const Cut& c) {
+    const CutReport report = field.apply(c);
+    (void)blocks.touch(report.level, report.changed_leaves);
   }
 };
 

@@ -1,0 +1,49 @@
+// Copies what a block is made from out of a field: anything that can gather its solid distance and S as CutField does.
+#pragma once
+#include <vector>
+
+#include "common/surface/surface_blocks.hpp"
+
+namespace osteon {
+
+// Levels coarser than the case's own take every 2nd or 4th sample of it, a plane at a time.
+template <class Gather>
+void gather_level(const Gather& gather, int level, const CoordBox& box, std::vector<float>& out) {
+  const Coord n = box.dims();
+  out.resize(static_cast<std::size_t>(n.x) * static_cast<std::size_t>(n.y) * static_cast<std::size_t>(n.z));
+  if (level >= 0) return gather(level, box, std::span<float>(out));
+  const std::int32_t every = 1 << -level;
+  std::vector<float> plane;
+  std::size_t i = 0;
+  for (std::int32_t x = box.min.x; x <= box.max.x; ++x) {
+    const CoordBox at{{every * x, every * box.min.y, every * box.min.z}, {every * x, every * box.max.y, every * box.max.z}};
+    const Coord d = at.dims();
+    plane.resize(static_cast<std::size_t>(d.y) * static_cast<std::size_t>(d.z));
+    gather(0, at, std::span<float>(plane));
+    for (std::int32_t y = 0; y < d.y; y += every)
+      for (std::int32_t z = 0; z < d.z; z += every) out[i++] = plane[static_cast<std::size_t>(y) * static_cast<std::size_t>(d.z) + static_cast<std::size_t>(z)];
+  }
+}
+
+// Fills `out`, using again what it has room for.
+template <class Field>
+void gather_block(const Field& field, const SurfaceBlocks& blocks, const BlockKey& key, double pitch_mm, BlockSamples& out) {
+  out.key = key;
+  out.level_pitch_mm = level_pitch_mm(pitch_mm, key.level);
+  out.covered = blocks.covered(key);
+  out.seams = {};
+  if (out.covered == kWhollyCovered) return;
+  out.seams = blocks.seams(key);
+  const auto solid = [&](int level, const CoordBox& box, std::span<float> to) { field.gather_solid(level, box, to); };
+  const auto surface = [&](int level, const CoordBox& box, std::span<float> to) { field.gather_surface(level, box, to); };
+  const CoordBox box = block_samples(key);
+  gather_level(solid, key.level, box, out.solid_mm);
+  gather_level(surface, key.level, box, out.surface_mm);
+  std::array<bool, kSeamSteps + 1> meets{};
+  for (const std::uint8_t steps : out.seams.coarser) meets[steps] = true;
+  for (int steps = 1; steps <= kSeamSteps; ++steps)
+    if (meets[static_cast<std::size_t>(steps)])
+      gather_level(solid, key.level - steps, coarse_samples(key, steps), out.coarse_mm[static_cast<std::size_t>(steps - 1)]);
+}
+
+}  // namespace osteon
