@@ -39,14 +39,59 @@ constexpr int kClearanceLeaves = 12;
 
 float to_quantum(float mm) { return std::round(mm * 1024.0f) / 1024.0f + 0.0f; }
 
-// The leaf's samples, with `outside` where the volume ends.
-void read_leaf(const DenseVolume<float>& from, Coord origin, float outside, std::span<float, kLeafVoxels> out) {
-  for (std::int32_t x = 0; x < kLeafSize; ++x)
-    for (std::int32_t y = 0; y < kLeafSize; ++y)
-      for (std::int32_t z = 0; z < kLeafSize; ++z) {
-        const Coord c = origin + Coord{x, y, z};
-        out[static_cast<std::size_t>(x * 64 + y * 8 + z)] = from.box.contains(c) ? from.at(c) : outside;
-      }
+// The leaf's samples out of a part, with `outside` where the part ends.
+void read_leaf(const CoordBox& part, std::span<const float> from, Coord origin, float outside, std::span<float, kLeafVoxels> out) {
+  const Coord dims = part.dims();
+  const std::int32_t first = std::max(origin.z, part.min.z), last = std::min(origin.z + kLeafSize - 1, part.max.z);
+  std::ranges::fill(out, outside);
+  for (std::int32_t x = std::max(origin.x, part.min.x); x <= std::min(origin.x + kLeafSize - 1, part.max.x); ++x)
+    for (std::int32_t y = std::max(origin.y, part.min.y); y <= std::min(origin.y + kLeafSize - 1, part.max.y); ++y) {
+      const std::size_t row = (static_cast<std::size_t>(x - part.min.x) * static_cast<std::size_t>(dims.y) +
+                               static_cast<std::size_t>(y - part.min.y)) * static_cast<std::size_t>(dims.z);
+      for (std::int32_t z = first; z <= last; ++z)
+        out[static_cast<std::size_t>((x - origin.x) * 64 + (y - origin.y) * 8 + (z - origin.z))] =
+            from[row + static_cast<std::size_t>(z - part.min.z)];
+    }
+}
+
+// One number where the leaf is all one: a bone's inside is mostly that.
+void store_leaf(SparseVolume& volume, Coord origin, std::span<const float, kLeafVoxels> values) {
+  if (std::ranges::all_of(values, [&](float v) { return v == values[0]; })) {
+    if (values[0] != volume.background()) volume.set_constant(origin, values[0]);
+  } else {
+    std::ranges::copy(values, volume.edit_leaf(origin));
+  }
+}
+
+// One leaf of bone from the samples of a part. False: the density is not a number.
+bool add_leaf(Case::Grids& grids, const CoordBox& part, std::span<const float> surface, std::span<const float> density, Coord origin) {
+  const float band = grids.surface.background();
+  std::array<float, kLeafVoxels> s, rho, tissue, bone;
+  read_leaf(part, surface, origin, band, s);
+  for (float& value : s) {
+    if (std::isnan(value)) return false;
+    value = std::clamp(to_quantum(std::clamp(value, -2.0f * band, 2.0f * band)), -band, band);
+  }
+  if (std::ranges::all_of(s, [&](float v) { return v == band; })) return true;
+  std::ranges::transform(s, bone.begin(), [](float v) { return v < 0.0f ? 1.0f : 0.0f; });
+  // A leaf of the surface that is not all inside stays one, also if its samples are equal.
+  if (std::ranges::all_of(s, [&](float v) { return v == -band; })) {
+    grids.surface.set_constant(origin, -band);
+    grids.bone.set_constant(origin, 1.0f);
+  } else {
+    std::ranges::copy(s, grids.surface.edit_leaf(origin));
+    std::ranges::copy(bone, grids.bone.edit_leaf(origin));
+  }
+  read_leaf(part, density, origin, 0.0f, rho);
+  for (std::size_t i = 0; i < kLeafVoxels; ++i) {
+    if (!std::isfinite(rho[i])) return false;
+    rho[i] = std::max(0.0f, rho[i]) + 0.0f;
+    const Tissue found = s[i] >= 0.0f ? Tissue::none : rho[i] >= kCorticalFrom_g_cm3 ? Tissue::cortical : Tissue::trabecular;
+    tissue[i] = static_cast<float>(found);
+  }
+  store_leaf(grids.tissue, origin, tissue);
+  store_leaf(grids.density, origin, rho);
+  return true;
 }
 
 void hash_volume(Hasher& hasher, const std::string& name, const SparseVolume& volume) {
@@ -194,37 +239,51 @@ json to_json(const Case::Grids& grids) {
 }  // namespace
 
 Result<Case> Case::build(CaseInfo info, const DenseVolume<float>& surface_mm, const DenseVolume<float>& density_g_cm3) {
-  if (!(info.pitch_mm > 0.0)) return failure(ErrorCode::invalid_input, "a case needs a pitch above zero");
   OSTEON_CHECK(surface_mm.box == density_g_cm3.box);
+  const auto copy_part = [&](const CoordBox& part, std::span<float> surface, std::span<float> density) {
+    const auto row = static_cast<std::size_t>(part.dims().z);
+    std::size_t to = 0;
+    for (std::int32_t x = part.min.x; x <= part.max.x; ++x)
+      for (std::int32_t y = part.min.y; y <= part.max.y; ++y, to += row) {
+        const std::size_t from = surface_mm.index({x, y, part.min.z});
+        std::copy_n(surface_mm.values.data() + from, row, surface.data() + to);
+        std::copy_n(density_g_cm3.values.data() + from, row, density.data() + to);
+      }
+    return PartKind::samples;
+  };
+  return build(std::move(info), surface_mm.box, copy_part);
+}
+
+Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillPart& fill, const KeepGoing& keep_going) {
+  if (!(info.pitch_mm > 0.0)) return failure(ErrorCode::invalid_input, "a case needs a pitch above zero");
   const float band = band_mm(info.pitch_mm);
   auto grids = std::make_shared<Grids>(Grids{std::move(info), {}, SparseVolume(band), SparseVolume(0.0f), SparseVolume(0.0f),
                                              SparseVolume(0.0f), SparseVolume(0.0f), {}, 0.0});
-  std::array<float, kLeafVoxels> s, rho;
-  const Coord first = floor_to(surface_mm.box.min, kLeafSize), last = surface_mm.box.max;
-  for (std::int32_t x = first.x; x <= last.x; x += kLeafSize)
-    for (std::int32_t y = first.y; y <= last.y; y += kLeafSize)
-      for (std::int32_t z = first.z; z <= last.z; z += kLeafSize) {
-        const Coord origin{x, y, z};
-        read_leaf(surface_mm, origin, band, s);
-        for (float& value : s) value = std::clamp(to_quantum(value), -band, band);
-        if (std::ranges::all_of(s, [&](float v) { return v == band; })) continue;
-        if (std::ranges::all_of(s, [&](float v) { return v == -band; })) {
-          grids->surface.set_constant(origin, -band);
-          grids->bone.set_constant(origin, 1.0f);
-        } else {
-          std::ranges::copy(s, grids->surface.edit_leaf(origin));
-          std::ranges::transform(s, grids->bone.edit_leaf(origin), [](float v) { return v < 0.0f ? 1.0f : 0.0f; });
-        }
-        read_leaf(density_g_cm3, origin, 0.0f, rho);
-        float* tissue = grids->tissue.edit_leaf(origin);
-        for (std::size_t i = 0; i < kLeafVoxels; ++i) {
-          if (!std::isfinite(rho[i])) return failure(ErrorCode::invalid_input, "the density has values that are not numbers");
-          rho[i] = std::max(0.0f, rho[i]);
-          const Tissue kind = s[i] >= 0.0f ? Tissue::none : rho[i] >= kCorticalFrom_g_cm3 ? Tissue::cortical : Tissue::trabecular;
-          tissue[i] = static_cast<float>(kind);
-        }
-        std::ranges::copy(rho, grids->density.edit_leaf(origin));
+  std::vector<float> surface, density;
+  const Coord first = floor_to(box.min, kPartSamples), last = box.max;
+  for (std::int32_t px = first.x; px <= last.x; px += kPartSamples) {
+    const double done = static_cast<double>(px - first.x) / std::max(1, last.x - first.x);
+    if (keep_going && !keep_going(done)) return failure(ErrorCode::cancelled, "stopped while building the case");
+    for (std::int32_t py = first.y; py <= last.y; py += kPartSamples)
+      for (std::int32_t pz = first.z; pz <= last.z; pz += kPartSamples) {
+        const CoordBox part{{std::max(px, box.min.x), std::max(py, box.min.y), std::max(pz, box.min.z)},
+                            {std::min(px + kPartSamples - 1, box.max.x), std::min(py + kPartSamples - 1, box.max.y),
+                             std::min(pz + kPartSamples - 1, box.max.z)}};
+        const Coord dims = part.dims();
+        const std::size_t samples = static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z);
+        surface.resize(samples);
+        density.resize(samples);
+        const PartKind kind = fill(part, surface, density);
+        if (kind == PartKind::outside) continue;
+        if (kind == PartKind::inside) std::ranges::fill(surface, -band);
+        const Coord leaf = floor_to(part.min, kLeafSize);
+        for (std::int32_t x = leaf.x; x <= part.max.x; x += kLeafSize)
+          for (std::int32_t y = leaf.y; y <= part.max.y; y += kLeafSize)
+            for (std::int32_t z = leaf.z; z <= part.max.z; z += kLeafSize)
+              if (!add_leaf(*grids, part, surface, density, {x, y, z}))
+                return failure(ErrorCode::invalid_input, "the bone's distance or density has values that are not numbers");
       }
+  }
   measure(*grids);
   if (grids->volume_mm3 <= 0.0)
     return failure(ErrorCode::invalid_input, "there is no bone at or above the threshold; choose a lower --threshold");
@@ -313,6 +372,13 @@ const CaseInfo& Case::info() const { return grids_->info; }
 const Digest& Case::hash() const { return grids_->hash; }
 CoordBox Case::bounds_samples() const { return grids_->bounds; }
 double Case::volume_mm3() const { return grids_->volume_mm3; }
+
+std::size_t Case::memory_bytes() const {
+  std::size_t bytes = 0;
+  for (const SparseVolume* volume : {&grids_->surface, &grids_->density, &grids_->clearance, &grids_->bone, &grids_->tissue})
+    bytes += volume->memory_bytes();
+  return bytes;
+}
 
 Box Case::bounds() const {
   return {position_mm(grids_->bounds.min, pitch_mm()), position_mm(grids_->bounds.max, pitch_mm())};

@@ -1,6 +1,7 @@
 // A case: the imported bone, which never changes. A folder with case.json and bone.vdb, named by its content's hash.
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -8,6 +9,7 @@
 #include "common/core/digest.hpp"
 #include "common/core/result.hpp"
 #include "common/volume/dense_volume.hpp"
+#include "common/volume/iso_surface.hpp"
 
 namespace osteon {
 
@@ -31,6 +33,16 @@ struct CaseInfo {
 
 enum class Tissue : std::uint8_t { none = 0, cortical = 1, trabecular = 2 };
 
+// What a part of a bone holds, so that a builder need not look at every sample of what is all one.
+enum class PartKind {
+  samples,  // both spans are filled
+  outside,  // no sample within the band of 4 voxels round the bone: neither span is read
+  inside,   // every sample is bone and deeper than the band: only the density is read
+};
+// Fills the signed distance (mm; beyond the band only the sign matters) and the density (g/cm³) of a box of samples, z
+// fastest. Asked once for each part, always in the same order, by one thread.
+using FillPart = std::function<PartKind(const CoordBox& box, std::span<float> surface_mm, std::span<float> density_g_cm3)>;
+
 // Read-only after construction, so any thread may read it at any time.
 class Case {
  public:
@@ -38,6 +50,11 @@ class Case {
   // the sign) and the density (g/cm³), both over the same box.
   [[nodiscard]] static Result<Case> build(CaseInfo info, const DenseVolume<float>& surface_mm,
                                           const DenseVolume<float>& density_g_cm3);
+  // The same from parts of at most kPartSamples³, without ever holding the whole in memory: for large bones. Leaves of
+  // one density are kept as one number. `keep_going` is asked between parts, and with a false answer the error is cancelled.
+  static constexpr std::int32_t kPartSamples = 64;
+  [[nodiscard]] static Result<Case> build(CaseInfo info, const CoordBox& box, const FillPart& fill,
+                                          const KeepGoing& keep_going = {});
   // Errors: not_found (no such folder), invalid_input (no or broken case.json / bone.vdb, or content that does not
   // match its hash), unsupported (schema version).
   [[nodiscard]] static Result<Case> load(const std::filesystem::path& folder);
@@ -50,6 +67,7 @@ class Case {
   [[nodiscard]] Box bounds() const;                // of the bone's surface band, mm
   [[nodiscard]] CoordBox bounds_samples() const;   // the same in samples of level 0
   [[nodiscard]] double volume_mm3() const;         // of the bone
+  [[nodiscard]] std::size_t memory_bytes() const;  // of the grids' samples
 
   // Samples of level 0, z fastest. Signed distance S clipped to ±4 h, and density.
   void gather_surface(const CoordBox& box, std::span<float> out) const;

@@ -1,6 +1,7 @@
 // What a body was made by, so that some of it can be taken back: every cut, and every mask by which a split took a piece
 // away, with the leaves that it reaches. Undo rebuilds those leaves from what remains.
 #pragma once
+#include <array>
 #include <map>
 #include <span>
 #include <unordered_map>
@@ -17,33 +18,51 @@ struct LevelLeaves {
   friend bool operator==(const LevelLeaves&, const LevelLeaves&) = default;
 };
 
-// Not synchronised: one thread writes, or several read.
+// What one undo or redo did.
+struct RebuildCost {
+  std::size_t leaves = 0;         // rebuilt
+  std::size_t cuts = 0;           // evaluated again, each on its part of the leaves
+  std::size_t leaf_cuts = 0;      // leaf and cut pairs evaluated: what the time goes with
+  std::size_t masks = 0;          // leaves of masks merged again
+};
+
+// A field whose every change is in the history, and whose others came as a mask (a piece's first state), is after any
+// undo and redo what a fresh field with only the remaining events would be. Not synchronised: one thread writes, or
+// several read.
 class CutHistory {
  public:
-  // An event at `place` that was applied to the field: all later calls name it by its place.
-  void add(RoomSeq place, const Cut& cut, const std::vector<Coord>& leaves);       // of cut.level: what it can change
-  void add_mask(RoomSeq place, const std::vector<FieldLeaf>& mask);                // R = min(R, mask)
+  // An event at `place` that was applied to the field: all later calls name it by its place, which must be new.
+  // `leaves`: all that the cut can change, CutReport::reached_leaves or CutField::reach(); those that it did change are
+  // not enough, because another cut that is taken back may have hidden the rest.
+  void add(RoomSeq place, const Cut& cut, const std::vector<Coord>& leaves);
+  void add_mask(RoomSeq place, const std::vector<FieldLeaf>& mask);  // R = min(R, mask)
 
   [[nodiscard]] bool contains(RoomSeq place) const;
   [[nodiscard]] bool undone(RoomSeq place) const;
+  [[nodiscard]] std::size_t size() const { return events_.size(); }
 
-  // Takes events back, or applies them again, and returns the leaves that changed. Places that are unknown, or in that
-  // state already, are passed over. The field must be the one that the events were applied to.
+  // Takes events back, or applies them again, and returns the leaves that changed, by level. Places that are unknown, or
+  // in that state already, are passed over. The field must be the one that the events were applied to.
   std::vector<LevelLeaves> undo(CutField& field, std::span<const RoomSeq> places);
   std::vector<LevelLeaves> redo(CutField& field, std::span<const RoomSeq> places);
+  [[nodiscard]] const RebuildCost& last_cost() const { return cost_; }
 
  private:
   struct Event {
     Cut cut;                      // without path: a mask
-    std::vector<FieldLeaf> mask;
-    std::vector<LevelLeaves> leaves;
+    std::vector<FieldLeaf> mask;  // sorted by (level, origin)
     bool undone = false;
   };
+  using Leaves = std::array<std::vector<Coord>, kLevels>;
+
   std::vector<LevelLeaves> rebuild(CutField& field, std::span<const RoomSeq> places, bool undone);
+  Leaves reached(const CutField& field, const Event& event, RoomSeq place) const;
+  void apply_again(CutField& field, const Leaves& leaves);
 
   std::map<RoomSeq, Event> events_;
   // Which events reach a leaf, in the order in which they were added.
   std::array<std::unordered_map<Coord, std::vector<RoomSeq>, CoordHash>, kLevels> reach_;
+  RebuildCost cost_;
 };
 
 }  // namespace osteon

@@ -1,0 +1,44 @@
+// Of a piece that came apart: its volume, and the masks that take it out of the parent and leave it in a field of its own.
+#pragma once
+#include <span>
+#include <vector>
+
+#include "common/volume/fragments.hpp"
+
+namespace osteon {
+
+// Places of cells, by the origin of their leaf of level 0.
+class CellMap {
+ public:
+  CellMap() = default;
+  CellMap(const CoordBox& bounds_samples, const std::vector<Coord>& origins);
+  [[nodiscard]] std::int32_t find(Coord origin) const;  // index among `origins`, or -1
+  // For each cell whether it, or one of the 26 around it, is marked.
+  [[nodiscard]] std::vector<std::uint8_t> dilated(std::span<const std::uint8_t> marked) const;
+  [[nodiscard]] std::size_t size() const { return count_; }
+
+ private:
+  [[nodiscard]] std::size_t index(Coord cell) const;
+  CoordBox box_;                     // of cells
+  std::vector<std::int32_t> cells_;  // dense
+  std::size_t count_ = 0;
+};
+
+// Samples of a level in a cell.
+[[nodiscard]] CoordBox cell_box(Coord origin, int level);
+// The finest level that a cut reached the cell with.
+[[nodiscard]] int cut_level(const CutField& field, Coord origin);
+
+// What a cell holds of one piece and of the rest.
+struct PieceCell {
+  Coord origin;
+  int level = 0;               // at which its components are labelled
+  bool full = false;
+  std::vector<bool> in_piece;  // of each component of label_solid() at that level, in order
+  bool has_piece = false, has_rest = false;
+};
+
+// `cells`: all of the finder, in the order of the map.
+[[nodiscard]] Fragment cut_out(const CutField& field, const CellMap& map, std::span<const PieceCell> cells);
+
+}  // namespace osteon
