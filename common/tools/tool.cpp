@@ -2,14 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "common/tools/tool_solid.hpp"
 
 namespace osteon {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 std::int32_t quanta(double mm) { return static_cast<std::int32_t>(std::lround(mm / kQuantum_mm)); }
 
@@ -42,59 +39,6 @@ double cylinder_distance(double radius, double top, double bottom, Outline p) {
   const double dz = std::max(p.z - top, bottom - p.z);
   if (dr <= 0.0 || dz <= 0.0) return std::max(dr, dz);
   return std::hypot(dr, dz);
-}
-
-// One ring of points at (r, z) whose normal into the tool is `inward` in the (radial, axial) plane.
-void add_ring(std::vector<SamplePoint>& points, double r, double z, Outline inward, double area, double spacing,
-              bool active) {
-  const int count = std::max(3, static_cast<int>(std::ceil(2.0 * kPi * r / spacing)));
-  // Successive rings are turned against each other, so that no straight seam is left unsampled.
-  const double turn = 0.5 * static_cast<double>(points.size());
-  for (int i = 0; i < count; ++i) {
-    const double angle = 2.0 * kPi * (i + turn) / count;
-    const double c = std::cos(angle), s = std::sin(angle);
-    points.push_back({{r * c, r * s, z}, {inward.r * c, inward.r * s, inward.z}, area / count, active});
-  }
-}
-
-void add_frustum(std::vector<SamplePoint>& points, Outline a, Outline b, double spacing, bool active) {
-  const double er = b.r - a.r, ez = b.z - a.z, length = std::hypot(er, ez);
-  const int rings = std::max(1, static_cast<int>(std::ceil(length / spacing)));
-  // Outlines run from the tip backwards (z falls), so turning the direction by a right angle points to the axis.
-  const Outline inward{ez / length, -er / length};
-  for (int i = 0; i < rings; ++i) {
-    const double t = (i + 0.5) / rings;
-    const double r = a.r + t * er;
-    add_ring(points, r, a.z + t * ez, inward, 2.0 * kPi * r * length / rings, spacing, active);
-  }
-}
-
-void add_sphere(std::vector<SamplePoint>& points, double radius, double shank_radius, double spacing) {
-  const int rings = std::max(2, static_cast<int>(std::ceil(kPi * radius / spacing)));
-  for (int i = 0; i < rings; ++i) {
-    const double polar = kPi * (i + 0.5) / rings;  // from the tip
-    const double r = radius * std::sin(polar), up = radius * std::cos(polar);
-    if (up < 0.0 && r < shank_radius) continue;  // where the shank leaves the sphere
-    const double area = 2.0 * kPi * radius * radius *
-                        (std::cos(kPi * i / rings) - std::cos(kPi * (i + 1) / rings));
-    add_ring(points, r, up - radius, {-std::sin(polar), -std::cos(polar)}, area, spacing, true);
-  }
-}
-
-std::vector<SamplePoint> points_with_spacing(const Tool& tool, double spacing) {
-  std::vector<SamplePoint> points;
-  const double shank_radius = 0.5 * tool.shank_diameter_mm;
-  // Walls only block, so they are sampled more thinly than the face that cuts.
-  const double wall_spacing = std::max(2.0 * spacing, tool.shank_diameter_mm / 3.0);
-  if (tool.kind == ToolKind::drill) {
-    const double radius = 0.5 * tool.diameter_mm, height = tip_height_mm(tool);
-    add_frustum(points, {0, 0}, {radius, -height}, spacing, true);
-    add_frustum(points, {radius, -height}, {radius, -tool.cutting_length_mm}, wall_spacing, false);
-  } else {
-    add_sphere(points, 0.5 * tool.diameter_mm, shank_radius, spacing);
-  }
-  add_frustum(points, {shank_radius, -tool.cutting_length_mm}, {shank_radius, -tool.reach_mm()}, wall_spacing, false);
-  return points;
 }
 
 // Rounds a unit normal, and the face so that it goes through the same middle: far from the tip the step of a normal is
@@ -217,16 +161,6 @@ double signed_distance_mm(const Tool& tool, const Vec3& point_tool_mm) {
                              ? drill_distance(tool, p)
                              : std::hypot(p.r, p.z + 0.5 * tool.diameter_mm) - 0.5 * tool.diameter_mm;
   return std::min(cutting, shank);
-}
-
-std::vector<SamplePoint> sample_points(const Tool& tool, int count) {
-  const double radius = 0.5 * tool.diameter_mm;
-  double spacing = std::sqrt(4.0 * kPi * radius * radius / std::max(1, count));
-  while (true) {
-    std::vector<SamplePoint> points = points_with_spacing(tool, spacing);
-    if (std::ranges::count_if(points, &SamplePoint::active) >= count) return points;
-    spacing *= 0.95;
-  }
 }
 
 }  // namespace osteon

@@ -2,65 +2,54 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <numbers>
+#include <algorithm>
+#include <functional>
+#include <set>
 
 namespace osteon {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
-TEST(Tools, DrillsConeIsAsHighAsItsPointAngleSays) {
-  const Tool drill = *find_tool("drill-3.2");
-  // (D/2) / tan(59°), which force-laws call the ramp of the entry: 0.961 mm.
-  EXPECT_NEAR(-drill.cut_body().profile[3].z * kQuantum_mm, 0.961, 0.001);
-}
-
-TEST(Tools, DistanceIsZeroOnEverySamplePointAndItsNormalPointsInward) {
-  for (const Tool& tool : builtin_tools())
-    for (const SamplePoint& point : sample_points(tool, 100)) {
-      ASSERT_NEAR(signed_distance_mm(tool, point.position_mm), 0.0, 1e-9) << tool.name;
-      ASSERT_NEAR(point.inward.norm(), 1.0, 1e-12) << tool.name;
-      ASSERT_LT(signed_distance_mm(tool, point.position_mm + 0.05 * point.inward), -0.02) << tool.name;
-    }
-}
-
-TEST(Tools, DistanceChangesAtMostAsFastAsThePointMoves) {
-  for (const Tool& tool : builtin_tools()) {
-    Vec3 previous{3.0, -2.0, 6.0};
-    double before = signed_distance_mm(tool, previous);
-    for (int i = 0; i < 2000; ++i) {
-      const Vec3 step = 0.2 * Vec3{std::sin(1.1 * i), std::cos(0.7 * i), std::sin(0.13 * i) - 0.2};
-      const Vec3 next = previous + step;
-      const double now = signed_distance_mm(tool, next);
-      ASSERT_LE(std::abs(now - before), step.norm() + 1e-9) << tool.name;
-      previous = next;
-      before = now;
+// Table B.1 of the dissertation: its eight groups.
+TEST(Tools, AllOfAppendixBAreThereInTheirGroups) {
+  const std::vector<std::vector<std::string>> groups{
+      {"drill-1-8in", "drill-5-16in", "end-drill"},
+      {"burr-round", "burr-barrel", "burr-contoured"},
+      {"saw-oscillating-1", "saw-oscillating-2", "saw-oscillating-3", "saw-reciprocating"},
+      {"reamer-sphere", "reamer-cylinder", "reamer-outside"},
+      {"broach-1", "broach-2"},
+      {"guide-1", "guide-2", "guide-3"},
+      {"pin-1", "pin-2", "pin-3"},
+      {"screw-1", "screw-2", "screw-3"},
+  };
+  const std::vector<std::size_t> counts{3, 3, 4, 3, 2, 3, 3, 3};
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    EXPECT_EQ(groups[i].size(), counts[i]);
+    for (const std::string& name : groups[i]) {
+      const auto tool = find_tool(name);
+      ASSERT_TRUE(tool) << name;
+      // Guides do not cut; pins and screws make their own holes.
+      EXPECT_EQ(tool->cuts(), i != 5) << name;
+      names.insert(name);
     }
   }
+  EXPECT_EQ(names.size(), 24u);
+  std::set<std::string> all;
+  for (const Tool& tool : builtin_tools()) all.insert(tool.name);
+  EXPECT_EQ(all.size(), builtin_tools().size()) << "two tools have one name";
 }
 
-TEST(Tools, SamplePointsStandForTheWholeCuttingFace) {
-  const Tool drill = *find_tool("drill-3.2");
-  double face = 0.0;
-  for (const SamplePoint& point : sample_points(drill, 200))
-    if (point.active) face += point.area_mm2;
-  // Lateral area of the cone: π R times its slant, R / sin(59°).
-  EXPECT_NEAR(face, kPi * 1.6 * 1.6 / std::sin(59.0 * kPi / 180.0), 1e-6);
-
-  const Tool burr = *find_tool("burr-round-5");
-  double forward = 0.0;
-  for (const SamplePoint& point : sample_points(burr, 200)) forward += point.active ? point.area_mm2 * std::max(0.0, -point.inward.z()) : 0.0;
-  // Seen along the axis a sphere is a disc.
-  EXPECT_NEAR(forward, kPi * 2.5 * 2.5, 0.02 * kPi * 2.5 * 2.5);
+TEST(Tools, TheDrillsInInchesAreThat) {
+  EXPECT_DOUBLE_EQ(find_tool("drill-1-8in")->diameter_mm, 25.4 / 8.0);
+  EXPECT_DOUBLE_EQ(find_tool("drill-5-16in")->diameter_mm, 25.4 * 5.0 / 16.0);
 }
 
-TEST(Tools, ManySamplePointsAreGivenWhereManyAreAsked) {
-  for (const Tool& tool : builtin_tools())
-    for (const int wanted : {1, 50, 1000}) {
-      const auto points = sample_points(tool, wanted);
-      EXPECT_GE(std::ranges::count_if(points, &SamplePoint::active), wanted) << tool.name;
-    }
+TEST(Tools, SmallToolsAndBladesCutFinestReamersAndBroachesAtTheCasesPitch) {
+  for (const Tool& tool : builtin_tools()) {
+    if (!tool.cuts()) continue;
+    const bool large = tool.name.starts_with("reamer") || tool.name.starts_with("broach");
+    EXPECT_EQ(tool.cut_level, large ? 0 : 2) << tool.name;
+  }
 }
 
 TEST(Tools, AnUnknownNameListsTheKnownOnes) {
@@ -72,10 +61,42 @@ TEST(Tools, AnUnknownNameListsTheKnownOnes) {
 
 TEST(Tools, EveryFieldIsPartOfTheHash) {
   const Tool drill = *find_tool("drill-3.2");
-  Tool other = drill;
-  other.spindle_rpm += 1.0;
-  EXPECT_NE(drill.hash(), other.hash());
   EXPECT_EQ(drill.hash(), find_tool("drill-3.2")->hash());
+  const std::vector<std::function<void(Tool&)>> changes{
+      [](Tool& t) { t.name += "x"; },
+      [](Tool& t) { t.title += "x"; },
+      [](Tool& t) { t.kind = ToolKind::pin; },
+      [](Tool& t) { t.diameter_mm += 1e-9; },
+      [](Tool& t) { t.cutting_length_mm += 1e-9; },
+      [](Tool& t) { t.point_angle_rad += 1e-9; },
+      [](Tool& t) { t.shank_diameter_mm += 1e-9; },
+      [](Tool& t) { t.shank_length_mm += 1e-9; },
+      [](Tool& t) { t.width_mm += 1e-9; },
+      [](Tool& t) { t.thickness_mm += 1e-9; },
+      [](Tool& t) { t.set_mm += 1e-9; },
+      [](Tool& t) { t.swing_rad += 1e-9; },
+      [](Tool& t) { t.stroke_mm += 1e-9; },
+      [](Tool& t) { t.pivot_mm += 1e-9; },
+      [](Tool& t) { t.taper_rad += 1e-9; },
+      [](Tool& t) { t.corner_mm += 1e-9; },
+      [](Tool& t) { t.bore_mm += 1e-9; },
+      [](Tool& t) { t.thread_pitch_mm += 1e-9; },
+      [](Tool& t) { t.core_diameter_mm += 1e-9; },
+      [](Tool& t) { t.spindle_rpm += 1e-9; },
+      [](Tool& t) { t.teeth += 1; },
+      [](Tool& t) { t.feed_mm_per_rev += 1e-9; },
+      [](Tool& t) { t.cut_level -= 1; },
+      [](Tool& t) { t.mesh = std::make_shared<SampledDistance>(SampledDistance{{{0, 0, 0}, {1, 1, 1}}, 512, std::vector<std::int16_t>(8, 5)}); },
+      [](Tool& t) { t.mesh = std::make_shared<SampledDistance>(SampledDistance{{{0, 0, 0}, {1, 1, 1}}, 512, std::vector<std::int16_t>(8, 6)}); },
+      [](Tool& t) { t.mesh = std::make_shared<SampledDistance>(SampledDistance{{{0, 0, 0}, {1, 1, 1}}, 513, std::vector<std::int16_t>(8, 6)}); },
+      [](Tool& t) { t.mesh = std::make_shared<SampledDistance>(SampledDistance{{{0, 0, 1}, {1, 1, 2}}, 513, std::vector<std::int16_t>(8, 6)}); },
+  };
+  std::set<Digest> hashes{drill.hash()};
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    Tool other = drill;
+    changes[i](other);
+    EXPECT_TRUE(hashes.insert(other.hash()).second) << "change " << i;
+  }
 }
 
 }  // namespace

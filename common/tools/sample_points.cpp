@@ -1,0 +1,119 @@
+// The points that touch bone: rings on drills and round burs, and points spread over the surface of every other tool.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "common/core/check.hpp"
+#include "common/tools/spread_points.hpp"
+#include "common/tools/tool.hpp"
+#include "common/tools/tool_solid.hpp"
+#include "common/tools/tool_surface.hpp"
+
+namespace osteon {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+// One ring of points at (r, z) whose normal into the tool is `inward` in the (radial, axial) plane.
+void add_ring(std::vector<SamplePoint>& points, double r, double z, Corner inward, double area, double spacing,
+              bool active) {
+  const int count = std::max(3, static_cast<int>(std::ceil(2.0 * kPi * r / spacing)));
+  // Successive rings are turned against each other, so that no straight seam is left unsampled.
+  const double turn = 0.5 * static_cast<double>(points.size());
+  for (int i = 0; i < count; ++i) {
+    const double angle = 2.0 * kPi * (i + turn) / count;
+    const double c = std::cos(angle), s = std::sin(angle);
+    points.push_back({{r * c, r * s, z}, {inward.r * c, inward.r * s, inward.z}, area / count, active});
+  }
+}
+
+void add_frustum(std::vector<SamplePoint>& points, Corner a, Corner b, double spacing, bool active) {
+  const double er = b.r - a.r, ez = b.z - a.z, length = std::hypot(er, ez);
+  const int rings = std::max(1, static_cast<int>(std::ceil(length / spacing)));
+  // Corners run from the tip backwards (z falls), so turning the direction by a right angle points to the axis.
+  const Corner inward{ez / length, -er / length};
+  for (int i = 0; i < rings; ++i) {
+    const double t = (i + 0.5) / rings;
+    const double r = a.r + t * er;
+    add_ring(points, r, a.z + t * ez, inward, 2.0 * kPi * r * length / rings, spacing, active);
+  }
+}
+
+void add_sphere(std::vector<SamplePoint>& points, double radius, double shank_radius, double spacing) {
+  const int rings = std::max(2, static_cast<int>(std::ceil(kPi * radius / spacing)));
+  for (int i = 0; i < rings; ++i) {
+    const double polar = kPi * (i + 0.5) / rings;  // from the tip
+    const double r = radius * std::sin(polar), up = radius * std::cos(polar);
+    if (up < 0.0 && r < shank_radius) continue;  // where the shank leaves the sphere
+    const double area = 2.0 * kPi * radius * radius *
+                        (std::cos(kPi * i / rings) - std::cos(kPi * (i + 1) / rings));
+    add_ring(points, r, up - radius, {-std::sin(polar), -std::cos(polar)}, area, spacing, true);
+  }
+}
+
+std::vector<SamplePoint> points_with_spacing(const Tool& tool, double spacing) {
+  std::vector<SamplePoint> points;
+  const double shank_radius = 0.5 * tool.shank_diameter_mm;
+  // Walls only block, so they are sampled more thinly than the face that cuts.
+  const double wall_spacing = std::max(2.0 * spacing, tool.shank_diameter_mm / 3.0);
+  if (tool.kind == ToolKind::drill) {
+    const double radius = 0.5 * tool.diameter_mm, height = point_height_mm(tool);
+    add_frustum(points, {0, 0}, {radius, -height}, spacing, true);
+    add_frustum(points, {radius, -height}, {radius, -tool.cutting_length_mm}, wall_spacing, false);
+  } else {
+    add_sphere(points, 0.5 * tool.diameter_mm, shank_radius, spacing);
+  }
+  add_frustum(points, {shank_radius, -tool.cutting_length_mm}, {shank_radius, -tool.reach_mm()}, wall_spacing, false);
+  return points;
+}
+
+std::vector<SamplePoint> points_on_rings(const Tool& tool, int count) {
+  const double radius = 0.5 * tool.diameter_mm;
+  double spacing = std::sqrt(4.0 * kPi * radius * radius / std::max(1, count));
+  while (true) {
+    std::vector<SamplePoint> points = points_with_spacing(tool, spacing);
+    if (std::ranges::count_if(points, &SamplePoint::active) >= count) return points;
+    spacing *= 0.95;
+  }
+}
+
+// What is bored forwards cuts with its end only: its sides run in the hole that it has made.
+bool cuts_forwards_only(ToolKind kind) { return kind == ToolKind::end_drill || kind == ToolKind::pin || kind == ToolKind::screw; }
+
+}  // namespace
+
+std::vector<SamplePoint> sample_points(const Tool& tool, int count) {
+  if (tool.kind == ToolKind::drill || tool.kind == ToolKind::round_burr) return points_on_rings(tool, count);
+  const Implicit solid = tool_solid(tool), part = cutting_part(tool);
+  // Cells of the surface well below the spacing, but not finer than the tool needs.
+  const Vec3 size = part.bounds.size_mm();
+  const double face_mm2 = 2.0 * (size.x() * size.y() + size.y() * size.z() + size.z() * size.x());
+  const double coarse = std::max(0.5 * std::sqrt(face_mm2 / std::max(1, count)), 0.25);
+  const TriangleMesh surface = tool_surface(tool, coarse);
+  const double back_mm = -tool.cutting_length_mm, point_mm = -point_height_mm(tool);
+  const auto active = [&](const Vec3& p, const Vec3& outward) {
+    // Nothing cuts with the face at its back.
+    constexpr double kNear_mm = 0.01;
+    if (!tool.cuts() || part(p) > solid(p) + 1e-9 || p.z() < back_mm + kNear_mm) return false;
+    return !cuts_forwards_only(tool.kind) || (outward.z() > 0.1 && p.z() > point_mm - kNear_mm);
+  };
+  if (!tool.cuts()) {
+    const auto all = [](const Vec3&, const Vec3&) { return true; };
+    return spread_points(solid, surface, all, {.count = count});
+  }
+  std::vector<SamplePoint> points = spread_points(solid, surface, active, {.count = count});
+  OSTEON_CHECK(!points.empty());
+  double active_mm2 = 0.0;
+  for (SamplePoint& point : points) {
+    point.active = true;
+    active_mm2 += point.area_mm2;
+  }
+  // Walls only block, so they are sampled more thinly than the face that cuts.
+  const double spacing = std::sqrt(active_mm2 / static_cast<double>(points.size()));
+  const auto passive = [&](const Vec3& p, const Vec3& outward) { return !active(p, outward); };
+  const auto walls = spread_points(solid, surface, passive, {.spacing_mm = std::max(2.0 * spacing, tool.shank_diameter_mm / 3.0)});
+  points.insert(points.end(), walls.begin(), walls.end());
+  return points;
+}
+
+}  // namespace osteon

@@ -1,0 +1,225 @@
+#include "common/tools/tool_surface.hpp"
+
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <unordered_map>
+#include <vector>
+
+#include "common/core/check.hpp"
+#include "common/tools/tool_solid.hpp"
+
+namespace osteon {
+namespace {
+
+// Where parts touch face to face the distance is zero inside; so near it still counts as inside.
+constexpr double kInside_mm = 1e-7;
+// An edge or corner whose planes differ by less than this share is taken as smooth (relative eigenvalue).
+constexpr double kFlat = 0.02;
+
+// Corner values of the cells near the surface, found by halving a box: with a 1-Lipschitz distance whole boxes whose
+// middle is farther than half their diagonal are left out.
+class Grid {
+ public:
+  Grid(const Implicit& solid, double cell_mm) : solid_(solid), cell_(cell_mm) {
+    // Off the origin by an irrational share: faces of a tool then do not lie in the grid's planes.
+    origin_ = solid.bounds.min_mm - Vec3(1.317, 1.271, 1.413) * cell_mm;
+    const Vec3 size = solid.bounds.max_mm - origin_;
+    int largest = 1;
+    for (int k = 0; k < 3; ++k) largest = std::max(largest, static_cast<int>(std::ceil(size[k] / cell_mm)) + 2);
+    int span = 1;
+    while (span < largest) span *= 2;
+    limit_ = Coord{static_cast<std::int32_t>(size.x() / cell_mm) + 2, static_cast<std::int32_t>(size.y() / cell_mm) + 2,
+                   static_cast<std::int32_t>(size.z() / cell_mm) + 2};
+    halve({0, 0, 0}, span);
+  }
+
+  [[nodiscard]] const std::vector<Coord>& cells() const { return cells_; }
+  [[nodiscard]] Vec3 place(Coord c) const { return origin_ + cell_ * Vec3(c.x, c.y, c.z); }
+  double value(Coord c) {
+    const auto [found, fresh] = values_.try_emplace(c, 0.0);
+    if (fresh) found->second = solid_(place(c)) - kInside_mm;
+    return found->second;
+  }
+  bool inside(Coord c) { return value(c) < 0.0; }
+  [[nodiscard]] double cell_mm() const { return cell_; }
+
+  // Where the surface crosses the edge between two corners.
+  Vec3 crossing(Coord a, Coord b) {
+    Vec3 pa = place(a), pb = place(b);
+    double fa = value(a), fb = value(b);
+    for (int i = 0; i < 40 && (pb - pa).norm() > 1e-7 * cell_; ++i) {
+      // Secant and bisection in turn: one is fast, the other sure.
+      const double t = i % 2 == 0 ? std::clamp(fa / (fa - fb), 0.02, 0.98) : 0.5;
+      const Vec3 p = pa + t * (pb - pa);
+      const double f = solid_(p) - kInside_mm;
+      if (std::abs(f) < 1e-9) return p;
+      if ((f < 0.0) == (fa < 0.0)) {
+        pa = p;
+        fa = f;
+      } else {
+        pb = p;
+        fb = f;
+      }
+    }
+    return 0.5 * (pa + pb);
+  }
+
+ private:
+  void halve(Coord at, int span) {
+    if (at.x > limit_.x || at.y > limit_.y || at.z > limit_.z) return;
+    const double half = 0.5 * span * cell_;
+    if (std::abs(solid_(place(at) + Vec3::Constant(half))) > 1.7321 * half + 1e-6) return;
+    if (span == 1) {
+      cells_.push_back(at);
+      return;
+    }
+    const int next = span / 2;
+    for (int i = 0; i < 8; ++i) halve(at + Coord{(i >> 2) * next, ((i >> 1) & 1) * next, (i & 1) * next}, next);
+  }
+
+  const Implicit& solid_;
+  double cell_;
+  Vec3 origin_;
+  Coord limit_;
+  std::vector<Coord> cells_;
+  std::unordered_map<Coord, double, CoordHash> values_;
+};
+
+constexpr std::array<Coord, 3> kSteps{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+
+// The point nearest to all planes through the crossings, from their middle on: along directions in which the planes
+// say nothing it stays there.
+Vec3 feature(const std::vector<Vec3>& points, const std::vector<Vec3>& normals) {
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& p : points) middle += p / static_cast<double>(points.size());
+  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+  Vec3 right = Vec3::Zero();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    squares += normals[i] * normals[i].transpose();
+    right += normals[i] * normals[i].dot(points[i] - middle);
+  }
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(squares);
+  const double largest = solver.eigenvalues()[2];
+  Vec3 shift = Vec3::Zero();
+  for (int k = 0; k < 3; ++k)
+    if (solver.eigenvalues()[k] > kFlat * largest) {
+      const Vec3 along = solver.eigenvectors().col(k);
+      shift += along * (along.dot(right) / solver.eigenvalues()[k]);
+    }
+  return middle + shift;
+}
+
+}  // namespace
+
+TriangleMesh surface_of(const Implicit& solid, double cell_mm) {
+  OSTEON_CHECK(cell_mm > 0.0);
+  Grid grid(solid, cell_mm);
+  struct Crossing {
+    Vec3 point, normal;
+  };
+  // By the edge's lower corner and its axis.
+  std::array<std::unordered_map<Coord, Crossing, CoordHash>, 3> crossings;
+  std::unordered_map<Coord, std::uint32_t, CoordHash> vertex_of;
+  TriangleMesh mesh;
+  std::vector<Vec3> points, normals;
+  for (const Coord& cell : grid.cells()) {
+    points.clear();
+    normals.clear();
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::size_t k = static_cast<std::size_t>(axis);
+      const Coord u = kSteps[(k + 1) % 3], v = kSteps[(k + 2) % 3];
+      for (int i = 0; i < 4; ++i) {
+        const Coord from = cell + (i & 1) * u + (i >> 1) * v, to = from + kSteps[k];
+        if (grid.inside(from) == grid.inside(to)) continue;
+        const auto [found, fresh] = crossings[k].try_emplace(from);
+        if (fresh) {
+          const Vec3 p = grid.crossing(from, to);
+          found->second = {p, gradient(solid, p)};
+        }
+        points.push_back(found->second.point);
+        normals.push_back(found->second.normal);
+      }
+    }
+    if (points.empty()) continue;
+    // Out of its cell a vertex could fold the surface over.
+    const Vec3 low = grid.place(cell), high = grid.place(cell + Coord{1, 1, 1});
+    Vec3 p = feature(points, normals).cwiseMax(low).cwiseMin(high);
+    // On a curved face the planes meet beside the surface: once more onto it.
+    if (const double off = solid(p); std::abs(off) > 1e-4 * cell_mm) p = (p - off * gradient(solid, p)).cwiseMax(low).cwiseMin(high);
+    vertex_of.emplace(cell, static_cast<std::uint32_t>(mesh.positions_mm.size()));
+    mesh.positions_mm.push_back({static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())});
+  }
+  // Each crossed edge joins the vertices of its four cells. In the order of the cells, so that files are equal.
+  for (const Coord& cell : grid.cells())
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!crossings[k].contains(cell)) continue;
+      const Coord u = kSteps[(k + 1) % 3], v = kSteps[(k + 2) % 3];
+      const std::array<Coord, 4> around{cell - u - v, cell - v, cell, cell - u};
+      std::array<std::uint32_t, 4> corner{};
+      for (std::size_t i = 0; i < 4; ++i) {
+        const auto found = vertex_of.find(around[i]);
+        OSTEON_CHECK(found != vertex_of.end());
+        corner[i] = found->second;
+      }
+      if (!grid.inside(cell)) std::swap(corner[1], corner[3]);
+      // Along the shorter diagonal.
+      const auto length2 = [&](std::size_t a, std::size_t b) { return (position(mesh, corner[a]) - position(mesh, corner[b])).squaredNorm(); };
+      if (length2(0, 2) <= length2(1, 3)) {
+        mesh.triangles.push_back({corner[0], corner[1], corner[2]});
+        mesh.triangles.push_back({corner[0], corner[2], corner[3]});
+      } else {
+        mesh.triangles.push_back({corner[0], corner[1], corner[3]});
+        mesh.triangles.push_back({corner[1], corner[2], corner[3]});
+      }
+    }
+  return mesh;
+}
+
+double thinnest_cell_mm(const Tool& tool) {
+  double thinnest = std::numeric_limits<double>::infinity();
+  const auto at_least = [&](double mm) { thinnest = std::min(thinnest, mm); };
+  if (tool.kind != ToolKind::mesh) {
+    const Vec3 size = local_bounds(tool).size_mm();
+    at_least(size.minCoeff());
+    if (tool.shank_diameter_mm > 0.0) at_least(tool.shank_diameter_mm);
+  }
+  switch (tool.kind) {
+    case ToolKind::oscillating_saw:
+    case ToolKind::reciprocating_saw:
+    case ToolKind::trial_cup: at_least(tool.thickness_mm); break;
+    case ToolKind::outside_reamer:
+      at_least(0.5 * (tool.diameter_mm - tool.bore_mm));
+      at_least(tool.thickness_mm);
+      break;
+    case ToolKind::drill_sleeve: at_least(0.5 * (tool.diameter_mm - tool.bore_mm)); break;
+    case ToolKind::distal_block:
+    case ToolKind::four_in_one_block:
+      at_least(tool.bore_mm);
+      at_least(tool.diameter_mm);
+      break;
+    case ToolKind::screw:
+      at_least(tool.core_diameter_mm);
+      at_least(0.5 * tool.thread_pitch_mm);
+      at_least(tool.diameter_mm - tool.core_diameter_mm);
+      break;
+    case ToolKind::broach:
+    case ToolKind::trial_stem:
+      at_least(std::min(tool.width_mm, tool.thickness_mm) - 2.0 * tool.cutting_length_mm * std::tan(tool.taper_rad));
+      break;
+    case ToolKind::contoured_burr: at_least(2.0 * end_radius_mm(tool)); break;
+    case ToolKind::mesh: at_least(2.0 * tool.mesh->pitch * kQuantum_mm); break;
+    default: break;
+  }
+  return 0.5 * thinnest;
+}
+
+TriangleMesh tool_surface(const Tool& tool, double resolution_mm) {
+  return surface_of(tool_solid(tool), std::min(resolution_mm, thinnest_cell_mm(tool)));
+}
+
+}  // namespace osteon
