@@ -64,32 +64,47 @@ void PatchBuilder::changed(double pitch_mm, int level, const std::vector<Coord>&
   }
 }
 
-std::shared_ptr<const Brick> PatchBuilder::brick(Store& store, const CutField& field, int level, Coord index,
+std::shared_ptr<const Brick> PatchBuilder::brick(Store& store, std::span<const CutField* const> bodies, int level, Coord index,
                                                  Quantity quantity) {
+  const Case& bone = bodies.front()->bone();
   auto& kept = store[index];
   if (kept) return kept;
   const CoordBox samples = brick_samples(index);
   const CoordBox at_h{shift_down(samples.min, level), shift_down(samples.max, level) + Coord{1, 1, 1}};
-  if (quantity == Quantity::solid && !field.bone().has_bone(at_h)) {
+  if (quantity == Quantity::solid && !bone.has_bone(at_h)) {
     if (!air_) {
       auto air = std::make_shared<Brick>();
-      air->values.fill(static_cast<float>(kBandVoxels * field.bone().pitch_mm()));
+      air->values.fill(static_cast<float>(kBandVoxels * bone.pitch_mm()));
       air_ = air;
     }
     return kept = air_;
   }
   auto made = std::make_shared<Brick>();
-  if (quantity == Quantity::density) field.bone().gather_density(samples, made->values);
-  else field.gather_solid(level, samples, made->values);
+  if (quantity == Quantity::density) {
+    bone.gather_density(samples, made->values);
+  } else {
+    bodies.front()->gather_solid(level, samples, made->values);
+    Brick other;
+    for (const CutField* body : bodies.subspan(1)) {
+      body->gather_solid(level, samples, other.values);
+      for (std::size_t i = 0; i < made->values.size(); ++i) made->values[i] = std::min(made->values[i], other.values[i]);
+    }
+  }
   ++bricks_made_;
   return kept = made;
 }
 
-void PatchBuilder::build(const CutField& field, const ToolModel& model, const Pose& pose, Patch& patch) {
-  const double h = field.bone().pitch_mm();
+void PatchBuilder::build(std::span<const CutField* const> bodies, const ToolModel& model, const Pose& pose, Patch& patch) {
+  const double h = bodies.front()->bone().pitch_mm();
   const Tool& tool = model.tool;
   if (fine_level_ != model.cut_level || fine_.size() > kMostKeptBricks) fine_.clear();
   if (coarse_.size() > kMostKeptBricks) coarse_.clear(), density_.clear();
+  // A body that came or went changed the bone all over it.
+  if (!std::ranges::equal(bodies_, bodies)) {
+    fine_.clear();
+    coarse_.clear();
+    bodies_.assign(bodies.begin(), bodies.end());
+  }
   fine_level_ = model.cut_level;
   const Pose pose_tool_bone = pose.inverse();
 
@@ -99,7 +114,7 @@ void PatchBuilder::build(const CutField& field, const ToolModel& model, const Po
     grid.reset(pitch, bricks.min, bricks.max);
     const double half_diagonal_mm = 0.5 * std::sqrt(3.0) * kBrickCells * pitch;
     for_each(bricks, [&](Coord index) {
-      const double distance_mm = signed_distance_mm(tool, pose_tool_bone.point(brick_centre_mm(index, pitch)));
+      const double distance_mm = model.solid(pose_tool_bone.point(brick_centre_mm(index, pitch)));
       if (distance_mm < margin_mm + half_diagonal_mm && distance_mm > -half_diagonal_mm - model.fine_pitch_mm)
         grid.set(index, make(index));
     });
@@ -109,13 +124,13 @@ void PatchBuilder::build(const CutField& field, const ToolModel& model, const Po
   const double fine_reach_mm = params_.fine_samples * model.fine_pitch_mm - 2.0 * params_.fine_margin_mm - tool.diameter_mm;
   const Box fine_box = tool_box(tool, pose, 0.0, -std::min(tool.cutting_length_mm, std::max(1.0, fine_reach_mm)));
   fill(patch.fine, bricks_in(fine_box.grown(params_.fine_margin_mm), model.fine_pitch_mm), model.fine_pitch_mm,
-       params_.fine_margin_mm, [&](Coord i) { return brick(fine_, field, model.cut_level, i, Quantity::solid); });
+       params_.fine_margin_mm, [&](Coord i) { return brick(fine_, bodies, model.cut_level, i, Quantity::solid); });
 
   const CoordBox coarse = bricks_in(tool_box(tool, pose, 0.0, -tool.reach_mm()).grown(params_.coarse_margin_mm), h);
   fill(patch.coarse, coarse, h, params_.coarse_margin_mm,
-       [&](Coord i) { return brick(coarse_, field, 0, i, Quantity::solid); });
+       [&](Coord i) { return brick(coarse_, bodies, 0, i, Quantity::solid); });
   fill(patch.density, coarse, h, params_.coarse_margin_mm,
-       [&](Coord i) { return brick(density_, field, 0, i, Quantity::density); });
+       [&](Coord i) { return brick(density_, bodies, 0, i, Quantity::density); });
   ++patch.version;
 }
 

@@ -2,6 +2,7 @@
 // changed them, so that a patch costs what the last cuts touched.
 #pragma once
 #include <memory>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
@@ -23,18 +24,24 @@ class PatchBuilder {
 
   // Forgets bricks that contain samples of these leaves (origins at `level`) of a field with this h.
   void changed(double pitch_mm, int level, const std::vector<Coord>& leaf_origins);
-  // Fills `patch` round the tool at this pose. Cuts and room_seq of the patch are the caller's to set.
-  void build(const CutField& field, const ToolModel& model, const Pose& pose_bone_tool, Patch& patch);
+  // Fills `patch` round the tool at this pose, from all bodies of the bone, at least one: solid is the least of theirs.
+  // Cuts and room_seq of the patch are the caller's to set.
+  void build(std::span<const CutField* const> bodies, const ToolModel& model, const Pose& pose_bone_tool, Patch& patch);
+  void build(const CutField& field, const ToolModel& model, const Pose& pose_bone_tool, Patch& patch) {
+    const CutField* const one = &field;
+    build(std::span(&one, 1), model, pose_bone_tool, patch);
+  }
   [[nodiscard]] std::size_t bricks_made() const { return bricks_made_; }
 
  private:
   using Store = std::unordered_map<Coord, std::shared_ptr<const Brick>, CoordHash>;
   enum class Quantity { solid, density };
-  std::shared_ptr<const Brick> brick(Store& store, const CutField& field, int level, Coord index, Quantity quantity);
+  std::shared_ptr<const Brick> brick(Store& store, std::span<const CutField* const> bodies, int level, Coord index, Quantity quantity);
 
   PatchParams params_;
   int fine_level_ = -1;
   Store fine_, coarse_, density_;
+  std::vector<const CutField*> bodies_;  // of the last patch, to see when one comes or goes
   std::shared_ptr<const Brick> air_;  // shared by every brick far from bone
   std::size_t bricks_made_ = 0;
 };

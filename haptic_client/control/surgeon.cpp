@@ -43,6 +43,13 @@ Stray stray(double time_s, double phase) {
   return {wave(phase + 0.8) / std::numbers::sqrt2, wave(phase + 2.5) / std::numbers::sqrt2};
 }
 
+// How far a rig goes: through the bone, or until the tool is as deep as it should be, however far the coupling stretches
+// on the way.
+double feed_end_mm(const ReadyStep& step) {
+  constexpr double kMostStretch_mm = 15.0;
+  return step.plan.to_mm > 0.0 ? step.plan.to_mm + kMostStretch_mm : step.site.thickness_mm + step.plan.beyond_mm;
+}
+
 // The time that a phase may take. What moves by its own clock gets twice that and a margin; the rest, what waits for bone
 // or spindle, as long as any bone could ask for.
 double most_s(const ReadyStep& step, SurgeonPhase phase) {
@@ -50,7 +57,7 @@ double most_s(const ReadyStep& step, SurgeonPhase phase) {
   switch (phase) {
     case SurgeonPhase::seek: return kMargin_s + 2.0 * step.site.thickness_mm / kSeekSpeed_mm_per_s;
     case SurgeonPhase::push: return kMostPush_s;
-    case SurgeonPhase::feed: return kMargin_s + 2.0 * (step.site.thickness_mm + step.plan.beyond_mm) / step.plan.feed_mm_per_s;
+    case SurgeonPhase::feed: return kMargin_s + 2.0 * feed_end_mm(step) / step.plan.feed_mm_per_s;
     case SurgeonPhase::sweep: return kMargin_s + 2.0 * step.sweep_length_mm / step.plan.sweep_mm_per_s;
     default: return kMargin_s;
   }
@@ -287,8 +294,8 @@ void Surgeon::drill(const ReadyStep& step, const LoopReport& report, double dt_s
       }
       break;
     case SurgeonPhase::feed:
-      if (carry_to_depth(step, to_mm > 0.0 ? to_mm : step.site.thickness_mm + step.plan.beyond_mm, step.plan.feed_mm_per_s, dt_s))
-        enter(SurgeonPhase::retract);
+      if (carry_to_depth(step, feed_end_mm(step), step.plan.feed_mm_per_s, dt_s)) enter(SurgeonPhase::retract);
+      if (to_mm > 0.0 && depth >= to_mm) enter(SurgeonPhase::retract);
       break;
     case SurgeonPhase::push:
       hand_.mode = HandMode::push;

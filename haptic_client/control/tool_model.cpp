@@ -53,6 +53,7 @@ bool feeds_along_axis(ToolKind kind) noexcept {
 
 ToolModel::ToolModel(const Tool& definition, double pitch_mm, double wear)
     : tool(definition),
+      solid(tool_solid(definition)),
       axial(feeds_along_axis(definition.kind)),
       cut_level(std::min(definition.cut_level, finest_level(pitch_mm))),
       fine_pitch_mm(level_pitch_mm(pitch_mm, cut_level)) {

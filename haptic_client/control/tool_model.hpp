@@ -6,7 +6,7 @@
 #include "common/mechanics/drilling.hpp"
 #include "common/mechanics/milling.hpp"
 #include "common/mechanics/spindle.hpp"
-#include "common/tools/tool.hpp"
+#include "common/tools/tool_solid.hpp"
 
 namespace osteon::haptic {
 
@@ -36,6 +36,7 @@ struct SweptOutline {
 
 struct ToolModel {
   Tool tool;
+  Implicit solid;                       // cutting part and shank, made once
   bool axial = false;                   // feeds_along_axis
   SweptOutline outline;                 // axial
   int cut_level = 0;                    // the level of its cuts: the tool's own or the finest of the case

@@ -79,6 +79,30 @@ TEST(Patch, FollowsCutsWithFewNewBricks) {
   EXPECT_EQ(builder.bricks_made(), second);
 }
 
+// Two bodies that share the block: what is solid in either is solid, and one that goes takes its half with it.
+TEST(Patch, HoldsEveryBody) {
+  const Case bone = block_case();
+  CutField whole(bone, BodyId{}), left(bone, BodyId{}), right(bone, BodyId{1});
+  // One body has a hole, the other is whole: together they are whole.
+  left.apply(hole(4.0));
+  const ToolModel model(*find_tool("drill-3.2"), bone.pitch_mm());
+  const Pose pose{{0, 0, 4.0}, Eigen::Quaterniond::Identity()};
+  PatchBuilder builder, other;
+  Patch patch, expected;
+  const CutField* const both[] = {&left, &right};
+  builder.build(both, model, pose, patch);
+  other.build(whole, model, pose, expected);
+  double value = 0.0, wanted = 0.0;
+  for (double z = 0.1; z < 5.0; z += 0.3)
+    for (double x = -1.5; x <= 1.5; x += 0.5) {
+      ASSERT_TRUE(patch.solid({x, 0, z}, value) && expected.solid({x, 0, z}, wanted));
+      EXPECT_NEAR(value, wanted, 1e-6);
+    }
+  builder.build(std::span(both, 1), model, pose, patch);
+  ASSERT_TRUE(patch.solid({0, 0, 2.0}, value));
+  EXPECT_GT(value, 0.0);
+}
+
 TEST(Patch, KnowsNothingOutside) {
   const Case bone = block_case();
   const CutField field(bone, BodyId{});

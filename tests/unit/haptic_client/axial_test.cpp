@@ -1,0 +1,113 @@
+// Every tool that is fed along its axis makes the hole of its own shape, and comes out of it without jamming.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "common/volume/cut_field.hpp"
+#include "tests/unit/haptic_client/bench.hpp"
+
+namespace osteon::haptic::test {
+namespace {
+
+struct AxialCase {
+  const char* tool;
+  double block_mm, to_mm;
+};
+
+class AxialTool : public ::testing::TestWithParam<AxialCase> {};
+
+TEST_P(AxialTool, MakesItsOwnHoleAndComesOut) {
+  const AxialCase& which = GetParam();
+  PlanStep step;
+  step.action = Action::drill;
+  step.tool = which.tool;
+  step.hand = HandKind::rig;
+  step.feed_mm_per_s = 2;
+  step.to_mm = which.to_mm;
+  step.entry.point_mm = Vec3(0.1, -0.2, 0);
+  step.entry.axis = Vec3(0, 0, 1);
+  const Case bone = block_case(which.block_mm);
+  Bench bench(bone, {step});
+  double out_n = 0.0, deepest = 0.0, work_min = 0.0;
+  bench.run([&](const SessionTick& tick) {
+    const double z = tick.report.pose_bone_proxy.position_mm.z();
+    deepest = std::max(deepest, z);
+    work_min = std::min(work_min, tick.report.cutting_force_n.dot(tick.report.moved_mm));
+    if (tick.order.phase == SurgeonPhase::lift) out_n = std::max(out_n, tick.report.force_physical_n.norm());
+  });
+  ASSERT_TRUE(bench.session().done());
+  EXPECT_TRUE(bench.session().surgeon().results()[0].completed);
+  EXPECT_GE(work_min, 0.0);
+  EXPECT_EQ(out_n, 0.0);
+  // The rig lets go when the tool is there; while it draws back, the coupling's stretch still pushes.
+  EXPECT_GE(deepest, which.to_mm);
+  EXPECT_LT(deepest, which.to_mm + 1.5);
+
+  // Another road to the same hole: the tool swept straight from above to the deepest place.
+  const Tool tool = *find_tool(which.tool);
+  CutField swept(bone, BodyId{});
+  Cut cut;
+  cut.author = AuthorId{1};
+  cut.author_seq = 1;
+  cut.tool = tool.hash();
+  cut.level = std::min(tool.cut_level, finest_level(bone.pitch_mm()));
+  cut.path = {quantise(pose_along({0.1, -0.2, -1}, Vec3::UnitZ())), quantise(pose_along({0.1, -0.2, deepest}, Vec3::UnitZ()))};
+  swept.apply(cut);
+  std::printf("  %s: %.2f mm deep, %.1f mm3 removed, straight sweep %.1f mm3\n", which.tool, deepest, bench.replica().removed_mm3(), swept.removed_mm3());
+  EXPECT_NEAR(bench.replica().removed_mm3(), swept.removed_mm3(), 0.01 * swept.removed_mm3());
+}
+
+INSTANTIATE_TEST_SUITE_P(All, AxialTool,
+                         ::testing::Values(AxialCase{"drill-1-8in", 12, 3}, AxialCase{"drill-5-16in", 20, 4}, AxialCase{"end-drill", 20, 3},
+                                           AxialCase{"pin-1", 12, 5}, AxialCase{"reamer-cylinder", 24, 3}, AxialCase{"reamer-sphere", 40, 2},
+                                           AxialCase{"reamer-outside", 64, 1}),
+                         [](const auto& test) {
+                           std::string name = test.param.tool;
+                           std::ranges::replace(name, '-', '_');
+                           return name;
+                         });
+
+// What the proxy takes for cut is what the kernel cuts: the outline's sign against the field's, on both sides of the wall.
+TEST(SweptOutline, HasTheSignOfTheCut) {
+  const Case bone = block_case(24.0);
+  for (const char* name : {"drill-3.2", "end-drill", "pin-1", "reamer-cylinder"}) {
+    const Tool tool = *find_tool(name);
+    const ToolModel model(tool, bone.pitch_mm());
+    CutField field(bone, BodyId{});
+    Cut cut;
+    cut.author = AuthorId{1};
+    cut.author_seq = 1;
+    cut.tool = tool.hash();
+    cut.level = model.cut_level;
+    cut.path = {quantise(pose_along({0, 0, -1}, Vec3::UnitZ())), quantise(pose_along({0, 0, 8}, Vec3::UnitZ()))};
+    field.apply(cut);
+    int in = 0, out = 0;
+    for (double z = 0.4; z < 10.0; z += 0.37)
+      for (double x = 0.05; x < 8.0; x += 0.13) {
+        const double outline = model.outline.distance_mm({x, 0, z - 8.0}), solid = field.solid_mm({x, 0, z});
+        if (std::abs(solid) < 0.75 * model.fine_pitch_mm) continue;
+        EXPECT_EQ(outline < 0.0, solid > 0.0) << name << " at " << x << ", " << z;
+        ++(outline < 0.0 ? in : out);
+      }
+    EXPECT_GT(in, 50) << name;
+    EXPECT_GT(out, 50) << name;
+  }
+}
+
+TEST(Plan, RefusesWhatTheHandCannotGuideYet) {
+  const Case bone = block_case();
+  for (const char* name : {"saw-oscillating-1", "broach-1", "burr-barrel"}) {
+    PlanStep step;
+    step.action = Action::drill;
+    step.tool = name;
+    step.entry.toward = Vec3(0, 0, -1);
+    const auto refused = make_ready({step}, bone);
+    ASSERT_FALSE(refused.has_value()) << name;
+    EXPECT_NE(refused.error().message.find("choose a drill"), std::string::npos) << refused.error().message;
+    step.action = Action::burr;
+    EXPECT_NE(make_ready({step}, bone).error().message.find("choose a round burr"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace osteon::haptic::test
