@@ -5,6 +5,9 @@
 #include <functional>
 #include <numbers>
 
+#include "common/tools/tool_solid.hpp"
+#include "common/tools/tool_surface.hpp"
+
 namespace osteon {
 
 namespace {
@@ -100,9 +103,49 @@ void add_burr(ToolMesh& mesh, const Tool& tool, double neck_radius) {
   add_strip(mesh, ball, 48, true);
 }
 
+// About so many triangles draw a tool, unless it has something thin.
+constexpr double kTriangles = 16000.0;
+// Where a face turns away from its corner's normal by more than this (cosine), the corner is sharp.
+constexpr double kSharp = 0.9;
+
+// Any tool by its implicit solid. Corners on sharp edges are drawn once for each face, with that face's normal.
+ToolMesh surface_mesh(const Tool& tool) {
+  const Implicit solid = tool_solid(tool), part = cutting_part(tool);
+  const Vec3 size = solid.bounds.size_mm();
+  const double area = 2.0 * (size.x() * size.y() + size.y() * size.z() + size.z() * size.x());
+  const TriangleMesh surface = tool_surface(tool, std::sqrt(2.0 * area / kTriangles));
+  ToolMesh mesh;
+  mesh.positions_mm = surface.positions_mm;
+  std::vector<Vec3> normals;
+  for (std::uint32_t i = 0; i < surface.positions_mm.size(); ++i) {
+    const Vec3 p = position(surface, i);
+    normals.push_back(gradient(solid, p));
+    mesh.cutting.push_back(tool.cuts() && part(p) <= solid(p) + 1e-9 ? 1 : 0);
+  }
+  const auto add_normal = [&mesh](const Vec3& n) { mesh.normals.push_back({float(n.x()), float(n.y()), float(n.z())}); };
+  for (const Vec3& n : normals) add_normal(n);
+  for (const auto& triangle : surface.triangles) {
+    const Vec3 a = position(surface, triangle[0]);
+    const Vec3 across = (position(surface, triangle[1]) - a).cross(position(surface, triangle[2]) - a);
+    if (across.norm() < 1e-12) continue;
+    const Vec3 face = across.normalized();
+    std::array<std::uint32_t, 3> corners = triangle;
+    for (std::uint32_t& corner : corners) {
+      if (normals[corner].dot(face) > kSharp) continue;
+      mesh.positions_mm.push_back(mesh.positions_mm[corner]);
+      mesh.cutting.push_back(mesh.cutting[corner]);
+      add_normal(face);
+      corner = static_cast<std::uint32_t>(mesh.positions_mm.size() - 1);
+    }
+    mesh.triangles.push_back(corners);
+  }
+  return mesh;
+}
+
 }  // namespace
 
 ToolMesh tool_mesh(const Tool& tool) {
+  if (tool.kind != ToolKind::drill && tool.kind != ToolKind::round_burr) return surface_mesh(tool);
   ToolMesh mesh;
   const double shank = 0.5 * tool.shank_diameter_mm;
   const double end = tool.cutting_length_mm, reach = tool.reach_mm();

@@ -1,4 +1,5 @@
-// A tool to look at, made from its definition: a surface of revolution whose cutting part is carved by flutes.
+// A tool to look at, made from its definition: drills and round burs as surfaces of revolution carved by flutes, every
+// other by its implicit solid.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -15,7 +16,7 @@ struct ToolMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-// Nowhere outside the tool's solid; the flutes' lands lie on it.
+// On the tool's solid or, in flutes, inside of it. Closed; corners on sharp edges are there once for each face.
 [[nodiscard]] ToolMesh tool_mesh(const Tool& tool);
 
 }  // namespace osteon

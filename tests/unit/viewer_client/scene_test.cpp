@@ -1,7 +1,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
 
+#include "common/tools/tool_solid.hpp"
 #include "synthetic.hpp"
 #include "viewer_client/scene/camera_view.hpp"
 #include "viewer_client/scene/gauges.hpp"
@@ -180,29 +184,47 @@ TEST(CameraView, BesideToolSeesTheTipFromBehindTheTool) {
 
 class ToolMeshes : public testing::TestWithParam<Tool> {};
 
-TEST_P(ToolMeshes, LiesOnTheToolAndReachesItsDiameter) {
+// Drills and round burs are drawn with flutes, every other tool as it is.
+bool fluted(const Tool& tool) { return tool.kind == ToolKind::drill || tool.kind == ToolKind::round_burr; }
+
+TEST_P(ToolMeshes, LiesOnTheToolAndFillsItsBox) {
   const Tool& tool = GetParam();
   const ToolMesh mesh = tool_mesh(tool);
+  const Implicit solid = tool_solid(tool);
   ASSERT_EQ(mesh.normals.size(), mesh.positions_mm.size());
-  double widest = 0.0, lowest = 0.0;
+  ASSERT_EQ(mesh.cutting.size(), mesh.positions_mm.size());
+  Box drawn;
+  std::size_t cutting = 0;
+  double inside_mm = 0.0;
   for (std::size_t i = 0; i < mesh.positions_mm.size(); ++i) {
     const Vec3 p(mesh.positions_mm[i][0], mesh.positions_mm[i][1], mesh.positions_mm[i][2]);
-    if (mesh.cutting[i] != 0) {
-      EXPECT_LT(signed_distance_mm(tool, p), 2e-3);
-      widest = std::max(widest, std::hypot(p.x(), p.y()));
+    const double distance_mm = solid(p);
+    if (fluted(tool)) {
+      EXPECT_LT(distance_mm, 2e-3);
     } else {
-      // A burr's neck is drawn on into the ball, which the definition leaves open there.
-      EXPECT_LT(signed_distance_mm(tool, p), 0.1 * tool.diameter_mm);
+      EXPECT_LT(distance_mm, 0.03);  // in a hollow edge that a cell cuts short
+      inside_mm += std::max(0.0, -distance_mm) / static_cast<double>(mesh.positions_mm.size());
     }
-    lowest = std::min(lowest, p.z());
-    EXPECT_LE(p.z(), 1e-6);
+    if (mesh.cutting[i] != 0) {
+      ++cutting;
+      EXPECT_GT(p.z(), -tool.cutting_length_mm - 0.01);
+    }
+    drawn.include(p);
   }
-  EXPECT_NEAR(2.0 * widest, tool.diameter_mm, 0.01 * tool.diameter_mm);
-  EXPECT_NEAR(-lowest, tool.reach_mm(), 1e-3);
+  EXPECT_LT(inside_mm, 0.005);
+  EXPECT_EQ(cutting > 0, tool.cuts());
+  EXPECT_LT(cutting, mesh.positions_mm.size());
+  // A narrow point may end in its last cell, a millimetre at most.
+  const Box box = local_bounds(tool);
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_NEAR(drawn.min_mm[k], box.min_mm[k], 0.01 * box.size_mm()[k]);
+    EXPECT_NEAR(drawn.max_mm[k], box.max_mm[k], k == 2 ? std::min(1.0, 0.02 * box.size_mm()[k]) : 0.01 * box.size_mm()[k]);
+  }
+  EXPECT_NEAR(drawn.min_mm.z(), -tool.reach_mm(), 1e-3);
 }
 
 // Gauss: the flux of the position through a closed surface is three times its volume, which is positive only if all
-// triangles turn outwards; flutes take away less than half of the solid.
+// triangles turn outwards.
 TEST_P(ToolMeshes, IsClosedAndTurnsOutwards) {
   const Tool& tool = GetParam();
   const ToolMesh mesh = tool_mesh(tool);
@@ -219,16 +241,32 @@ TEST_P(ToolMeshes, IsClosedAndTurnsOutwards) {
     const Vec3 shading(mesh.normals[a][0], mesh.normals[a][1], mesh.normals[a][2]);
     if (normal.norm() > 1e-5 && shading.dot(normal) < 0.0) ++against;
   }
-  const double radius = 0.5 * tool.diameter_mm, shank = 0.5 * tool.shank_diameter_mm;
-  const double shank_mm3 = std::numbers::pi * shank * shank * tool.shank_length_mm;
-  const double head_mm3 = tool.kind == ToolKind::drill
-                              ? std::numbers::pi * radius * radius *
-                                    (tool.cutting_length_mm - 2.0 / 3.0 * radius / std::tan(0.5 * tool.point_angle_rad))
-                              : 4.0 / 3.0 * std::numbers::pi * radius * radius * radius;
-  EXPECT_GT(volume_mm3, shank_mm3 + 0.5 * head_mm3);
-  EXPECT_LT(volume_mm3, 1.02 * (shank_mm3 + head_mm3));
   EXPECT_LT(area_mm2.norm(), 0.01);  // a closed surface has no net area
   EXPECT_LT(against, mesh.triangles.size() / 100);
+
+  const double radius = 0.5 * tool.diameter_mm, shank = 0.5 * tool.shank_diameter_mm;
+  const double shank_mm3 = std::numbers::pi * shank * shank * tool.shank_length_mm;
+  if (fluted(tool)) {
+    // Flutes take away less than half of the solid.
+    const double head_mm3 = tool.kind == ToolKind::drill
+                                ? std::numbers::pi * radius * radius *
+                                      (tool.cutting_length_mm - 2.0 / 3.0 * radius / std::tan(0.5 * tool.point_angle_rad))
+                                : 4.0 / 3.0 * std::numbers::pi * radius * radius * radius;
+    EXPECT_GT(volume_mm3, shank_mm3 + 0.5 * head_mm3);
+    EXPECT_LT(volume_mm3, 1.02 * (shank_mm3 + head_mm3));
+    return;
+  }
+  // Every other tool by counting random places, within three and a half standard deviations and chords of three per cent.
+  const Implicit solid = tool_solid(tool);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> share(0.0, 1.0);
+  constexpr int kPlaces = 50000;
+  int inside = 0;
+  const Box box = solid.bounds;
+  for (int i = 0; i < kPlaces; ++i)
+    inside += solid(box.min_mm + Vec3(share(random), share(random), share(random)).cwiseProduct(box.size_mm())) < 0.0;
+  const double p = static_cast<double>(inside) / kPlaces, whole_mm3 = box.size_mm().prod();
+  EXPECT_NEAR(volume_mm3, p * whole_mm3, 3.5 * std::sqrt(p * (1.0 - p) / kPlaces) * whole_mm3 + 0.03 * p * whole_mm3);
 }
 
 INSTANTIATE_TEST_SUITE_P(Builtin, ToolMeshes, testing::ValuesIn(builtin_tools().begin(), builtin_tools().end()),
