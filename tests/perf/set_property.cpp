@@ -1,6 +1,8 @@
 // Whether a bone is a function of the set of its cuts: applies random cuts of all tools in random orders, some of them
-// again, and compares the names of the fields. Takes cuts, orders and threads, prints JSON, and progress to stderr.
-// Linked with differently built kernels it must print the same name.
+// again, and compares the names of the fields. Takes cuts, orders, threads that share a cut and, if wanted, how many samples the kernel
+// computes at once; prints JSON, and progress to stderr. Linked with differently built kernels it must print the same name.
+#include <tbb/global_control.h>
+
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -10,6 +12,7 @@
 #include <set>
 #include <thread>
 
+#include "common/field/kernel.hpp"
 #include "common/volume/cut_field.hpp"
 #include "tests/support/scenes/random_cuts.hpp"
 
@@ -30,7 +33,9 @@ CutField apply_in_order(const Case& bone, const std::vector<Cut>& cuts, const st
   return field;
 }
 
-int run(std::size_t count, int orders, int threads) {
+int run(std::size_t count, int orders, int threads, int lanes) {
+  const int used = limit_kernel_lanes(lanes);
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
   const Case bone = ball_of_bone();
   Random random(1);
   const std::vector<Cut> cuts = grazing_cuts(count, random);
@@ -66,14 +71,16 @@ int run(std::size_t count, int orders, int threads) {
         std::fprintf(stderr, "%d of %d orders, %d differ, %.0f s\n", tally.done, orders, tally.differing, seconds());
     }
   };
+  // Where each cut has one thread, as many orders are applied at once as there are processors; else one after the other.
+  const int at_once = threads == 1 ? std::max(1, static_cast<int>(std::thread::hardware_concurrency())) : 1;
   std::vector<std::jthread> pool;
-  for (int i = 0; i < threads; ++i) pool.emplace_back(work);
+  for (int i = 0; i < at_once; ++i) pool.emplace_back(work);
   pool.clear();
 
   tally.names.insert(expected);
-  std::printf("{\"cuts\": %zu, \"orders\": %d, \"threads\": %d, \"seconds\": %.1f, \"tools\": %zu, \"names\": %zu, "
-              "\"differing\": %d, \"partly_cut\": %.4f, \"name\": \"%s\"}\n",
-              count, orders, threads, seconds(), cutting_tools(), tally.names.size(), tally.differing,
+  std::printf("{\"cuts\": %zu, \"orders\": %d, \"threads\": %d, \"lanes\": %d, \"seconds\": %.1f, \"tools\": %zu, "
+              "\"names\": %zu, \"differing\": %d, \"partly_cut\": %.4f, \"name\": \"%s\"}\n",
+              count, orders, threads, used, seconds(), cutting_tools(), tally.names.size(), tally.differing,
               samples == 0 ? 0.0 : static_cast<double>(between) / static_cast<double>(samples), to_hex(expected).c_str());
   return 0;
 }
@@ -84,9 +91,10 @@ int run(std::size_t count, int orders, int threads) {
 int main(int argc, char** argv) {
   const long cuts = argc > 1 ? std::atol(argv[1]) : 0;
   const int orders = argc > 2 ? std::atoi(argv[2]) : 0, threads = argc > 3 ? std::atoi(argv[3]) : 0;
-  if (cuts < 1 || cuts > 1000000 || orders < 1 || threads < 1 || threads > 64) {
+  const int lanes = argc > 4 ? std::atoi(argv[4]) : 16;
+  if (cuts < 1 || cuts > 1000000 || orders < 1 || threads < 1 || threads > 64 || lanes < 4) {
     std::fprintf(stderr, "osteon-set-property: needs the numbers of cuts, of orders and of threads\n");
     return 1;
   }
-  return osteon::test::run(static_cast<std::size_t>(cuts), orders, threads);
+  return osteon::test::run(static_cast<std::size_t>(cuts), orders, threads, lanes);
 }

@@ -16,13 +16,15 @@ import registry
 ROOT = Path(__file__).resolve().parents[3]
 
 
-def line(figure, value, baseline):
-    """NAME VALUE UNIT (baseline VALUE, ratio R) target T ok|short|info"""
+def line(figure, value, baseline=None, low=None, high=None, threads=None):
+    """NAME VALUE UNIT (baseline VALUE, ratio R[, min A, max B][, threads N]) target T ok|short|info"""
     beside = ""
     if baseline is not None:
         ratio = f"{value / baseline:.3g}" if value is not None and baseline else "-"
         beside = f"baseline {number(baseline)}, ratio {ratio}"
-    return (f"{figure.name} {number(value)} {figure.unit} ({beside or 'baseline -, ratio -'}) "
+    spread = "" if low is None and high is None else f", min {number(low)}, max {number(high)}"
+    parallel = "" if threads is None else f", threads {threads}"
+    return (f"{figure.name} {number(value)} {figure.unit} ({beside or 'baseline -, ratio -'}{spread}{parallel}) "
             f"target {figure.target_text()} {figure.verdict(value)}")
 
 
@@ -35,12 +37,12 @@ def number(value):
 def list_figures(figures, as_json):
     if as_json:
         print(json.dumps([{"name": f.name, "unit": f.unit, "measures": f.measures, "target": f.target_text(),
-                           "baseline": f.baseline} for f in figures], indent=2))
+                           "baseline": f.baseline, "full": f.full} for f in figures], indent=2))
         return
     width = max(len(f.name) for f in figures)
     for f in figures:
         beside = f"; baseline: {f.baseline}" if f.baseline else ""
-        print(f"{f.name:{width}}  {f.unit:9}  {f.target_text():8}  {f.measures}{beside}")
+        print(f"{f.name:{width}}  {f.unit:9}  {f.target_text():8}  {f.measures}{beside}{'; only with --full' if f.full else ''}")
 
 
 def commit():
@@ -50,14 +52,33 @@ def commit():
     return (git("rev-parse", "--short=12", "HEAD") or "unknown") + changed
 
 
+def saved(figure, measured):
+    measured = registry.Measured(*measured)
+    kept = {"value": rounded(measured.value), "unit": figure.unit, "baseline": rounded(measured.baseline),
+            "target": figure.target_text(), "verdict": figure.verdict(measured.value)}
+    if measured.low is not None or measured.high is not None:
+        kept |= {"min": rounded(measured.low), "max": rounded(measured.high)}
+    if measured.threads is not None:
+        kept["threads"] = measured.threads
+    return kept
+
+
+def print_tables(tables):
+    """Lists beside the figures, as of all tools: every column as wide as it needs."""
+    for title, rows in tables:
+        print(f"# {title}")
+        widths = [max(len(str(row[i])) for row in rows) for i in range(len(rows[0]))]
+        for row in rows:
+            print("#   " + "  ".join(f"{cell!s:{width}}" for cell, width in zip(row, widths)).rstrip())
+
+
 def results(figures, values, soak, machine, load):
     """What is committed under tests/perf/results: numbers with the commit and the conditions."""
     return {
         "commit": commit(), "date": datetime.now(timezone.utc).strftime("%Y-%m-%d"), "machine": machine,
         "size": "soak" if soak else "quick", "build": "perf",
         "load_before": round(load, 2),  # processes that wanted a processor in the minute before
-        "figures": {f.name: {"value": rounded(values[f.name][0]), "unit": f.unit, "baseline": rounded(values[f.name][1]),
-                             "target": f.target_text(), "verdict": f.verdict(values[f.name][0])} for f in figures},
+        "figures": {f.name: saved(f, values[f.name]) for f in figures},
     }
 
 
@@ -71,6 +92,11 @@ def rounded(value):
     if value is None or isinstance(value, int):
         return value
     return float(f"{value:.5g}") if math.isfinite(value) else None
+
+
+def skip_reason(figure, skipped):
+    """Why a figure was left out, where its data is not on this machine; None when it was measured."""
+    return next((reason for name, reason in skipped.items() if figure.name.startswith(name)), None)
 
 
 def measure(figures, run, groups):
@@ -93,6 +119,7 @@ def main():
     parser.add_argument("--list", action="store_true", help="show the figures and what they measure; run nothing")
     parser.add_argument("--json", action="store_true", help="print JSON instead of lines")
     parser.add_argument("--soak", action="store_true", help="longer runs and more repetitions")
+    parser.add_argument("--full", action="store_true", help="also the figures that take minutes; each also runs when it is named")
     parser.add_argument("--save", action="store_true",
                         help="also write all results with commit and conditions into tests/perf/results")
     parser.add_argument("--build", type=Path, help=argparse.SUPPRESS)
@@ -101,7 +128,7 @@ def main():
         print("deploy/figures: --save is for all figures at once; leave out the names", file=sys.stderr)
         return 2
     try:
-        figures = registry.by_name(options.names)
+        figures = registry.by_name(options.names, options.full or options.list)
     except ValueError as error:
         print(f"deploy/figures: {error}", file=sys.stderr)
         return 2
@@ -129,15 +156,18 @@ def main():
     except KeyboardInterrupt:
         print("deploy/figures: stopped; every program has been ended", file=sys.stderr)
         return 130
-    outcome = results(figures, values, options.soak, groups.record.machine(), load)
+    decided = [f for f in figures if not skip_reason(f, run.skipped)]
+    outcome = results(decided, values, options.soak, groups.record.machine(), load)
     if options.save:
         results_file(outcome["machine"]).write_text(json.dumps(outcome, indent=2) + "\n", encoding="utf-8")
     if options.json:
         print(json.dumps(outcome, indent=2))
     else:
         for figure in figures:
-            print(line(figure, *values[figure.name]))
-    return 1 if any(f.verdict(values[f.name][0]) == "short" for f in figures) else 0
+            reason = skip_reason(figure, run.skipped)
+            print(f"{figure.name} skipped: {reason}" if reason else line(figure, *values[figure.name]))
+        print_tables(run.tables)
+    return 1 if any(f.verdict(values[f.name][0]) == "short" for f in decided) else 0
 
 
 if __name__ == "__main__":

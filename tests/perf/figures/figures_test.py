@@ -11,7 +11,7 @@ import groups  # noqa: E402
 import registry  # noqa: E402
 from registry import Figure  # noqa: E402
 
-FORM = re.compile(r"^\S+ \S+ \S+ \(baseline \S+, ratio \S+\) target \S+ (ok|short|info)$")
+FORM = re.compile(r"^\S+ \S+ \S+ \(baseline \S+, ratio \S+(, min \S+, max \S+)?(, threads \d+)?\) target \S+ (ok|short|info)$")
 TIMES = {"us", "ms", "s"}
 
 
@@ -24,6 +24,17 @@ class Registry(unittest.TestCase):
     def test_no_absolute_time_is_decided(self):
         self.assertEqual([f.name for f in registry.FIGURES if f.unit in TIMES and f.target], [])
 
+    def test_what_takes_minutes_runs_when_asked_for(self):
+        slow = [f.name for f in registry.FIGURES if f.full]
+        self.assertTrue(slow)
+        self.assertFalse(set(slow) & {f.name for f in registry.by_name([])})
+        self.assertLessEqual(set(slow), {f.name for f in registry.by_name([], full=True)})
+        self.assertEqual([f.name for f in registry.by_name(slow[:1])], slow[:1])
+
+    def test_groups_are_slow_or_quick_as_a_whole(self):
+        for group in groups.GROUPS:
+            self.assertLessEqual(len({f.full for f in registry.FIGURES if f.group == group}), 1, group)
+
     def test_an_unknown_name_is_an_error(self):
         with self.assertRaises(ValueError):
             registry.by_name(["no_such_figure"])
@@ -34,6 +45,7 @@ class Lines(unittest.TestCase):
         figure = Figure("f", "ratio", "x", "bench", ("<=", 2.0))
         for value, baseline in ((1.5, 3.0), (1.5, None), (0, None), (None, None), (1.0, 0.0)):
             self.assertRegex(figures.line(figure, value, baseline), FORM)
+            self.assertRegex(figures.line(figure, *registry.Measured(value, baseline, 1.0, 2.0, 2)), FORM)
 
     def test_verdicts(self):
         self.assertEqual(Figure("f", "ratio", "x", "bench", ("<=", 2.0)).verdict(2.0), "ok")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+import kernels
 import registry
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -47,6 +48,8 @@ class Run:
     say: object
     sessions: list = field(default_factory=list)   # numbers of every session so far
     plunges: dict = field(default_factory=dict)
+    tables: list = field(default_factory=list)     # (title, rows) printed beside the figures
+    skipped: dict = field(default_factory=dict)    # what was left out: name or its beginning, and why
     _loop: dict = None
 
     def empty_loop(self):
@@ -55,11 +58,13 @@ class Run:
             self._loop = json.loads(self.output("osteon-empty-loop", 60 if self.soak else 10))
         return self._loop
 
-    def output(self, program, *arguments):
+    def output(self, program, *arguments, progress=False):
+        """What a program prints; `progress`: what it says meanwhile is for the user."""
         command = [self.programs / program, *map(str, arguments)]
-        result = subprocess.run(command, capture_output=True, text=True, check=False)
+        result = subprocess.run(command, stdout=subprocess.PIPE, stderr=None if progress else subprocess.PIPE, text=True,
+                                check=False)
         if result.returncode != 0:
-            raise Failure(f"{program} ended with {result.returncode}: {result.stderr.strip()[-400:]}")
+            raise Failure(f"{program} ended with {result.returncode}: {(result.stderr or '').strip()[-400:]}")
         return result.stdout
 
     def phantom(self):
@@ -69,6 +74,22 @@ class Run:
             layers = ",".join(f"{thickness:g}:{density:g}" for thickness, density in LAYERS)
             self.output("osteon-import", "phantom", "block", "--layers", layers, "--out", case)
         return case
+
+    def skip(self, name, reason):
+        self.skipped[name] = reason
+        self.say(f"{name} is SKIPPED: {reason}")
+
+    @staticmethod
+    def shared_data(name):
+        """A folder of data that may lie beside the checkout or beside a folder above it."""
+        found = [parent.parent / "shared/data" / name for parent in (ROOT, *ROOT.parents[:-1])]
+        return next((folder for folder in found if folder.is_dir()), None)
+
+    @staticmethod
+    def example(name):
+        """A file of Debian's invesalius-examples: installed, or unpacked by deploy/install."""
+        inside = Path("usr/share/doc/invesalius-examples/examples") / name
+        return next((root / inside for root in (Path("/"), ROOT / "build/examples") if (root / inside).is_file()), None)
 
     def session(self, name, plan):
         self.say(f"session: {name}")
@@ -200,22 +221,5 @@ def novice(run):
     }
 
 
-def bench(run):
-    """Google Benchmark; medians of repetitions, each beside the plain way of doing the same."""
-    run.say("kernels")
-    out = json.loads(run.output("osteon-bench", "--benchmark_format=json", "--benchmark_min_time=0.2",
-                                f"--benchmark_repetitions={15 if run.soak else 5}",
-                                "--benchmark_report_aggregates_only=true"))
-    median = {b["run_name"]: b for b in out["benchmarks"] if b.get("aggregate_name") == "median"}
-    time = {name: b["real_time"] for name, b in median.items()}
-    return {
-        "cut_burr": (time["cut_burr"], time["cut_burr_plain"]),
-        "cut_drill": (time["cut_drill"], time["cut_drill_plain"]),
-        "mesh_encode": (time["mesh_encode"], time["mesh_flying_edges"]),
-        "mesh_decode": (time["mesh_decode"], time["mesh_flying_edges"]),
-        "mesh_bytes_per_triangle": (median["mesh_encode"]["bytes_per_triangle"], None),
-    }
-
-
 # In the order in which they run: agreement is counted after every session.
-GROUPS = {"bench": bench, "expert": expert, "novice": novice, "rig": rig}
+GROUPS = {**kernels.GROUPS, "expert": expert, "novice": novice, "rig": rig}

@@ -3,7 +3,16 @@
 A figure is decided ("ok" or "short") only when it is a ratio, a count or a bound; absolute times depend on the machine
 and are printed as "info", beside a baseline that was measured on the same machine in the same run."""
 from dataclasses import dataclass
-from typing import Optional
+from typing import NamedTuple, Optional
+
+
+class Measured(NamedTuple):
+    """What a group gives for a figure: its value, mostly a median, and what it was measured beside and with."""
+    value: object
+    baseline: object = None
+    low: object = None              # smallest and largest of the values that `value` stands for
+    high: object = None
+    threads: Optional[int] = None
 
 
 @dataclass(frozen=True)
@@ -14,6 +23,7 @@ class Figure:
     group: str                      # what produces it, see groups.py; a group runs once for all of its figures
     target: Optional[tuple] = None  # (comparison, bound); None: information
     baseline: str = ""              # what `baseline` is; empty: there is none
+    full: bool = False              # measured when it is named or everything is asked for, as it takes minutes
 
     def verdict(self, value):
         if self.target is None:
@@ -31,6 +41,7 @@ COMPARISONS = {
     "==": lambda value, bound: value == bound,
 }
 
+ACCESSOR = "voxel by voxel through an OpenVDB accessor"
 EMPTY_LOOP = "the same of an empty 1 kHz loop"
 
 FIGURES = [
@@ -78,23 +89,89 @@ FIGURES = [
            ("==", 0)),
     Figure("mesh_hash_differences", "count", "viewers, one of them late, that held another surface than the server at the end", "rig",
            ("==", 0)),
-    # Kernels.
-    Figure("cut_burr", "us", "applying a 5 mm burr's cut of 8 ms at 0.125 mm", "bench",
-           baseline="voxel by voxel through an OpenVDB accessor"),
-    Figure("cut_drill", "us", "applying a 3.2 mm drill's cut of 8 ms at 0.125 mm", "bench",
-           baseline="voxel by voxel through an OpenVDB accessor"),
-    Figure("mesh_encode", "us", "making one block of surface with its bytes", "bench",
+    # Cutting at 0.125 mm, one cut of a haptic client (8 ms); single threads unless they say otherwise.
+    *[figure for tool, what, least in (("burr", "a 3.2 mm burr's cut", 7.0), ("drill", "a 3.5 mm drill's cut", 15.0))
+      for figure in (
+        Figure(f"cut_{tool}", "us", f"applying {what} at 0.125 mm", "cutting", baseline=ACCESSOR),
+        Figure(f"cut_{tool}_speedup", "ratio", f"{what}: a ValueAccessor over the voxels of the tool's world bounding block, "
+               "over ours", "cutting", (">=", least)),
+        Figure(f"cut_{tool}_speedup_2", "ratio", "the same with two threads for ours", "cutting", (">=", least)),
+        Figure(f"cut_{tool}_speedup_near", "ratio", f"{what}: a ValueAccessor over no leaves but those near the tool, over ours",
+               "cutting"),
+        *[Figure(f"cut_{tool}_cold_p99{suffix}", "of_budget", f"{what} where nothing was touched before, {threads}: 99th percentile "
+                 "as a part of 200 us", "cutting", ("<=", 1.0)) for suffix, threads in (("", "one thread"), ("_2", "two threads"))])],
+    Figure("tools_slowest_cut", "of_budget", "the slowest of the cutting tools, each at its own level: median as a part of 2 ms",
+           "cutting", ("<=", 1.0)),
+    Figure("tools_slowest_cut_2", "of_budget", "the same with two threads", "cutting", ("<=", 1.0)),
+    Figure("tools_measured", "count", "cutting tools in that list; 21 of Appendix B's 24 cut", "cutting", (">=", 21)),
+    # The surface.
+    Figure("mesh_block_speedup", "ratio", "gathering a burred block, its marching cubes and normals: time of "
+           "vtkFlyingEdges3D on its samples over ours", "surface", (">=", 3.0)),
+    Figure("mesh_whole_bone_speedup", "ratio", "the same for a whole bone, one thread each", "surface", (">=", 2.5)),
+    Figure("mesh_whole_bone_speedup_2", "ratio", "the same for a whole bone, two threads each", "surface", (">=", 2.5)),
+    Figure("mesh_triangle_difference", "count", "triangles of the whole bone that vtkFlyingEdges3D has more or fewer",
+           "surface", ("==", 0)),
+    Figure("mesh_frame_share", "ratio", "vtkFlyingEdges3D on the whole bone over the frame after 33 burr cuts", "surface",
+           (">=", 250.0)),
+    Figure("mesh_bytes_per_triangle", "bytes", "a burred block on the wire per triangle", "surface", ("<=", 2.2)),
+    Figure("mesh_bytes_per_triangle_bone", "bytes", "a whole bone on the wire per triangle", "surface"),
+    Figure("mesh_encode", "us", "making one block of surface with its bytes", "surface",
            baseline="vtkFlyingEdges3D on the same samples"),
-    Figure("mesh_decode", "us", "rebuilding one block of surface from its bytes", "bench",
+    Figure("mesh_decode", "us", "rebuilding one block of surface from its bytes", "surface",
            baseline="vtkFlyingEdges3D on the same samples"),
-    Figure("mesh_bytes_per_triangle", "bytes", "size of a block on the wire per triangle", "bench"),
+    # How true cuts are, at random places and orientations: the worst trial decides.
+    *[figure for body, what in (("sphere", "a sphere cut by the 3.2 mm burr"), ("hole", "a hole drilled through a slab"),
+                                ("kerf", "a saw's kerf through a shaft")) for figure in (
+        Figure(f"accuracy_{body}_volume", "percent", f"volume of {what} at 0.125 mm against its closed form", "accuracy",
+               ("<=", 0.5)),
+        Figure(f"accuracy_{body}_order", "order", f"the same error's rate: it falls with the pitch to this power, 0.5 to "
+               "0.125 mm", "accuracy", (">=", 1.5)),
+        Figure(f"accuracy_{body}_surface", "pitches", f"largest distance of vertices from {what}, away from edges",
+               "accuracy", ("<=", 0.15)))],
+    # The bone is a function of the set of its cuts.
+    Figure("set_property_differences", "count", "random orders with repeats, of 300 random cuts of all tools, that gave "
+           "another bone", "set_property", ("==", 0)),
+    Figure("set_property_partly_cut", "ratio", "samples of that bone between uncut and gone; without them it would prove "
+           "nothing", "set_property", (">=", 0.1)),
+    Figure("set_property_kernels", "count", "kernels by other compilers and settings tried, two orders each", "set_property",
+           (">=", 3)),
+    Figure("set_property_kernel_differences", "count", "of those, the ones that gave another bone", "set_property", ("==", 0)),
+    Figure("set_property_full_differences", "count", "100 orders with repeats, of 10000 random cuts of all tools, one and two "
+           "threads, that gave another bone", "set_property_full", ("==", 0), full=True),
+    Figure("set_property_full_orders", "count", "orders tried for that", "set_property_full", ("==", 100), full=True),
+    Figure("set_property_full_kernel_differences", "count", "kernels that gave another bone for these cuts, two orders each",
+           "set_property_full", ("==", 0), full=True),
+    # Growth.
+    *[Figure(f"growth_cut_{size}", "ratio", f"a burr's cut in a bone of {size}^3 samples over the same in 128^3", "growth",
+             ("<=", 1.25)) for size in (256, 512, 1024)],
+    Figure("growth_memory_per_area", "bytes", "memory of the cut field per mm2 of cut surface, fitted through zero", "growth"),
+    Figure("growth_memory_per_volume", "bytes", "the same per mm3 of removed bone, one bur", "growth"),
+    Figure("growth_memory_linear", "ratio", "correlation of memory with cut surface", "growth", (">=", 0.99)),
+    Figure("growth_memory_bone_ratio", "ratio", "memory of a cut in the largest bone over the smallest, cuts scattered",
+           "growth"),
+    # Taking back.
+    Figure("undo_leaves", "count", "leaves rebuilt to take one of 1000 burr cuts back, median", "undo"),
+    Figure("undo_time", "us", "taking one of 1000 burr cuts back, median", "undo", baseline="applying all the others again"),
+    Figure("undo_share", "ratio", "time to take one cut back over that of applying all the others again", "undo",
+           ("<=", 0.1)),
+    Figure("undo_differences", "count", "bones that were not as if the cut had never been made", "undo", ("==", 0)),
+    # Bones from real images, burred in frames of 33 cuts.
+    *[figure for name, what in (("temporal", "a temporal bone at its own 0.096 mm"),
+                                ("skull", "a skull, cuts at a quarter of its pitch")) for figure in (
+        Figure(f"real_{name}_frame", "ms", f"{what}: 33 burr cuts and all blocks that they change, median",
+               f"real_{name}", baseline="the surface of the whole bone, once", full=True),
+        Figure(f"real_{name}_frame_budget", "of_budget", "the same as a part of a 30 Hz frame", f"real_{name}", ("<=", 1.0),
+               full=True),
+        Figure(f"real_{name}_cut_p99", "us", f"{what}: one cut, 99th percentile", f"real_{name}", baseline="median", full=True),
+        Figure(f"real_{name}_memory", "mb", f"{what}: memory of the case", f"real_{name}", full=True),
+        Figure(f"real_{name}_memory_cut", "mb", f"{what}: memory of what all these cuts added", f"real_{name}", full=True))],
 ]
 
 
-def by_name(names):
-    """The figures of these names, or all; ValueError names the first unknown one."""
+def by_name(names, full=False):
+    """The figures of these names, or all that are asked for; ValueError names the first unknown one."""
     known = {figure.name: figure for figure in FIGURES}
     for name in names:
         if name not in known:
             raise ValueError(f"there is no figure '{name}'; deploy/figures --list shows all")
-    return [known[name] for name in names] if names else list(FIGURES)
+    return [known[name] for name in names] if names else [figure for figure in FIGURES if full or not figure.full]

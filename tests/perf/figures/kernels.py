@@ -1,0 +1,268 @@
+"""Figures of the bone itself, by programs of tests/perf: cutting, surface, accuracy, order of cuts, growth, undo."""
+import json
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+
+from registry import Measured
+
+CUT_BUDGET_US = 200.0
+TOOL_BUDGET_US = 2000.0
+
+
+def benchmarks(run, pattern):
+    """Google Benchmark's counters by name."""
+    out = json.loads(run.output("osteon-bench", "--benchmark_format=json", f"--benchmark_filter={pattern}"))
+    return {b["name"].removesuffix("/iterations:1"): b for b in out["benchmarks"] if b.get("run_type") != "aggregate"}
+
+
+def spread(counters, name="ratio", threads=None):
+    return Measured(counters[name], None, counters.get(f"{name}_min"), counters.get(f"{name}_max"), threads)
+
+
+def repeated(run, pattern, repetitions):
+    """{name: [counters of each repetition]}, the benchmarks in random turns, so that what disturbs the machine for a while
+    disturbs all."""
+    out = json.loads(run.output("osteon-bench", "--benchmark_format=json", f"--benchmark_filter={pattern}",
+                                "--benchmark_min_time=0.1", f"--benchmark_repetitions={repetitions}",
+                                "--benchmark_enable_random_interleaving=true"))
+    runs = {}
+    for b in out["benchmarks"]:
+        if b.get("run_type") != "aggregate":
+            name = re.sub(r"/(iterations|repeats|min_time):[0-9.]+|/(manual_time|real_time)", "", b["name"])
+            runs.setdefault(name, []).append(b)
+    return runs
+
+
+def over(values, baseline=None, threads=None):
+    """The median of several, with the smallest and the largest."""
+    return Measured(float(np.median(values)), baseline, float(min(values)), float(max(values)), threads)
+
+
+def cutting(run):
+    run.say("cutting")
+    runs = repeated(run, "^cut_(burr|drill)/", 15 if run.soak else 7)
+    values = {}
+    for tool in ("burr", "drill"):
+        def times(name, key="real_time", tool=tool):
+            return np.array([b[key] for b in runs[f"cut_{tool}/{name}"]])
+        plain, near = times("world_box"), times("near_leaves")
+        values[f"cut_{tool}"] = over(times("hot/threads:1"), float(np.median(plain)), 1)
+        for suffix, threads in (("", 1), ("_2", 2)):
+            hot = times(f"hot/threads:{threads}")
+            values[f"cut_{tool}_speedup{suffix}"] = over(plain / hot, None, threads)
+            cold = times(f"cold/threads:{threads}", "p99_us")
+            values[f"cut_{tool}_cold_p99{suffix}"] = over(cold / CUT_BUDGET_US, None, threads)
+        values[f"cut_{tool}_speedup_near"] = over(near / times("hot/threads:1"), None, 1)
+
+    run.say("cutting with every tool")
+    tools = {}
+    for name, counters in repeated(run, "^cut_tool/", 1).items():
+        _, tool, threads = name.split("/")
+        tools.setdefault(tool, {})[int(threads.removeprefix("threads:"))] = counters[0]
+    one = {tool: by_threads[1] for tool, by_threads in tools.items()}
+    slowest = max(one, key=lambda tool: one[tool]["median_us"])
+    rows = [("tool", "pitch mm", "us p50, 1 thread", "max", "us p50, 2 threads", "max", "visited", "computed", "modified",
+             "cuts", "memory kB")]
+    for tool, c in sorted(one.items()):
+        two = tools[tool].get(2, {})
+        rows.append((tool, f"{c['pitch_mm']:g}", f"{c['median_us']:.0f}", f"{c['max_us']:.0f}",
+                     f"{two.get('median_us', math.nan):.0f}", f"{two.get('max_us', math.nan):.0f}",
+                     *(f"{c[key]:.0f}" for key in ("visited", "computed", "modified", "cuts")), f"{c['memory_bytes'] / 1e3:.0f}"))
+    run.tables.append((f"a cut of 8 ms by every tool that cuts, at its own level; the slowest is {slowest}", rows))
+    medians = [c["median_us"] / TOOL_BUDGET_US for c in one.values()]
+    values["tools_slowest_cut"] = Measured(max(medians), None, min(medians), max(medians), 1)
+    two = [by_threads[2]["median_us"] / TOOL_BUDGET_US for by_threads in tools.values() if 2 in by_threads]
+    values["tools_slowest_cut_2"] = Measured(max(two), None, min(two), max(two), 2) if two else Measured(None)
+    values["tools_measured"] = Measured(len(one))
+    return values
+
+
+def surface(run):
+    run.say("surface")
+    b = benchmarks(run, "^mesh_")
+    whole = {threads: b[f"mesh_whole_bone_versus_flying_edges/{threads}"] for threads in (1, 2)}
+    return {
+        "mesh_block_speedup": spread(b["mesh_block_versus_flying_edges"], threads=1),
+        "mesh_whole_bone_speedup": spread(whole[1], threads=1),
+        "mesh_whole_bone_speedup_2": spread(whole[2], threads=2),
+        "mesh_triangle_difference": Measured(int(max(abs(w["triangles"] - w["flying_edges_triangles"]) for w in whole.values()))),
+        "mesh_frame_share": spread(b["mesh_frame_of_33_cuts"]),
+        "mesh_bytes_per_triangle": Measured(b["mesh_bytes_per_triangle_cut"]["bytes_per_triangle"]),
+        "mesh_bytes_per_triangle_bone": Measured(b["mesh_bytes_per_triangle_bone"]["bytes_per_triangle"]),
+        "mesh_encode": Measured(b["mesh_encode"]["real_time"], b["mesh_flying_edges"]["real_time"]),
+        "mesh_decode": Measured(b["mesh_decode"]["real_time"], b["mesh_flying_edges"]["real_time"]),
+    }
+
+
+def convergence_order(pitches, errors):
+    """The power of the pitch that errors fall with: slope of the line through their logarithms."""
+    return float(np.polyfit(np.log(pitches), np.log(errors), 1)[0])
+
+
+def accuracy(run):
+    """Distances are exact on the samples and linear between them, so smooth bodies converge with the square of the pitch."""
+    run.say("accuracy")
+    out = json.loads(run.output("osteon-accuracy", 300 if run.soak else 60))
+    values = {}
+    rows = [("body", "tool", "pitch mm", "error % median", "max", "deviation pitches p50", "p99", "max", "vertices")]
+    for body in ("sphere", "hole", "kerf"):
+        if body not in out:  # no tool of the box cuts it
+            values |= {f"accuracy_{body}_{what}": Measured(None) for what in ("volume", "order", "surface")}
+            continue
+        pitches = out[body]["pitches"]
+        at = {p["pitch_mm"]: p for p in pitches}
+        coarse = [p for p in pitches if p["pitch_mm"] >= 0.125]
+        values[f"accuracy_{body}_volume"] = Measured(at[0.125]["error_percent_max"], None, at[0.125]["error_percent_min"],
+                                                     at[0.125]["error_percent_max"])
+        values[f"accuracy_{body}_order"] = Measured(convergence_order([p["pitch_mm"] for p in coarse],
+                                                                      [p["error_percent_p50"] for p in coarse]))
+        values[f"accuracy_{body}_surface"] = Measured(max(p["deviation_pitches_max"] for p in coarse), None,
+                                                      min(p["deviation_pitches_max"] for p in coarse),
+                                                      max(p["deviation_pitches_max"] for p in coarse))
+        for p in pitches:
+            rows.append((body, out[body]["tool"], p["pitch_mm"], f"{p['error_percent_p50']:.4f}", f"{p['error_percent_max']:.4f}",
+                         f"{p['deviation_pitches_p50']:.4f}", f"{p['deviation_pitches_p99']:.4f}",
+                         f"{p['deviation_pitches_max']:.4f}", p["vertices"]))
+    run.tables.append((f"accuracy, {out['trials']} random places and orientations each", rows))
+    return values
+
+
+# Kernels as the same program may choose them: samples computed at once, 4 without AVX.
+LANES = (4, 8, 16)
+
+
+def set_property_run(run, cuts, orders, threads, program="osteon-set-property", lanes=0):
+    kernel = program.removeprefix("osteon-set-property").lstrip("-") or "as built"
+    kernel += f", {lanes} lanes" if lanes else ""
+    run.say(f"set property: {cuts} cuts, {orders} orders, {threads} threads, kernel {kernel}")
+    return json.loads(run.output(program, cuts, orders, threads, *([lanes] if lanes else []), progress=True))
+
+
+def kernels_differing(run, cuts, expected):
+    """Kernels of other compilers and settings, two orders each: how many there are, and how many give another bone."""
+    programs = sorted(path.name for path in Path(run.programs).glob("osteon-set-property-*"))
+    outcomes = {f"{lanes} lanes": set_property_run(run, cuts, 2, 2, lanes=lanes) for lanes in LANES}
+    outcomes |= {name.removeprefix("osteon-set-property-"): set_property_run(run, cuts, 2, 2, name) for name in programs}
+    differing = [name for name, o in outcomes.items() if o["differing"] or o["name"] != expected]
+    run.tables.append((f"kernels, {cuts} cuts in two orders each", [("kernel", "name of the bone", "lanes", "seconds")] + [
+        (name, o["name"][:16], o["lanes"], o["seconds"]) for name, o in outcomes.items()]))
+    return len(outcomes), len(differing)
+
+
+def set_property(run):
+    one, two = (set_property_run(run, 300, 10, threads) for threads in (1, 2))
+    kernels, differing = kernels_differing(run, 300, one["name"])
+    return {
+        "set_property_differences": Measured(one["differing"] + two["differing"] + int(one["name"] != two["name"])),
+        "set_property_partly_cut": Measured(one["partly_cut"]),
+        "set_property_kernels": Measured(kernels),
+        "set_property_kernel_differences": Measured(differing),
+    }
+
+
+def set_property_full(run):
+    one, two = (set_property_run(run, 10000, 50, threads) for threads in (1, 2))
+    _, differing = kernels_differing(run, 10000, one["name"])
+    return {
+        "set_property_full_differences": Measured(one["differing"] + two["differing"] + int(one["name"] != two["name"])),
+        "set_property_full_orders": Measured(one["orders"] + two["orders"]),
+        "set_property_full_kernel_differences": Measured(differing),
+    }
+
+
+def through_zero(x, y):
+    """Slope of the line through zero, and the correlation."""
+    x, y = np.asarray(x, float), np.asarray(y, float)
+    return float(np.dot(x, y) / np.dot(x, x)), float(np.corrcoef(x, y)[0, 1])
+
+
+def growth(run):
+    run.say("growth")
+    out = json.loads(run.output("osteon-growth", 128, 256, 512, 1024, progress=True))
+    sizes = {s["samples"]: s for s in out["sizes"]}
+    area, volume, used = (np.array([m[key] for m in out["memory"]]) for key in ("area_mm2", "volume_mm3", "bytes"))
+    per_area, linear = through_zero(area, used)
+    per_volume, _ = through_zero(volume, used)
+    import pictures  # draws with matplotlib, which no other group needs
+    pictures.growth(out, per_area, run.folder / "growth.png")
+    run.tables.append((f"growth, {out['sizes'][0]['cuts']} cuts of {out['tool']} in each bone, in turn; picture: "
+                       f"{run.folder / 'growth.png'}",
+                       [("samples", "us p50", "us p99", "over 128^3", "bytes a cut", "bone MB")] + [
+                           (f"{s['samples']}^3", f"{s['us_p50']:.1f}", f"{s['us_p99']:.1f}", f"{s['ratio_p50']:.3f}",
+                            f"{s['bytes_per_cut']:.0f}", f"{s['bone_bytes'] / 1e6:.1f}") for s in out["sizes"]]))
+    largest = sizes[max(sizes)]
+    return {
+        **{f"growth_cut_{n}": Measured(sizes[n]["ratio_p50"], None, sizes[n]["ratio_min"], sizes[n]["ratio_max"], 1)
+           for n in (256, 512, 1024)},
+        "growth_memory_per_area": Measured(per_area),
+        "growth_memory_per_volume": Measured(per_volume),
+        "growth_memory_linear": Measured(linear),
+        "growth_memory_bone_ratio": Measured(largest["bytes_per_cut"] / sizes[128]["bytes_per_cut"]),
+    }
+
+
+def undo(run):
+    run.say("undo")
+    out = json.loads(run.output("osteon-undo", 1000, 40 if run.soak else 15))
+    return {
+        "undo_leaves": Measured(out["leaves_p50"], None, out["leaves_min"], out["leaves_max"]),
+        "undo_time": Measured(out["undo_us_p50"], out["again_us_p50"], out["undo_us_min"], out["undo_us_max"], 1),
+        "undo_share": Measured(out["ratio_p50"], None, out["ratio_min"], out["ratio_max"], 1),
+        "undo_differences": Measured(out["differing"]),
+    }
+
+
+FRAME_MS = 1000.0 / 30.0
+
+
+def real_case(run, name, make_case):
+    """A bone from real images, burred in frames of 33 cuts; skipped, and said so, where its images are not."""
+    case = run.folder / name
+    reason = make_case(case)
+    names = ("frame", "frame_budget", "cut_p99", "memory", "memory_cut")
+    if reason:
+        run.skip(f"real_{name}", reason)
+        return {f"real_{name}_{what}": Measured(None) for what in names}
+    run.say(f"burring {name}")
+    out = json.loads(run.output("osteon-real-case", case, 200 if run.soak else 60))
+    run.tables.append((f"{name}: bone of {'x'.join(map(str, out['samples']))} samples at {out['pitch_mm']:.4g} mm, cut at "
+                       f"{out['cut_pitch_mm']:.4g} mm", [(key, value) for key, value in out.items()]))
+    # A frame's whole work, cuts and blocks, beside the surface of the whole bone by the same mesher.
+    return {
+        f"real_{name}_frame": Measured(out["frame_ms_p50"], out["whole_ms"], out["frame_ms_min"], out["frame_ms_max"], 1),
+        f"real_{name}_frame_budget": Measured(out["frame_ms_p50"] / FRAME_MS, None, out["frame_ms_min"] / FRAME_MS,
+                                              out["frame_ms_max"] / FRAME_MS, 1),
+        f"real_{name}_cut_p99": Measured(out["cut_us_p99"], out["cut_us_p50"], None, None, 1),
+        f"real_{name}_memory": Measured(out["case_mb"]),
+        f"real_{name}_memory_cut": Measured(out["cut_mb"]),
+    }
+
+
+def real_temporal(run):
+    def make(case):
+        slices = run.shared_data("temporal-bone-labels")
+        if slices is None:
+            return "there are no temporal-bone-labels beside this checkout"
+        run.say("importing temporal-bone-labels")
+        run.output("osteon-import", "labels", slices, "--spacing", "0.0961,0.0961,0.0960", "--out", case)
+        return None
+    return real_case(run, "temporal", make)
+
+
+def real_skull(run):
+    def make(case):
+        skull = run.example("Cranium.inv3")
+        if skull is None:
+            return "the package invesalius-examples is not installed"
+        run.say("importing the skull")
+        run.output("osteon-import", "ct", skull, "--out", case)
+        return None
+    return real_case(run, "skull", make)
+
+
+GROUPS = {"cutting": cutting, "accuracy": accuracy, "set_property": set_property, "set_property_full": set_property_full,
+          "growth": growth, "undo": undo, "surface": surface,
+          "real_temporal": real_temporal, "real_skull": real_skull}
