@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/tools/tool_file.hpp"
+
 namespace osteon::wire {
 namespace {
 
@@ -89,8 +91,10 @@ v1::FieldLeaf to_wire(const FieldLeaf& leaf) {
   out.set_level(static_cast<std::uint32_t>(leaf.level));
   *out.mutable_origin() = to_wire(leaf.origin);
   std::string* bytes = out.mutable_values();
-  bytes->resize(2 * leaf.values.size());
-  for (std::size_t i = 0; i < leaf.values.size(); ++i) {
+  // Most leaves of a piece's field are gone throughout.
+  const bool constant = std::ranges::all_of(leaf.values, [&](std::int16_t v) { return v == leaf.values.front(); });
+  bytes->resize(2 * (constant ? 1 : leaf.values.size()));
+  for (std::size_t i = 0; 2 * i < bytes->size(); ++i) {
     const auto value = static_cast<std::uint16_t>(leaf.values[i]);
     (*bytes)[2 * i] = static_cast<char>(value & 255);
     (*bytes)[2 * i + 1] = static_cast<char>(value >> 8);
@@ -177,13 +181,58 @@ Result<FieldLeaf> from_wire(const v1::FieldLeaf& leaf) {
   out.level = static_cast<int>(leaf.level());
   out.origin = from_wire(leaf.origin());
   if (floor_to(out.origin, kLeafSize) != out.origin) return bad("origin", "is not the first sample of a leaf");
-  if (leaf.values().size() != 2 * kLeafVoxels) return bad("values", "needs 1024 bytes, this has " + std::to_string(leaf.values().size()));
-  out.values.resize(kLeafVoxels);
-  for (std::size_t i = 0; i < out.values.size(); ++i) {
+  const std::size_t size = leaf.values().size();
+  if (size != 2 && size != std::size_t{2} * kLeafVoxels) return bad("values", "needs 1024 bytes or 2, this has " + std::to_string(size));
+  const auto value = [&](std::size_t i) {
     const auto low = static_cast<std::uint8_t>(leaf.values()[2 * i]), high = static_cast<std::uint8_t>(leaf.values()[2 * i + 1]);
-    out.values[i] = static_cast<std::int16_t>(low | high << 8);
-  }
+    return static_cast<std::int16_t>(low | high << 8);
+  };
+  out.values.assign(kLeafVoxels, value(0));
+  for (std::size_t i = 1; 2 * i < size; ++i) out.values[i] = value(i);
   return out;
+}
+
+v1::SceneItem to_wire(const SceneItem& item) {
+  v1::SceneItem out;
+  out.set_item(item.id);
+  out.set_body(item.body.value);
+  out.set_tool_hash(to_wire(item.tool));
+  *out.mutable_pose_bone_item() = to_wire(item.pose_bone_item);
+  out.set_turns(item.turns);
+  out.set_seated(item.seated);
+  out.set_set_at(item.set_at);
+  return out;
+}
+
+Result<SceneItem> from_wire(const v1::SceneItem& item) {
+  SceneItem out;
+  out.id = item.item();
+  out.body = {item.body()};
+  const auto tool = digest_from_wire(item.tool_hash());
+  if (!tool) return bad("item.tool_hash:", tool.error().message);
+  out.tool = *tool;
+  const auto pose = from_wire(item.pose_bone_item());
+  if (!pose) return failure(ErrorCode::invalid_input, "item.pose_bone_item." + pose.error().message);
+  out.pose_bone_item = *pose;
+  if (!std::isfinite(item.turns())) return bad("item.turns", "is not finite");
+  out.turns = item.turns();
+  out.seated = item.seated();
+  out.set_at = item.set_at();
+  return out;
+}
+
+v1::ToolDefinition to_wire(const Tool& tool) {
+  v1::ToolDefinition out;
+  out.set_tool_hash(to_wire(tool.hash()));
+  out.set_yaml(to_yaml(tool));
+  return out;
+}
+
+Result<Tool> from_wire(const v1::ToolDefinition& tool) {
+  Result<Tool> parsed = parse_tool(tool.yaml(), "the tool definition");
+  if (!parsed) return bad("tool.yaml:", parsed.error().message);
+  if (!tool.tool_hash().empty() && tool.tool_hash() != to_wire(parsed->hash())) return bad("tool.tool_hash", "is not that of the definition");
+  return parsed;
 }
 
 }  // namespace osteon::wire

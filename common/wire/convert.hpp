@@ -7,6 +7,7 @@
 #include "common/field/field_hash.hpp"
 #include "common/surface/mesh_block.hpp"
 #include "common/mechanics/cutting_state.hpp"
+#include "common/tools/scene_item.hpp"
 #include "osteon/v1/cutting.pb.h"
 #include "osteon/v1/room.pb.h"
 #include "osteon/v1/types.pb.h"
@@ -15,7 +16,7 @@
 namespace osteon::wire {
 
 // Version of the protocol that this build speaks.
-inline constexpr std::uint32_t kProtocolVersion = 1;
+inline constexpr std::uint32_t kProtocolVersion = 2;
 
 [[nodiscard]] v1::Vector3 to_wire(const Vec3& v);
 [[nodiscard]] Vec3 from_wire(const v1::Vector3& v);
@@ -24,7 +25,9 @@ inline constexpr std::uint32_t kProtocolVersion = 1;
 [[nodiscard]] Coord from_wire(const v1::Coord& c);
 [[nodiscard]] v1::Cut to_wire(const Cut& cut);
 [[nodiscard]] v1::CuttingState to_wire(const CuttingState& state);
-[[nodiscard]] v1::FieldLeaf to_wire(const FieldLeaf& leaf);
+[[nodiscard]] v1::FieldLeaf to_wire(const FieldLeaf& leaf);  // one value when all are equal
+[[nodiscard]] v1::SceneItem to_wire(const SceneItem& item);
+[[nodiscard]] v1::ToolDefinition to_wire(const Tool& tool);
 [[nodiscard]] std::string to_wire(const Digest& digest);
 
 // Error invalid_input, naming the field, for anything a correct peer never sends: wrong counts, numbers that are not
@@ -33,6 +36,8 @@ inline constexpr std::uint32_t kProtocolVersion = 1;
 [[nodiscard]] Result<Cut> from_wire(const v1::Cut& cut);
 [[nodiscard]] Result<CuttingState> from_wire(const v1::CuttingState& state);
 [[nodiscard]] Result<FieldLeaf> from_wire(const v1::FieldLeaf& leaf);
+[[nodiscard]] Result<SceneItem> from_wire(const v1::SceneItem& item);
+[[nodiscard]] Result<Tool> from_wire(const v1::ToolDefinition& tool);  // by the rules of tool files
 [[nodiscard]] Result<Digest> digest_from_wire(const std::string& bytes);
 
 }  // namespace osteon::wire

@@ -44,10 +44,14 @@ struct Rejected {
   std::uint64_t author_seq;
   std::string reason;
 };
-struct Complete {
-  RoomSeq contained;
+struct Noted {
+  RoomSeq place;  // of an event that leaves the bone as it is
 };
-using FromRoom = std::variant<FieldLeaf, Complete, Committed, Rejected>;
+struct SceneSet {
+  RoomSeq place;
+  std::vector<SceneItem> items;
+};
+using FromRoom = std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, SceneSet, Noted>;
 
 // Where the tool is, for the replica's thread.
 struct ToolPlace {
@@ -62,7 +66,7 @@ class Client {
   Client(RoomSession& room, ReadyPlan plan, const SimulatedDeviceParams& device, const ClientOptions& options,
          const StopSignal& stop)
       : room_(room), options_(options), stop_(stop), session_(std::move(plan), device, options.force_scale),
-        replica_(room.bone(), BodyId{}) {
+        replica_(room.bone(), BodyId{}, room.tools()), lease_epoch_(room.room().lease_epoch) {
     for (auto& time : tick_times_) time.store(0, std::memory_order_relaxed);
     for (const ToolModel& model : session_.surgeon().plan().tools) tool_names_.push_back(model.tool.name);
     if (tool_names_.empty()) tool_names_.emplace_back("none");
@@ -97,8 +101,8 @@ class Client {
     outcome_.coupling_n_per_mm = session_.loop().coupling_n_per_mm();
     outcome_.workspace_scale = session_.loop().mapping().scale();
     outcome_.steps = session_.surgeon().results();
-    outcome_.field_hash = replica_.predicted().hash();
-    outcome_.removed_total_mm3 = replica_.predicted().removed_mm3();
+    outcome_.field_hash = replica_.hash();
+    outcome_.removed_total_mm3 = replica_.removed_mm3();
     outcome_.room_seq = replica_.room_seq();
     outcome_.rejected = replica_.rejected();
     outcome_.patch_p50_us = patch_times_.percentile_us(50);
@@ -119,7 +123,10 @@ class Client {
     };
     RoomEvents events;
     events.leaf = [pass](const FieldLeaf& leaf) { pass(leaf); };
-    events.complete = [pass](RoomSeq contained) { pass(Complete{contained}); };
+    events.complete = [pass](const RoomAtJoin& room) { pass(room); };
+    events.change = [pass](BonePart&& part) { pass(std::move(part)); };
+    events.scene = [pass](RoomSeq place, const std::vector<SceneItem>& items) { pass(SceneSet{place, items}); };
+    events.tool = [pass](RoomSeq place) { pass(Noted{place}); };
     events.committed = [pass](RoomSeq place, const Cut& cut) { pass(Committed{place, cut}); };
     events.rejected = [pass](RoomSeq place, std::uint64_t seq, const std::string& why) { pass(Rejected{place, seq, why}); };
     events.lost = [this](const Error& why) { give_up(why); };
@@ -156,7 +163,9 @@ class Client {
       patches_.refresh();
       const bool room_follows = room_health_.load(std::memory_order_relaxed) == RoomHealth::follows;
       if (!room_follows) ++outcome_.held_for_room_ticks;
-      const SessionTick now = session_.tick(patches_.value(), link_ok && room_follows, periods);
+      guides_.refresh();
+      const SessionTick now = session_.tick(patches_.value(), link_ok && room_follows, periods, &guides_.value());
+      guides_placed_.store(session_.surgeon().guides_placed(), std::memory_order_relaxed);
 
       const std::int64_t woke_ns = ns(timer.woke());
       tick_times_[now.report.state_seq % kTickTimes].store(woke_ns, std::memory_order_relaxed);
@@ -216,7 +225,7 @@ class Client {
   void take_own_cuts() {
     CutPiece piece;
     while (session_.loop().take_piece(piece)) {
-      const Cut cut = cut_of(piece, session_.loop().tool(piece.tool), room_.room().author, room_.room().lease_epoch);
+      const Cut cut = cut_of(piece, session_.loop().tool(piece.tool), room_.room().author, lease_epoch_);
       unsent_.push_back(cut);
       const std::int64_t closed_ns = tick_times_[static_cast<std::size_t>(piece.closed_tick) % kTickTimes].load(std::memory_order_relaxed);
       outcome_.cuts.push_back({piece.author_seq, 0, closed_ns, 0});
@@ -239,10 +248,29 @@ class Client {
   }
 
   void take(const FieldLeaf& leaf) { replica_.restore(leaf); }
-  void take(const Complete& complete) {
-    replica_.joined(complete.contained);
-    noted_mm3_ = replica_.predicted().removed_mm3();  // by others, before the first step
+  void take(const RoomAtJoin& room) {
+    replica_.change(room.contained, room.bodies, {});
+    replica_.joined(room.contained);
+    lease_epoch_ = room.lease_epoch;
+    noted_mm3_ = replica_.removed_mm3();  // by others, before the first step
     joined_ = true;
+  }
+  void take(const BonePart& part) {
+    replica_.change(part.place, part.bodies, part.leaves);
+    if (part.lease_epoch <= lease_epoch_) return;
+    // What is on its way was cut on the sight of other bone: the room will reject it.
+    lease_epoch_ = part.lease_epoch;
+    replica_.lease(lease_epoch_);
+  }
+  void take(const Noted& noted) { replica_.note(noted.place); }
+  void take(const SceneSet& scene) {
+    replica_.note(scene.place);
+    std::vector<PlacedGuide>& guides = guides_.writable();
+    guides.clear();
+    for (const SceneItem& item : scene.items)
+      if (const ToolBox::Entry* entry = room_.tools()->find(item.tool))
+        if (PlacedGuide guide = placed_guide(item.id, entry->tool, item.pose_bone_item); opening_count(guide.shape) > 0) guides.push_back(std::move(guide));
+    guides_.publish();
   }
   void take(const Committed& committed) {
     const bool own = committed.cut.author == room_.room().author;
@@ -252,7 +280,7 @@ class Client {
   }
   void take(const Rejected& rejected) {
     confirm(rejected.author_seq, RoomSeq{});
-    replica_.reject(rejected.place, rejected.author_seq);
+    if (!replica_.reject(rejected.place, rejected.author_seq)) return;  // it had fallen with an undo
     // One now and then gives its bone back; a room that takes none makes further work pointless.
     constexpr int kMostInARow = 20;
     if (rejected_in_a_row_++ == 0) log::warn("cut rejected", {{"author_seq", rejected.author_seq}, {"reason", rejected.reason}});
@@ -285,7 +313,7 @@ class Client {
     const auto began = Clock::now();
     for (const ChangedLeaves& change : changes) builder_.changed(room_.bone().pitch_mm(), change.level, change.origins);
     Patch& patch = patches_.writable();
-    builder_.build(replica_.predicted(), session_.loop().tool(place.tool), place.pose_bone_tool, patch);
+    builder_.build(replica_.bodies(), session_.loop().tool(place.tool), place.pose_bone_tool, patch);
     patch.own_cuts = replica_.last_own();
     patch.room_seq = replica_.room_seq();
     patches_.publish();
@@ -298,7 +326,7 @@ class Client {
   // Bone removed by the steps before this one, as far as it was not noted yet.
   void note_removed(std::size_t step) {
     for (; noted_steps_ < step && noted_steps_ < outcome_.removed_mm3.size(); ++noted_steps_) {
-      const double removed = replica_.predicted().removed_mm3();
+      const double removed = replica_.removed_mm3();
       outcome_.removed_mm3[noted_steps_] = removed - noted_mm3_;
       noted_mm3_ = removed;
     }
@@ -315,12 +343,24 @@ class Client {
         log_.write(row, tool_name(row));
       }
       if (any && link_ok_) room_.send(state_of(row));
+      place_guides();
       if (over) break;
       if (options_.status && any && Clock::now() >= next_status) {
         next_status += 1s;
         print_status(row);
       }
       std::this_thread::sleep_for(4ms);
+    }
+  }
+
+  // What the plan has placed goes into the room's scene; from there it comes back and guides the tool.
+  void place_guides() {
+    const ReadyPlan& plan = session_.surgeon().plan();
+    for (; guides_set_ < guides_placed_ && link_ok_; ++guides_set_) {
+      SceneItem item;
+      item.tool = plan.guide_tools[guides_set_].hash();
+      item.pose_bone_item = plan.guides[guides_set_].pose_bone_guide;
+      if (const Result<std::uint32_t> set = room_.set_item(item); !set) give_up(set.error());
     }
   }
 
@@ -366,6 +406,7 @@ class Client {
 
   LatestValue<Patch> patches_;     // replica → haptic
   LatestValue<ToolPlace> places_;  // haptic → replica
+  LatestValue<std::vector<PlacedGuide>> guides_;  // of the room's scene, replica → haptic
   EventQueue<TickRow, 2048> rows_; // haptic → reporter
   std::array<std::atomic<std::int64_t>, kTickTimes> tick_times_;
 
@@ -377,6 +418,8 @@ class Client {
   std::atomic<std::int64_t> heard_ns_{0};
   std::atomic<RoomHealth> room_health_{RoomHealth::follows};
   std::atomic<std::size_t> unconfirmed_{0};
+  std::atomic<std::size_t> guides_placed_{0};  // by the plan
+  std::size_t guides_set_ = 0;                 // in the room; reporter thread
   std::atomic<bool> link_ok_{true}, joined_{false}, touching_over_{false}, all_over_{false};
 
   // Haptic thread.
@@ -384,6 +427,7 @@ class Client {
   const Site* site_ = nullptr;
   bool taken_up_ = false;
   // Replica thread.
+  std::uint64_t lease_epoch_;      // of the room, as far as it was heard
   std::deque<Cut> unsent_;         // as bounded as what is unconfirmed
   Pose built_at_;
   int built_tool_ = -1;

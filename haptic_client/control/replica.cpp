@@ -1,75 +1,143 @@
 #include "haptic_client/control/replica.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <iterator>
 #include <utility>
 
 namespace osteon::haptic {
 
-Replica::Replica(const Case& bone, BodyId body) : body_(body), committed_(bone, body), predicted_(bone, body) {}
+Replica::Replica(const Case& bone, BodyId body, std::shared_ptr<const ToolBox> tools) : bone_(bone), tools_(std::move(tools)) {
+  this->body(body);
+}
+
+Replica::Body& Replica::body(BodyId id) {
+  const auto found = bodies_.find(id);
+  if (found != bodies_.end()) return found->second;
+  return bodies_.emplace(id, Body{CutField(bone_, id, tools_), CutField(bone_, id, tools_)}).first->second;
+}
 
 void Replica::restore(const FieldLeaf& leaf) {
-  committed_.restore(leaf);
-  predicted_.restore(leaf);
+  Body& held = body(leaf.body);
+  held.committed.restore(leaf);
+  held.predicted.restore(leaf);
   changes_.push_back({leaf.level, {leaf.origin}});
+}
+
+std::vector<Coord> Replica::predict(const Cut& cut) {
+  std::vector<Coord> changed;
+  for (auto& [id, held] : bodies_) {
+    const CutReport report = held.predicted.apply(cut);
+    std::vector<Coord> all;
+    std::ranges::set_union(changed, report.changed_leaves, std::back_inserter(all));
+    changed = std::move(all);
+  }
+  if (!changed.empty()) changes_.push_back({cut.level, changed});
+  return changed;
 }
 
 void Replica::add_own(const Cut& cut) {
   last_own_ = std::max(last_own_, cut.author_seq);
-  CutReport report = predicted_.apply(cut);
-  pending_.push_back({cut, report.changed_leaves});
-  if (!report.changed_leaves.empty()) changes_.push_back({report.level, std::move(report.changed_leaves)});
+  pending_.push_back({cut, predict(cut)});
 }
 
 void Replica::commit(RoomSeq place, const Cut& cut, bool own) {
   room_seq_ = place;
-  committed_.apply(cut);
+  for (auto& [id, held] : bodies_) held.committed.apply(cut);
   if (own) {
     // The prediction holds it already: applying it again would change nothing.
     const auto found = std::ranges::find(pending_, cut.author_seq, [](const Pending& p) { return p.cut.author_seq; });
     if (found != pending_.end()) {
+      if (again_) predict(cut);  // leaves that were set meanwhile do not
       pending_.erase(found);
       return;
     }
   }
-  CutReport report = predicted_.apply(cut);
-  if (!report.changed_leaves.empty()) changes_.push_back({report.level, std::move(report.changed_leaves)});
+  predict(cut);
 }
 
-void Replica::reject(RoomSeq place, std::uint64_t author_seq) {
-  room_seq_ = std::max(room_seq_, place);
+void Replica::fall(const Pending& pending) {
+  for (const Coord origin : pending.changed) undone_.insert({pending.cut.level, origin});
+}
+
+bool Replica::reject(RoomSeq place, std::uint64_t author_seq) {
+  note(place);
   ++rejected_;
   const auto found = std::ranges::find(pending_, author_seq, [](const Pending& p) { return p.cut.author_seq; });
-  if (found == pending_.end()) return;
-  if (!found->changed.empty()) undone_.push_back({found->cut.level, std::move(found->changed)});
+  if (found == pending_.end()) return false;
+  fall(*found);
   pending_.erase(found);
+  return true;
+}
+
+void Replica::lease(std::uint64_t epoch) {
+  std::erase_if(pending_, [&](const Pending& pending) {
+    if (pending.cut.lease_epoch >= epoch) return false;
+    fall(pending);
+    return true;
+  });
+}
+
+void Replica::change(RoomSeq place, std::span<const BodyId> bodies, std::span<const FieldLeaf> leaves) {
+  note(place);
+  for (const BodyId id : bodies) body(id);
+  for (auto held = bodies_.begin(); held != bodies_.end();) {
+    if (std::ranges::find(bodies, held->first) != bodies.end() || bodies.empty()) {
+      ++held;
+      continue;
+    }
+    for (const FieldLeaf& leaf : held->second.predicted.leaf_places()) changes_.push_back({leaf.level, {leaf.origin}});
+    held = bodies_.erase(held);
+  }
+  for (const FieldLeaf& leaf : leaves) {
+    restore(leaf);
+    again_ = true;
+  }
 }
 
 void Replica::settle() {
-  if (undone_.empty()) return;
-  std::array<float, kLeafVoxels> values;
-  for (ChangedLeaves& undone : undone_) {
-    for (const Coord origin : undone.origins) {
-      committed_.gather_cuts(undone.level, {origin, origin + Coord{kLeafSize - 1, kLeafSize - 1, kLeafSize - 1}}, values);
-      FieldLeaf leaf{body_, undone.level, origin, std::vector<std::int16_t>(kLeafVoxels)};
-      std::ranges::transform(values, leaf.values.begin(), [](float mm) { return static_cast<std::int16_t>(std::lround(mm / kQuantum_mm)); });
-      predicted_.restore(leaf);
-    }
-    changes_.push_back(std::move(undone));
+  if (undone_.empty() && !again_) return;
+  std::map<int, std::vector<Coord>> back;
+  for (const auto& [level, origin] : undone_) back[level].push_back(origin);
+  for (auto& [level, origins] : back) {
+    for (auto& [id, held] : bodies_)
+      for (const Coord origin : origins) {
+        FieldLeaf leaf{id, level, origin, {}};
+        held.committed.read(leaf);
+        held.predicted.restore(leaf);
+      }
+    changes_.push_back({level, std::move(origins)});
   }
   undone_.clear();
-  // A pending cut may have found its bone gone already, by one that was rejected: now it is the one that takes it.
+  again_ = false;
+  // A pending cut may have found its bone gone already, by one that fell: now it is the one that takes it.
   for (Pending& pending : pending_) {
     ++cut_again_;
-    const CutReport report = predicted_.apply(pending.cut);
+    const std::vector<Coord> changed = predict(pending.cut);
     std::vector<Coord> all;
-    std::ranges::set_union(pending.changed, report.changed_leaves, std::back_inserter(all));
+    std::ranges::set_union(pending.changed, changed, std::back_inserter(all));
     pending.changed = std::move(all);
   }
 }
 
 std::vector<ChangedLeaves> Replica::take_changes() { return std::exchange(changes_, {}); }
+
+std::vector<const CutField*> Replica::bodies() const {
+  std::vector<const CutField*> fields;
+  for (const auto& [id, held] : bodies_) fields.push_back(&held.predicted);
+  return fields;
+}
+
+Digest Replica::hash() const {
+  std::vector<FieldLeaf> leaves;
+  for (const CutField* field : bodies()) std::ranges::move(field->leaves(), std::back_inserter(leaves));
+  return field_hash(std::move(leaves), bone_.pitch_mm());
+}
+
+double Replica::removed_mm3() const {
+  // A body lacks what was cut and what is in the others.
+  double removed_mm3 = -static_cast<double>(bodies_.size() - 1) * bone_.volume_mm3();
+  for (const CutField* field : bodies()) removed_mm3 += field->removed_mm3();
+  return removed_mm3;
+}
 
 }  // namespace osteon::haptic

@@ -3,6 +3,7 @@
 #include <grpcpp/grpcpp.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <cstdlib>
@@ -29,6 +30,12 @@ constexpr auto kCaseSilence = 60s;  // a whole case takes no longer on one machi
 
 Error cannot_cache(const fs::path& path, const std::string& why) {
   return {ErrorCode::internal, "cannot keep the case in the cache: " + path.string() + ": " + why + "; give another folder with --cache"};
+}
+
+std::vector<BodyId> bodies_of(const google::protobuf::RepeatedField<std::uint32_t>& ids) {
+  std::vector<BodyId> bodies;
+  for (const std::uint32_t id : ids) bodies.push_back(BodyId{id});
+  return bodies;
 }
 
 // Writes the case's files as they come. A correct server sends these names and no others.
@@ -127,6 +134,7 @@ struct RoomSession::Impl {
 
   wire::JoinedRoom room;
   Case bone;
+  std::shared_ptr<ToolBox> tools = builtin_tool_box();  // shared with the replica's fields
   RoomEvents events;
 
   grpc::ClientContext context;
@@ -175,12 +183,47 @@ Result<void> RoomSession::Impl::deliver(const v1::SessionResponse& response) {
       if (events.leaf) events.leaf(*leaf);
       return {};
     }
-    case v1::SessionResponse::kComplete:
-      if (events.complete) events.complete(RoomSeq{response.complete().room_seq()});
+    case v1::SessionResponse::kComplete: {
+      const v1::FieldComplete& row = response.complete();
+      if (events.complete) events.complete({RoomSeq{row.room_seq()}, bodies_of(row.bodies()), row.lease_epoch()});
       return {};
+    }
+    case v1::SessionResponse::kTool: {
+      const Result<Tool> tool = wire::from_wire(response.tool().tool());
+      if (!tool) return tl::unexpected(tool.error());
+      tools->add(*tool);
+      if (events.tool && response.tool().room_seq() != 0) events.tool(RoomSeq{response.tool().room_seq()});
+      return {};
+    }
+    case v1::SessionResponse::kChange: {
+      const v1::BoneChange& row = response.change();
+      BonePart part{RoomSeq{row.room_seq()}, bodies_of(row.bodies()), row.lease_epoch(), {}, row.last()};
+      for (const v1::FieldLeaf& wire_leaf : row.leaves()) {
+        Result<FieldLeaf> leaf = wire::from_wire(wire_leaf);
+        if (!leaf) return tl::unexpected(leaf.error());
+        if (std::ranges::find(part.bodies, leaf->body) == part.bodies.end())
+          return failure(ErrorCode::invalid_input, "change.leaves has one of a body that is gone");
+        part.leaves.push_back(std::move(*leaf));
+      }
+      if (events.change) events.change(std::move(part));
+      return {};
+    }
+    case v1::SessionResponse::kScene: {
+      std::vector<SceneItem> items;
+      for (const v1::SceneItem& wire_item : response.scene().items()) {
+        const Result<SceneItem> item = wire::from_wire(wire_item);
+        if (!item) return tl::unexpected(item.error());
+        if (!tools->find(item->tool)) return failure(ErrorCode::invalid_input, "scene.items names a tool that was not sent");
+        items.push_back(*item);
+      }
+      if (events.scene) events.scene(RoomSeq{response.scene().room_seq()}, items);
+      return {};
+    }
     case v1::SessionResponse::kCommitted: {
       const Result<Cut> cut = wire::from_wire(response.committed().cut());
       if (!cut) return tl::unexpected(cut.error());
+      const ToolBox::Entry* tool = tools->find(cut->tool);
+      if (!tool || !tool->body.cuts()) return failure(ErrorCode::invalid_input, "committed.cut names a tool that was not sent");
       if (events.committed) events.committed(RoomSeq{response.committed().room_seq()}, *cut);
       return {};
     }
@@ -245,6 +288,21 @@ Result<RoomSession> RoomSession::join(const RoomSessionOptions& options, const s
 
 const wire::JoinedRoom& RoomSession::room() const { return impl_->room; }
 const Case& RoomSession::bone() const { return impl_->bone; }
+
+const std::shared_ptr<ToolBox>& RoomSession::tools() const { return impl_->tools; }
+
+Result<std::uint32_t> RoomSession::set_item(const SceneItem& item) {
+  v1::SetSceneItemRequest request;
+  v1::SetSceneItemResponse response;
+  request.set_author(impl_->room.author.value);
+  *request.mutable_item() = wire::to_wire(item);
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + 5s);
+  const grpc::Status status = v1::RoomService::NewStub(impl_->room.channel)->SetSceneItem(&context, request, &response);
+  if (status.ok()) return response.item();
+  return failure(status.error_code() == grpc::StatusCode::INVALID_ARGUMENT ? ErrorCode::invalid_input : ErrorCode::unavailable,
+                 "the server does not set the item: " + status.error_message());
+}
 
 void RoomSession::open(RoomEvents events) {
   OSTEON_CHECK(!impl_->stream);

@@ -6,12 +6,15 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "common/core/id.hpp"
 #include "common/core/result.hpp"
 #include "common/field/cut.hpp"
 #include "common/field/field_hash.hpp"
 #include "common/mechanics/cutting_state.hpp"
+#include "common/tools/scene_item.hpp"
+#include "common/tools/tool_box.hpp"
 #include "common/volume/case.hpp"
 #include "common/wire/room_client.hpp"
 
@@ -27,13 +30,33 @@ struct RoomSessionOptions {
   std::filesystem::path cache = default_case_cache();  // one folder per case, named by its hash
 };
 
-// What comes down. Called on the session's own thread, one after the other: every leaf, then `complete`, then cuts and
-// rejections in room_seq order. `lost` comes at most once and last, and never after close().
+// Where a room stands when all leaves were sent: they contain every event up to this place.
+struct RoomAtJoin {
+  RoomSeq contained;
+  std::vector<BodyId> bodies;
+  std::uint64_t lease_epoch = 0;
+};
+
+// A part of an event that changed the bone otherwise than by a cut: leaves to set, of bodies to hold.
+struct BonePart {
+  RoomSeq place;
+  std::vector<BodyId> bodies;      // any other is gone
+  std::uint64_t lease_epoch = 0;   // cuts of an earlier one will be rejected
+  std::vector<FieldLeaf> leaves;
+  bool last = false;               // part of the event
+};
+
+// What comes down. Called on the session's own thread, one after the other: the scene, every leaf, then `complete`, then
+// events in room_seq order; one may come as a change and as a scene. `lost` comes at most once and last, and never after
+// close(). Tools go to tools() before anything that names them.
 struct RoomEvents {
   std::function<void(const FieldLeaf& leaf)> leaf;
-  std::function<void(RoomSeq contained)> complete;  // all leaves were sent; they contain every cut up to this one
+  std::function<void(const RoomAtJoin& room)> complete;
   std::function<void(RoomSeq place, const Cut& cut)> committed;  // of anyone, the caller's own included
   std::function<void(RoomSeq place, std::uint64_t author_seq, const std::string& reason)> rejected;  // the caller's
+  std::function<void(BonePart&& part)> change;
+  std::function<void(RoomSeq place, const std::vector<SceneItem>& items)> scene;  // all that stand from now on
+  std::function<void(RoomSeq place)> tool;  // one was added
   std::function<void(const Error& why)> lost;
 };
 
@@ -51,6 +74,10 @@ class RoomSession {
 
   [[nodiscard]] const wire::JoinedRoom& room() const;  // the author of all cuts and states, epochs, bounds
   [[nodiscard]] const Case& bone() const;
+  [[nodiscard]] const std::shared_ptr<ToolBox>& tools() const;  // that the room knows; grows with its events
+  // Sets an item of the room's scene, id 0 for a new one, and returns its id. Waits for the answer. Errors:
+  // invalid_input, unavailable.
+  [[nodiscard]] Result<std::uint32_t> set_item(const SceneItem& item);
 
   // Opens the stream; once. From now on `events` are called.
   void open(RoomEvents events);

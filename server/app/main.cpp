@@ -2,14 +2,18 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <filesystem>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "common/runtime/command_line.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
 #include "common/runtime/progress.hpp"
 #include "common/runtime/stop_signal.hpp"
+#include "common/tools/tool_file.hpp"
 #include "server/net/room_server.hpp"
 
 namespace {
@@ -23,6 +27,8 @@ struct Options {
   std::string listen = "127.0.0.1:0";
   std::filesystem::path address_file;
   std::filesystem::path summary_file;
+  std::filesystem::path tools_folder;
+  std::filesystem::path save_file, resume_file;
 };
 
 void log_health(const HostHealth& health) {
@@ -50,10 +56,13 @@ nlohmann::json durations(const DurationHistogram& histogram) {
 
 nlohmann::json summary_of(const RoomServerSummary& summary, const Case& bone) {
   const HostHealth& health = summary.health;
+  nlohmann::json bodies = nlohmann::json::array();
+  for (const BodyId body : summary.bone.bodies) bodies.push_back(body.value);
   return {{"case_hash", to_hex(bone.hash())},
           {"field_hash", to_hex(summary.bone.field_hash)},
           {"mesh_hash", to_hex(summary.surface_hash)},
           {"room_seq", summary.bone.room_seq.value},
+          {"bodies", bodies},
           {"removed_mm3", summary.bone.removed_mm3},
           {"committed", health.counts.committed},
           {"rejected", health.counts.rejected},
@@ -66,6 +75,40 @@ nlohmann::json summary_of(const RoomServerSummary& summary, const Case& bone) {
             {"lateness", durations(health.tick.lateness)},
             {"work", durations(health.tick.work)}}},
           {"mesh_update_after_cut", durations(health.mesh_update)}};
+}
+
+// Every tool file of a folder, in the order of their names.
+Result<void> load_tools(const std::filesystem::path& folder, ToolBox& box) {
+  std::error_code error;
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error))
+    if (entry.path().extension() == ".yaml") files.push_back(entry.path());
+  if (error) return failure(ErrorCode::not_found, "the tools' folder " + folder.string() + " cannot be read: " + error.message());
+  std::sort(files.begin(), files.end());
+  for (const std::filesystem::path& file : files) {
+    const Result<Tool> tool = load_tool(file);
+    if (!tool) return tl::unexpected(tool.error());
+    const auto entries = box.entries();
+    const auto same = std::find_if(entries.begin(), entries.end(), [&](const auto* e) { return e->tool.name == tool->name; });
+    if (same != entries.end() && (*same)->hash != tool->hash())
+      return failure(ErrorCode::exists, file.string() + ": there is another tool of the name " + tool->name + "; give this one a name of its own");
+    const ToolBox::Entry& entry = box.add(*tool);
+    log::info("tool", {{"name", entry.tool.name}, {"hash", to_hex(entry.hash)}, {"file", file.filename().string()}});
+  }
+  return {};
+}
+
+Result<Room> make_room(const Options& options, const Case& bone) {
+  const std::shared_ptr<ToolBox> tools = builtin_tool_box();  // shared by the room and its fields
+  if (!options.tools_folder.empty())
+    if (Result<void> loaded = load_tools(options.tools_folder, *tools); !loaded) return tl::unexpected(loaded.error());
+  if (options.resume_file.empty()) return Room(bone, {}, tools);
+  const Result<SavedFields> saved = load_fields(options.resume_file);
+  if (!saved) return tl::unexpected(saved.error());
+  Result<Room> room = Room::resume(bone, *saved, {}, tools);
+  if (!room) return failure(room.error().code, options.resume_file.string() + ": " + room.error().message);
+  log::info("resumed", {{"file", options.resume_file.string()}, {"room_seq", saved->room_seq.value}, {"bodies", saved->bodies.size()}});
+  return room;
 }
 
 Result<void> run(const Options& options, const StopSignal& stop) {
@@ -82,12 +125,16 @@ Result<void> run(const Options& options, const StopSignal& stop) {
                      {"volume_mm3", bone->volume_mm3()},
                      {"hash", to_hex(bone->hash())}});
 
+  Result<Room> room = make_room(options, *bone);
+  if (!room) return tl::unexpected(room.error());
+
   RoomServerOptions server_options;
   server_options.listen = options.listen;
   server_options.case_folder = options.case_folder;
+  server_options.save = options.save_file;
   Result<std::unique_ptr<RoomServer>> server = [&] {
     Progress progress("surface");
-    return RoomServer::start(Room(*bone), server_options, [&](double fraction) { progress.update(fraction); });
+    return RoomServer::start(std::move(*room), server_options, [&](double fraction) { progress.update(fraction); });
   }();
   if (!server) return tl::unexpected(server.error());
   log::info("listening", {{"address", (*server)->address()}, {"surface_blocks", (*server)->health().blocks}});
@@ -100,6 +147,8 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   log::info("stopping");
   const RoomServerSummary summary = (*server)->stop();
   log_health(summary.health);
+  if (!options.save_file.empty())
+    if (Result<void> saved = save_fields(options.save_file, summary.fields); !saved) return saved;
   if (options.summary_file.empty()) return {};
   return write_file(options.summary_file, summary_of(summary, *bone).dump(2) + "\n");
 }
@@ -114,6 +163,9 @@ int main(int argc, char** argv) {
   app.add_option("--case", options.case_folder, "Folder of the case, as osteon-import writes it")->required();
   app.add_option("--listen", options.listen, "HOST:PORT on this machine; port 0 lets the system choose")->capture_default_str();
   app.add_option("--address-file", options.address_file, "Written with HOST:PORT when clients may come");
+  app.add_option("--tools", options.tools_folder, "Folder of tool files (*.yaml) that the room knows beside the built-in tools");
+  app.add_option("--save", options.save_file, "Cut fields of all bodies (.vdb), written at a clean stop and when a client asks");
+  app.add_option("--resume", options.resume_file, "Cut fields that --save wrote: the room goes on from them");
   app.add_option("--summary", options.summary_file, "JSON written at the end: field hash, counts, ticks, latencies");
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
 

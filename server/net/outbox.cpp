@@ -1,5 +1,6 @@
 #include "server/net/outbox.hpp"
 
+#include <iterator>
 #include <utility>
 
 #include "common/wire/convert.hpp"
@@ -58,7 +59,11 @@ MessageParts MeshOutbox::take() {
   return parts;
 }
 
-void SessionOutbox::begin(RoomSeq contained) { contained_ = contained; }
+void SessionOutbox::begin(RoomSeq contained, MessageParts before, Bytes complete) {
+  contained_ = contained;
+  before_.assign(std::make_move_iterator(before.begin()), std::make_move_iterator(before.end()));
+  complete_ = std::move(complete);
+}
 
 void SessionOutbox::set_leaves(std::vector<FieldLeaf> leaves) {
   leaves_ = std::move(leaves);
@@ -74,6 +79,12 @@ bool SessionOutbox::add_answer(Bytes row) {
 }
 
 MessageParts SessionOutbox::take() {
+  const auto next_of = [](std::deque<Bytes>& rows) {
+    Bytes row = std::move(rows.front());
+    rows.pop_front();
+    return MessageParts{std::move(row)};
+  };
+  if (!before_.empty()) return next_of(before_);
   if (!leaves_known_) return {};
   v1::SessionResponse response;
   if (next_leaf_ < leaves_.size()) {
@@ -86,15 +97,9 @@ MessageParts SessionOutbox::take() {
     }
     return {serialised(response)};
   }
-  if (!complete_said_) {
-    complete_said_ = true;
-    response.mutable_complete()->set_room_seq(contained_.value);
-    return {serialised(response)};
-  }
+  if (complete_) return {std::exchange(complete_, nullptr)};
   if (rows_.empty()) return {};
-  Bytes row = std::move(rows_.front());
-  rows_.pop_front();
-  return {std::move(row)};
+  return next_of(rows_);
 }
 
 }  // namespace osteon

@@ -56,15 +56,17 @@ class MeshOutbox {
   bool news_ = true;            // newest_ was not said yet
 };
 
-// What a session sends: the field as it was on joining, then rows in room_seq order. Rows cannot be skipped, so a reader
+// What a session sends: the tools, scene and field as they were on joining, then rows in room_seq order. Rows cannot be skipped, so a reader
 // that falls too far behind is given up instead.
 class SessionOutbox {
  public:
   static constexpr std::size_t kMaxRows = 8192;
 
-  void begin(RoomSeq contained);
+  // `before`: sent before the leaves, `complete` after them.
+  void begin(RoomSeq contained, MessageParts before, Bytes complete);
   // Copied while rows may have come already: every leaf contains at least the order up to `contained`. What it contains
-  // beyond that changes nothing when its row is applied again, since a cut field is a minimum over its cuts.
+  // beyond that changes nothing when its row is applied again, since a cut field is a minimum over its cuts and all other
+  // rows set leaves as they are at their place.
   void set_leaves(std::vector<FieldLeaf> leaves);
   // A row of the room's order; one up to `contained` is skipped. False when kMaxRows wait already; the row is then
   // not taken.
@@ -78,7 +80,9 @@ class SessionOutbox {
   std::vector<FieldLeaf> leaves_;
   std::size_t next_leaf_ = 0;
   RoomSeq contained_;
-  bool leaves_known_ = false, complete_said_ = false;
+  bool leaves_known_ = false;
+  std::deque<Bytes> before_;
+  Bytes complete_;  // null: said
   std::deque<Bytes> rows_;
 };
 

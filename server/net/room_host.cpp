@@ -10,8 +10,10 @@
 #include <shared_mutex>
 #include <thread>
 #include <utility>
+#include <variant>
 
 #include "common/core/check.hpp"
+#include "common/field/kernel.hpp"
 #include "common/runtime/periodic.hpp"
 #include "common/wire/convert.hpp"
 
@@ -53,6 +55,61 @@ struct QueuedCut {
   Cut cut;
   Clock::time_point arrived;
 };
+struct QueuedEvent {
+  std::function<Result<RoomEvent>(Room&)> change;
+  std::function<void(const Result<RoomEvent>&)> answer;
+  Clock::time_point arrived;
+};
+using Queued = std::variant<QueuedCut, QueuedEvent>;
+
+// Events that changed the bone in other ways than by cutting travel as leaves; a message holds about so much of them.
+constexpr std::size_t kChangeBytes = 128 * 1024;
+
+v1::BoneChangeKind wire_kind(EventKind kind) {
+  switch (kind) {
+    case EventKind::split: return v1::BONE_CHANGE_KIND_SPLIT;
+    case EventKind::undo: return v1::BONE_CHANGE_KIND_UNDO;
+    case EventKind::redo: return v1::BONE_CHANGE_KIND_REDO;
+    case EventKind::remove_body: return v1::BONE_CHANGE_KIND_REMOVE_BODY;
+    default: return v1::BONE_CHANGE_KIND_UNSPECIFIED;
+  }
+}
+
+Bytes tool_row(RoomSeq place, const Tool& tool) {
+  v1::SessionResponse response;
+  response.mutable_tool()->set_room_seq(place.value);
+  *response.mutable_tool()->mutable_tool() = wire::to_wire(tool);
+  return serialised(response);
+}
+
+Bytes scene_row(RoomSeq place, const std::vector<SceneItem>& items) {
+  v1::SessionResponse response;
+  response.mutable_scene()->set_room_seq(place.value);
+  for (const SceneItem& item : items) *response.mutable_scene()->add_items() = wire::to_wire(item);
+  return serialised(response);
+}
+
+MessageParts change_rows(const RoomEvent& event) {
+  MessageParts rows;
+  std::size_t next = 0;
+  do {
+    v1::SessionResponse response;
+    v1::BoneChange& change = *response.mutable_change();
+    change.set_room_seq(event.room_seq.value);
+    change.set_kind(wire_kind(event.kind));
+    change.set_author(event.author.value);
+    change.set_lease_epoch(event.lease_epoch);
+    for (const BodyId body : event.bodies) change.add_bodies(body.value);
+    for (std::size_t size = 0; next < event.leaves.size() && size < kChangeBytes; ++next) {
+      v1::FieldLeaf& leaf = *change.add_leaves();
+      leaf = wire::to_wire(event.leaves[next]);
+      size += leaf.values().size() + 24;
+    }
+    change.set_last(next == event.leaves.size());
+    rows.push_back(serialised(response));
+  } while (next < event.leaves.size());
+  return rows;
+}
 
 // A tool's newest state; one whose session is over is shown idle for a while, so that every reader sees it stop.
 struct ShownState {
@@ -64,11 +121,14 @@ constexpr std::uint64_t kShowIdleTicks = 1200;
 
 }  // namespace
 
+// Before every block of a body.
+constexpr Coord kFirstCoord{INT32_MIN, INT32_MIN, INT32_MIN};
+
 // Leaves copied at once. Between two batches the room goes on cutting.
 constexpr std::size_t kLeafBatch = 64;
 
 // Lock order: room_mutex, then sessions_mutex or mesh_mutex or cutting_mutex, then a stream's own, then jobs_mutex.
-// queue_mutex, mesh_wake_mutex and stats_mutex are never held with another.
+// queue_mutex, mesh_wake_mutex, pieces_mutex and stats_mutex are never held with another.
 struct RoomHost::Impl {
   Impl(Room r, HostRates rates) : room(std::move(r)), rates_(rates) {}
 
@@ -76,22 +136,36 @@ struct RoomHost::Impl {
   void run_ticks();
   void run_mesh();
   void run_jobs();
+  void run_pieces();
   void decide(QueuedCut& queued);
+  void decide(QueuedEvent& queued);
+  void publish(const RoomEvent& event);
+  void show_scene();
   void publish_states();
   void make_stale_blocks();
   void session_over(AuthorId author);
   void read_leaves(std::vector<FieldLeaf>& leaves);
 
+  // All bodies at one place of the order, copied while the room went on.
+  struct BoneCopy {
+    RoomSeq room_seq;
+    RoomCounts counts;
+    std::map<BodyId, CutField> bodies;
+  };
+  BoneCopy copy_bone();
+  void look_for_pieces();
+
   Room room;
   std::shared_mutex room_mutex;
-  std::optional<std::vector<Cut>> meanwhile;  // under room_mutex: cuts applied since bone_status() began to copy
+  std::optional<std::vector<Cut>> meanwhile;  // under room_mutex: cuts applied since copy_bone() began to copy
   const HostRates rates_;
   std::atomic<std::uint64_t> room_seq{0}, authors{0};
   std::atomic<std::size_t> stale{0};
   std::atomic<bool> stopping{false};
 
   std::mutex queue_mutex;
-  std::vector<QueuedCut> queue;
+  std::vector<Queued> queue;
+  bool queue_closed = false;  // the last tick has taken what was queued
 
   mutable std::mutex sessions_mutex;
   Audience<SessionSink> sessions;
@@ -102,6 +176,8 @@ struct RoomHost::Impl {
   std::map<AuthorId, ShownState> states;
   Bytes shown;               // the newest message, for those who come later
   bool states_changed = false;
+  std::vector<v1::SceneItem> items;
+  std::vector<BodyId> bodies;
 
   mutable std::mutex mesh_mutex;
   Audience<MeshSink> mesh_streams;
@@ -112,6 +188,12 @@ struct RoomHost::Impl {
   std::condition_variable mesh_wake;
   std::vector<Clock::time_point> unmeshed;  // arrivals of cuts whose blocks are not made yet
   bool mesh_due = false, mesh_end = false;
+
+  std::mutex pieces_mutex;
+  std::condition_variable pieces_wake;
+  bool pieces_due = false, pieces_end = false;
+  std::set<BodyId> lost_finders;               // under pieces_mutex: what they found was not taken
+  std::map<BodyId, FragmentFinder> finders;    // of the piece thread
 
   std::mutex jobs_mutex;
   std::condition_variable jobs_wake;
@@ -126,11 +208,14 @@ struct RoomHost::Impl {
   std::optional<std::string> ended;  // under sessions, cutting and mesh mutex: why new streams end at once
   std::optional<BoneStatus> last_status;  // of the job thread
 
-  std::thread tick_thread, mesh_thread, job_thread;
+  std::thread tick_thread, mesh_thread, piece_thread, job_thread;
 };
 
 void RoomHost::Impl::make_whole_surface(const std::function<void(double)>& progress) {
-  const std::vector<BlockKey> keys = room.bone_blocks();
+  std::vector<BlockKey> keys = room.bone_blocks();
+  for (const BlockKey& key : room.take_stale_blocks()) keys.push_back(key);  // fine ones of fields that were loaded
+  std::ranges::sort(keys);
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   std::vector<BlockPayload> payloads(keys.size());
   std::atomic<std::size_t> next{0};
   const auto work = [&](bool reports) {
@@ -147,13 +232,16 @@ void RoomHost::Impl::make_whole_surface(const std::function<void(double)>& progr
   for (std::size_t i = 0; i < keys.size(); ++i)
     if (const StoredBlock* block = store.put(keys[i], std::move(payloads[i])))
       surface.blocks[keys[i]] = block_message(keys[i], *block);
+  surface.room_seq = room.room_seq();
+  room_seq = room.room_seq().value;
+  show_scene();
   if (progress) progress(1.0);
 }
 
 void RoomHost::Impl::run_ticks() {
   PeriodicTimer timer(rates_.tick);
   TickStats own;
-  std::vector<QueuedCut> batch;
+  std::vector<Queued> batch;
   bool last = false;
   while (!last) {
     timer.wait(own);
@@ -161,15 +249,21 @@ void RoomHost::Impl::run_ticks() {
     {
       const std::lock_guard lock(queue_mutex);
       std::swap(batch, queue);
+      queue_closed = last;
     }
-    for (QueuedCut& queued : batch) decide(queued);
+    for (Queued& queued : batch) std::visit([this](auto& one) { decide(one); }, queued);
     const bool decided = !batch.empty();
     batch.clear();
     publish_states();
     if (decided) {
-      const std::lock_guard lock(mesh_wake_mutex);
-      mesh_due = true;
-      mesh_wake.notify_one();
+      {
+        const std::lock_guard lock(mesh_wake_mutex);
+        mesh_due = true;
+        mesh_wake.notify_one();
+      }
+      const std::lock_guard lock(pieces_mutex);
+      pieces_due = true;
+      pieces_wake.notify_one();
     }
     timer.done(own);
     // Others read a copy, so that a tick never waits for a reader of its figures; only the last one makes sure.
@@ -225,6 +319,46 @@ void RoomHost::Impl::decide(QueuedCut& queued) {
   }
 }
 
+void RoomHost::Impl::decide(QueuedEvent& queued) {
+  const Result<RoomEvent> event = [&] {
+    const std::unique_lock lock(room_mutex);
+    Result<RoomEvent> decision = queued.change(room);
+    room_seq = room.room_seq().value;
+    stale = room.stale_blocks();
+    return decision;
+  }();
+  if (event && event->room_seq) publish(*event);
+  queued.answer(event);
+  if (!event || !event->bone) return;
+  const std::lock_guard lock(mesh_wake_mutex);
+  unmeshed.push_back(queued.arrived);
+}
+
+void RoomHost::Impl::publish(const RoomEvent& event) {
+  MessageParts rows;
+  if (event.tool) rows.push_back(tool_row(event.room_seq, event.tool->tool));
+  if (event.bone) rows = change_rows(event);
+  if (event.scene) {
+    // Only this thread changes the room.
+    rows.push_back(scene_row(event.room_seq, room.items()));
+  }
+  {
+    const std::lock_guard lock(sessions_mutex);
+    for (const Bytes& row : rows)
+      sessions.each([&](SessionSink& sink) { sink.offer(event.room_seq, row); });
+  }
+  if (event.scene || event.bone) show_scene();
+}
+
+// What viewers draw beside the surface.
+void RoomHost::Impl::show_scene() {
+  const std::lock_guard lock(cutting_mutex);
+  items.clear();
+  for (const SceneItem& item : room.items()) items.push_back(wire::to_wire(item));
+  bodies = room.bodies();
+  states_changed = true;
+}
+
 void RoomHost::Impl::publish_states() {
   const std::lock_guard lock(cutting_mutex);
   for (auto& [author, entry] : states) entry.ticks_over += entry.over ? 1 : 0;
@@ -235,6 +369,8 @@ void RoomHost::Impl::publish_states() {
   v1::WatchCuttingResponse response;
   response.set_room_seq(room_seq);
   for (const auto& [author, entry] : states) *response.add_states() = wire::to_wire(entry.state);
+  for (const v1::SceneItem& item : items) *response.add_items() = item;
+  for (const BodyId body : bodies) response.add_bodies(body.value);
   shown = serialised(response);
   cutting_streams.each([&](CuttingSink& sink) { sink.offer(shown); });
 }
@@ -271,6 +407,7 @@ void RoomHost::Impl::run_mesh() {
 
 void RoomHost::Impl::make_stale_blocks() {
   std::vector<BlockKey> keys;
+  std::vector<BodyId> bodies_now;
   std::vector<Clock::time_point> arrivals;
   MeshUpdate update;
   {
@@ -283,17 +420,18 @@ void RoomHost::Impl::make_stale_blocks() {
     keys = room.take_stale_blocks();
     stale = 0;
     update.room_seq = room.room_seq();
+    bodies_now = room.bodies();
   }
 
   // The room goes on between two blocks; one that it changes meanwhile is stale again and made anew.
   std::vector<BlockPayload> payloads;
   payloads.reserve(keys.size());
   for (const BlockKey& key : keys) {
-    const BlockSamples samples = [&] {
+    const std::optional<BlockSamples> samples = [&] {
       const std::shared_lock lock(room_mutex);
-      return room.gather_block(key);
+      return room.find_field(key.body) ? std::optional(room.gather_block(key)) : std::nullopt;
     }();
-    payloads.push_back(make_block(samples));
+    payloads.push_back(samples ? make_block(*samples) : BlockPayload{});
   }
 
   {
@@ -307,6 +445,19 @@ void RoomHost::Impl::make_stale_blocks() {
         surface.blocks.erase(keys[i]);
       else
         surface.blocks[keys[i]] = message;
+    }
+    // Bodies that are gone take their blocks along.
+    std::vector<BlockKey> gone;
+    for (auto block = surface.blocks.begin(); block != surface.blocks.end();) {
+      const BodyId body = block->first.body;
+      const auto next_body = surface.blocks.lower_bound({BodyId{body.value + 1}, 0, kFirstCoord});
+      if (!std::ranges::binary_search(bodies_now, body))
+        for (; block != next_body; ++block) gone.push_back(block->first);
+      block = next_body;
+    }
+    for (const BlockKey& key : gone) {
+      surface.blocks.erase(key);
+      if (const StoredBlock* block = store.put(key, {})) update.blocks[key] = block_message(key, *block);
     }
     surface.room_seq = update.room_seq;
     mesh_streams.each([&](MeshSink& sink) { sink.offer(update); });
@@ -333,8 +484,12 @@ void RoomHost::Impl::run_jobs() {
 RoomHost::RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress)
     : impl_(std::make_unique<Impl>(std::move(room), rates)) {
   impl_->make_whole_surface(progress);
+  // Of the bone before it is cut here: what those cuts separate is found as it comes apart.
+  for (const BodyId body : impl_->room.bodies()) impl_->finders.emplace(body, FragmentFinder(*impl_->room.find_field(body)));
+  (void)impl_->room.take_changes();
   impl_->tick_thread = std::thread([this] { impl_->run_ticks(); });
   impl_->mesh_thread = std::thread([this] { impl_->run_mesh(); });
+  impl_->piece_thread = std::thread([this] { impl_->run_pieces(); });
   impl_->job_thread = std::thread([this] { impl_->run_jobs(); });
 }
 
@@ -342,7 +497,15 @@ RoomHost::~RoomHost() { stop(); }
 
 const Case& RoomHost::bone() const { return impl_->room.bone(); }
 RoomSeq RoomHost::room_seq() const { return RoomSeq{impl_->room_seq}; }
-std::uint64_t RoomHost::lease_epoch() const { return impl_->room.lease_epoch(); }
+std::uint64_t RoomHost::lease_epoch() const {
+  const std::shared_lock lock(impl_->room_mutex);
+  return impl_->room.lease_epoch();
+}
+const ToolBox& RoomHost::tools() const { return *impl_->room.tools(); }
+std::vector<SceneItem> RoomHost::items() const {
+  const std::shared_lock lock(impl_->room_mutex);
+  return impl_->room.items();
+}
 bool RoomHost::knows(AuthorId author) const { return author && author.value <= impl_->authors; }
 
 HostHealth RoomHost::health() const {
@@ -395,59 +558,200 @@ Digest RoomHost::surface_hash() const {
   return impl_->store.hash();
 }
 
-// In batches: a room that is much cut has many leaves, and a tick must not wait until all of them are copied.
+// In batches: a room that is much cut has many leaves, and a tick must not wait until all of them are copied. Those of a
+// body that goes meanwhile stay without values.
 void RoomHost::Impl::read_leaves(std::vector<FieldLeaf>& leaves) {
   for (std::size_t i = 0; i < leaves.size();) {
     const std::shared_lock lock(room_mutex);
-    for (const std::size_t end = std::min(leaves.size(), i + kLeafBatch); i < end; ++i) room.field().read(leaves[i]);
+    for (const std::size_t end = std::min(leaves.size(), i + kLeafBatch); i < end; ++i)
+      if (const CutField* field = room.find_field(leaves[i].body)) field->read(leaves[i]);
+  }
+  std::erase_if(leaves, [](const FieldLeaf& leaf) { return leaf.values.empty(); });
+}
+
+RoomHost::Impl::BoneCopy RoomHost::Impl::copy_bone() {
+  const auto places = [&] {
+    std::vector<FieldLeaf> leaves;
+    for (const BodyId body : room.bodies()) std::ranges::move(room.find_field(body)->leaf_places(), std::back_inserter(leaves));
+    return leaves;
+  };
+  for (int attempt = 0;; ++attempt) {
+    BoneCopy copy;
+    std::vector<FieldLeaf> leaves;
+    std::vector<Cut> cuts;
+    std::uint64_t changes = 0;
+    {
+      // Only this thread and, with the lock alone, the tick's use `meanwhile`.
+      const std::shared_lock lock(room_mutex);
+      changes = room.bone_changes();
+      leaves = places();
+      meanwhile.emplace();
+    }
+    read_leaves(leaves);
+    {
+      const std::shared_lock lock(room_mutex);
+      copy.room_seq = room.room_seq();
+      copy.counts = room.counts();
+      cuts = std::move(*meanwhile);
+      meanwhile.reset();
+      // Bone that came back or fell apart meanwhile: what was copied before is of another bone. A room in which that
+      // happens all the time is held still.
+      if (changes != room.bone_changes()) {
+        if (attempt < 3) continue;
+        leaves = places();
+        for (FieldLeaf& leaf : leaves) room.find_field(leaf.body)->read(leaf);
+        cuts.clear();
+      }
+      for (const BodyId body : room.bodies()) copy.bodies.emplace(body, CutField(room.bone(), body, room.tools()));
+    }
+    // Leaves that contain some of the cuts since their copying began get the others now, and those once more, which
+    // changes nothing: the copy is the bone at room_seq.
+    for (const FieldLeaf& leaf : leaves) copy.bodies.at(leaf.body).restore(leaf);
+    for (const Cut& cut : cuts)
+      for (auto& [id, field] : copy.bodies) field.apply(cut);
+    return copy;
   }
 }
 
 BoneStatus RoomHost::bone_status() {
-  std::vector<FieldLeaf> leaves;
   {
-    // Only this thread and, with the lock alone, the tick's use `meanwhile`.
     const std::shared_lock lock(impl_->room_mutex);
     if (impl_->last_status && impl_->last_status->room_seq == impl_->room.room_seq()) return *impl_->last_status;
-    leaves = impl_->room.field().leaf_places();
-    impl_->meanwhile.emplace();
   }
-  impl_->read_leaves(leaves);
+  // Measured on a copy, so that the room is not kept from cutting.
+  const Impl::BoneCopy copy = impl_->copy_bone();
   BoneStatus status;
-  std::vector<Cut> meanwhile;
-  {
-    const std::shared_lock lock(impl_->room_mutex);
-    status.room_seq = impl_->room.room_seq();
-    status.counts = impl_->room.counts();
-    meanwhile = std::move(*impl_->meanwhile);
-    impl_->meanwhile.reset();
+  status.room_seq = copy.room_seq;
+  status.counts = copy.counts;
+  std::vector<FieldLeaf> leaves;
+  for (const auto& [id, field] : copy.bodies) {
+    status.bodies.push_back(id);
+    // A body lacks what was cut and what is in the others: a piece is there that the bone lacks.
+    status.removed_mm3 += field.removed_mm3() - (status.bodies.size() > 1 ? bone().volume_mm3() : 0.0);
+    std::ranges::move(field.leaves(), std::back_inserter(leaves));
   }
-  // Measured on a copy, so that the room is not kept from cutting. Leaves that contain some of the cuts since their
-  // copying began get the others now, and those once more, which changes nothing: the copy is the bone at room_seq.
-  CutField copy(bone(), BodyId{0});
-  for (const FieldLeaf& leaf : leaves) copy.restore(leaf);
-  for (const Cut& cut : meanwhile) copy.apply(cut);
-  status.removed_mm3 = copy.removed_mm3();
-  status.field_hash = copy.hash();
+  status.field_hash = field_hash(std::move(leaves), bone().pitch_mm());
   impl_->last_status = status;
   return status;
 }
 
+SavedFields RoomHost::saved_fields() {
+  const Impl::BoneCopy copy = impl_->copy_bone();
+  SavedFields saved;
+  saved.case_hash = bone().hash();
+  saved.kernel_version = kKernelVersion;
+  saved.room_seq = copy.room_seq;
+  saved.pitch_mm = bone().pitch_mm();
+  for (const auto& [id, field] : copy.bodies) {
+    saved.bodies.push_back(id);
+    std::ranges::move(field.leaves(), std::back_inserter(saved.leaves));
+  }
+  return saved;
+}
+
+// [piece thread] The finders follow the bodies at some distance. What they find is a queued event like any other.
+void RoomHost::Impl::run_pieces() {
+  while (true) {
+    {
+      std::unique_lock lock(pieces_mutex);
+      pieces_wake.wait(lock, [&] { return pieces_due || pieces_end; });
+      if (pieces_end) return;
+      pieces_due = false;
+    }
+    look_for_pieces();
+    std::unique_lock lock(pieces_mutex);
+    pieces_wake.wait_for(lock, rates_.pieces, [&] { return pieces_end; });
+  }
+}
+
+void RoomHost::Impl::look_for_pieces() {
+  std::vector<BodyLeaves> changes;
+  std::vector<BodyId> present;
+  {
+    const std::unique_lock lock(room_mutex);
+    changes = room.take_changes();
+    present = room.bodies();
+  }
+  {
+    const std::lock_guard lock(pieces_mutex);
+    for (const BodyId body : lost_finders) finders.erase(body);
+    lost_finders.clear();
+  }
+  std::erase_if(finders, [&](const auto& entry) { return !std::ranges::binary_search(present, entry.first); });
+  for (const BodyId body : present) {
+    if (finders.contains(body)) continue;
+    // Labelled from a copy, since that takes longer than a tick may wait.
+    std::vector<FieldLeaf> leaves;
+    {
+      const std::shared_lock lock(room_mutex);
+      if (const CutField* field = room.find_field(body)) leaves = field->leaf_places();
+    }
+    CutField copy(room.bone(), body, room.tools());
+    if (body == BodyId{0}) {
+      // From the bone as it was, so that what has come apart since is found.
+      for (const FieldLeaf& leaf : leaves) changes.push_back({body, leaf.level, {leaf.origin}});
+    } else {
+      read_leaves(leaves);
+      for (const FieldLeaf& leaf : leaves) copy.restore(leaf);
+    }
+    finders.emplace(body, FragmentFinder(copy));
+  }
+  std::set<BodyId> touched;
+  for (const BodyLeaves& change : changes) {
+    const std::shared_lock lock(room_mutex);
+    const CutField* field = room.find_field(change.body);
+    if (!field) continue;
+    finders.at(change.body).touch(*field, change.level, change.origins);
+    touched.insert(change.body);
+  }
+  for (const BodyId body : touched) {
+    std::vector<Fragment> fragments;
+    std::uint64_t seen = 0;
+    {
+      const std::shared_lock lock(room_mutex);
+      const CutField* field = room.find_field(body);
+      if (!field) continue;
+      fragments = finders.at(body).take_fragments(*field);
+      seen = room.lease_epoch();
+    }
+    if (fragments.empty()) continue;
+    const std::lock_guard lock(queue_mutex);
+    if (queue_closed) return;
+    queue.emplace_back(std::in_place_type<QueuedEvent>, QueuedEvent{[body, fragments, seen](Room& r) { return r.split(body, fragments, seen); },
+                                [this, body](const Result<RoomEvent>& split) {
+                                  if (split) return;
+                                  const std::lock_guard lost(pieces_mutex);
+                                  lost_finders.insert(body);
+                                  pieces_due = true;
+                                },
+                                Clock::now()});
+  }
+}
+
 Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink) {
   std::vector<FieldLeaf> leaves;
+  MessageParts before;
   {
     // Held until the sink is listed: every row after `contained` is committed, and so offered, later.
     const std::shared_lock room_lock(impl_->room_mutex);
     if (!impl_->room.may_cut(sink->author()))
       return failure(ErrorCode::invalid_input, "open.author " + std::to_string(sink->author().value) +
                                                    " has not joined this room as a haptic client; call Join first");
-    leaves = impl_->room.field().leaf_places();
+    for (const BodyId body : impl_->room.bodies())
+      std::ranges::move(impl_->room.find_field(body)->leaf_places(), std::back_inserter(leaves));
+    for (const ToolBox::Entry* entry : impl_->room.tools()->entries())
+      before.push_back(tool_row(RoomSeq{}, entry->tool));
+    before.push_back(scene_row(impl_->room.room_seq(), impl_->room.items()));
+    v1::SessionResponse complete;
+    complete.mutable_complete()->set_room_seq(impl_->room.room_seq().value);
+    complete.mutable_complete()->set_lease_epoch(impl_->room.lease_epoch());
+    for (const BodyId body : impl_->room.bodies()) complete.mutable_complete()->add_bodies(body.value);
     const std::lock_guard lock(impl_->sessions_mutex);
     if (!impl_->open_authors.insert(sink->author()).second)
       return failure(ErrorCode::invalid_input,
                      "open.author " + std::to_string(sink->author().value) + " has an open session; join again for another");
     impl_->sessions.add(*sink);
-    sink->begin(impl_->room.room_seq());
+    sink->begin(impl_->room.room_seq(), std::move(before), serialised(complete));
     if (impl_->ended) sink->end(*impl_->ended);
   }
   impl_->read_leaves(leaves);
@@ -493,7 +797,19 @@ void RoomHost::leave(CuttingSink& sink) {
 
 void RoomHost::queue_cut(std::shared_ptr<SessionSink> sink, Cut cut, Clock::time_point arrived) {
   const std::lock_guard lock(impl_->queue_mutex);
-  impl_->queue.push_back({std::move(sink), std::move(cut), arrived});
+  impl_->queue.emplace_back(std::in_place_type<QueuedCut>, QueuedCut{std::move(sink), std::move(cut), arrived});
+}
+
+void RoomHost::queue_event(std::function<Result<RoomEvent>(Room&)> change,
+                           std::function<void(const Result<RoomEvent>&)> answer) {
+  {
+    const std::lock_guard lock(impl_->queue_mutex);
+    if (!impl_->queue_closed) {
+      impl_->queue.emplace_back(std::in_place_type<QueuedEvent>, QueuedEvent{std::move(change), std::move(answer), Clock::now()});
+      return;
+    }
+  }
+  answer(failure(ErrorCode::unavailable, "the server stops"));
 }
 
 void RoomHost::offer_state(CuttingState state) {
@@ -521,6 +837,12 @@ void RoomHost::stop() {
     impl_->mesh_wake.notify_all();
   }
   if (impl_->mesh_thread.joinable()) impl_->mesh_thread.join();
+  {
+    const std::lock_guard lock(impl_->pieces_mutex);
+    impl_->pieces_end = true;
+    impl_->pieces_wake.notify_all();
+  }
+  if (impl_->piece_thread.joinable()) impl_->piece_thread.join();
   {
     const std::lock_guard lock(impl_->jobs_mutex);
     impl_->jobs_end = true;

@@ -1,4 +1,5 @@
-// Runs a room: one thread that commits cuts at 120 Hz, one that makes mesh blocks at 30 Hz, one for slow requests.
+// Runs a room: one thread that commits events at 120 Hz, one that makes mesh blocks at 30 Hz, one that looks for pieces
+// that have come apart, one for slow requests.
 // Free of gRPC: streams are seen as sinks.
 #pragma once
 #include <chrono>
@@ -33,7 +34,9 @@ class CuttingSink : public StreamSink {
 class SessionSink : public StreamSink {
  public:
   [[nodiscard]] virtual AuthorId author() const = 0;
-  virtual void begin(RoomSeq contained) = 0;                // of the leaves; rows come from here on
+  // Of the leaves; rows come from here on. `before`: whole SessionResponses that go before the leaves, `complete` the one
+  // that ends them.
+  virtual void begin(RoomSeq contained, MessageParts before, Bytes complete) = 0;
   // Once, after begin() and perhaps after rows. Those apply to these leaves: what one of them contains already is no
   // change when its row is applied again.
   virtual void set_leaves(std::vector<FieldLeaf> leaves) = 0;
@@ -46,6 +49,7 @@ class SessionSink : public StreamSink {
 struct HostRates {
   std::chrono::nanoseconds tick{1'000'000'000 / 120};
   std::chrono::nanoseconds mesh{1'000'000'000 / 30};
+  std::chrono::nanoseconds pieces{1'000'000'000 / 8};  // at most so often is looked for what has come apart
 };
 
 struct HostHealth {
@@ -62,7 +66,8 @@ struct HostHealth {
 // The bone at one place of the room's order.
 struct BoneStatus {
   RoomSeq room_seq;
-  Digest field_hash;
+  Digest field_hash;   // of all bodies
+  std::vector<BodyId> bodies;
   double removed_mm3 = 0;
   RoomCounts counts;
 };
@@ -81,6 +86,8 @@ class RoomHost {
   [[nodiscard]] RoomSeq room_seq() const;
   [[nodiscard]] std::uint64_t lease_epoch() const;
   [[nodiscard]] bool knows(AuthorId author) const;
+  [[nodiscard]] const ToolBox& tools() const;
+  [[nodiscard]] std::vector<SceneItem> items() const;
   [[nodiscard]] HostHealth health() const;
   [[nodiscard]] Digest surface_hash() const;  // of the newest blocks
 
@@ -88,6 +95,7 @@ class RoomHost {
   void run_slowly(std::function<void()> job);
   AuthorId join(MemberKind kind);
   [[nodiscard]] BoneStatus bone_status();
+  [[nodiscard]] SavedFields saved_fields();  // of all bodies, at its room_seq
   // The sink hears every row after those of its leaves. Error: invalid_input (the author may not cut, or
   // has an open session).
   [[nodiscard]] Result<void> open_session(const std::shared_ptr<SessionSink>& sink);
@@ -101,6 +109,9 @@ class RoomHost {
   // Queued until the next tick. The sink, kept alive until then, hears the outcome.
   void queue_cut(std::shared_ptr<SessionSink> sink, Cut cut, Clock::time_point arrived);
   void offer_state(CuttingState state);  // newest of its author wins
+  // Queued until the next tick too, behind the cuts that came before. `answer` is called there and must return at once;
+  // by then every session has been told. Error unavailable: the room has stopped.
+  void queue_event(std::function<Result<RoomEvent>(Room&)> change, std::function<void(const Result<RoomEvent>&)> answer);
 
   void end_streams(const std::string& why);  // those open now and those that come later
   void stop();                               // joins the threads; what is queued is decided before

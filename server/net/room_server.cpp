@@ -99,7 +99,7 @@ std::uint64_t new_server_epoch() {
   return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(since_1970).count());
 }
 
-constexpr int kMaxReceiveBytes = 256 * 1024;       // a cut of 64 knots is below 4 kB
+constexpr int kMaxReceiveBytes = 4 * 1024 * 1024;  // a cut of 64 knots is below 4 kB, a tool made from a mesh a few MB
 constexpr int kMaxSendBytes = 4 * 1024 * 1024;     // a piece of a case is 1 MiB
 constexpr int kKeepaliveMs = 10'000;               // a peer that answers no ping that long is gone
 constexpr int kShortestPingMs = 500;               // clients may ask that often whether the server lives
@@ -111,6 +111,7 @@ struct RoomServer::Impl {
   std::vector<std::unique_ptr<grpc::Service>> services;
   std::unique_ptr<grpc::Server> server;
   std::string address;
+  bool saves = false;
 };
 
 RoomServer::RoomServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -136,9 +137,10 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(Room room, const RoomServe
   gpr_set_log_function([](gpr_log_func_args*) {});
 
   auto impl = std::make_unique<Impl>();
+  impl->saves = !options.save.empty();
   impl->host = std::make_unique<RoomHost>(std::move(room), options.rates, progress);
   const std::uint64_t epoch = new_server_epoch();
-  impl->services.push_back(make_room_service(*impl->host, options.case_folder, epoch));
+  impl->services.push_back(make_room_service(*impl->host, {options.case_folder, options.save}, epoch));
   impl->services.push_back(make_cutting_service(*impl->host, epoch));
   impl->services.push_back(make_watch_service(*impl->host));
 
@@ -176,7 +178,8 @@ RoomServerSummary RoomServer::stop() {
   impl_->server->Wait();
   impl_->host->stop();
   impl_->server.reset();
-  return {impl_->host->bone_status(), impl_->host->health(), impl_->host->surface_hash()};
+  return {impl_->host->bone_status(), impl_->host->health(), impl_->saves ? impl_->host->saved_fields() : SavedFields{},
+          impl_->host->surface_hash()};
 }
 
 }  // namespace osteon

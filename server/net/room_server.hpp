@@ -13,12 +13,14 @@ namespace osteon {
 struct RoomServerOptions {
   std::string listen = "127.0.0.1:0";   // HOST:PORT on this machine; port 0 lets the system choose
   std::filesystem::path case_folder;    // what clients are sent; holds the room's case
-  HostRates rates;
+  std::filesystem::path save{};         // where the cut fields are written on request; empty: nowhere
+  HostRates rates{};
 };
 
 struct RoomServerSummary {
   BoneStatus bone;
   HostHealth health;
+  SavedFields fields;   // of the bone; empty without RoomServerOptions::save
   Digest surface_hash;  // equal to every viewer's that has shown room_seq
 };
 

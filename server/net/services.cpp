@@ -205,9 +205,10 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink {
   void start() { StartRead(&request_); }
 
   AuthorId author() const override { return author_; }
-  void begin(RoomSeq contained) override {
+  void begin(RoomSeq contained, MessageParts before, Bytes complete) override {
     const std::lock_guard lock(mutex_);
-    outbox_.begin(contained);
+    outbox_.begin(contained, std::move(before), std::move(complete));
+    pump();
   }
   void set_leaves(std::vector<FieldLeaf> leaves) override {
     const std::lock_guard lock(mutex_);
@@ -310,7 +311,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink {
       pump();
     else
       close_locked({StatusCode::RESOURCE_EXHAUSTED, "the reader is more than " + std::to_string(SessionOutbox::kMaxRows) +
-                                                        " cuts behind the room; join again"});
+                                                        " events behind the room; join again"});
   }
   bool take(ByteBuffer& message) override {
     const MessageParts parts = outbox_.take();
@@ -405,13 +406,32 @@ Status judge(const v1::JoinRequest& request) {
   return Status::OK;
 }
 
-using RoomBase = v1::RoomService::WithCallbackMethod_Join<v1::RoomService::WithCallbackMethod_GetStatus<
-    v1::RoomService::WithRawCallbackMethod_GetCase<v1::RoomService::Service>>>;
+Status status_of(const Error& error) {
+  switch (error.code) {
+    case ErrorCode::invalid_input: return invalid(error.message);
+    case ErrorCode::not_found: return {StatusCode::NOT_FOUND, error.message};
+    case ErrorCode::exists: return {StatusCode::ALREADY_EXISTS, error.message};
+    case ErrorCode::unavailable:
+    case ErrorCode::unsupported: return {StatusCode::FAILED_PRECONDITION, error.message};
+    default: return {StatusCode::INTERNAL, error.message};
+  }
+}
+
+template <class Base>
+using WithTools = v1::RoomService::WithCallbackMethod_ListTools<
+    v1::RoomService::WithCallbackMethod_GetTool<v1::RoomService::WithCallbackMethod_AddTool<Base>>>;
+template <class Base>
+using WithEvents = v1::RoomService::WithCallbackMethod_Undo<
+    v1::RoomService::WithCallbackMethod_Redo<v1::RoomService::WithCallbackMethod_RemoveBody<
+        v1::RoomService::WithCallbackMethod_SetSceneItem<v1::RoomService::WithCallbackMethod_RemoveSceneItem<
+            v1::RoomService::WithCallbackMethod_SaveFields<Base>>>>>>;
+using RoomBase = WithTools<WithEvents<v1::RoomService::WithCallbackMethod_Join<v1::RoomService::WithCallbackMethod_GetStatus<
+    v1::RoomService::WithRawCallbackMethod_GetCase<v1::RoomService::Service>>>>>;
 
 class RoomServiceImpl final : public RoomBase {
  public:
-  RoomServiceImpl(RoomHost& host, std::filesystem::path case_folder, std::uint64_t server_epoch)
-      : host_(host), case_folder_(std::move(case_folder)), server_epoch_(server_epoch) {}
+  RoomServiceImpl(RoomHost& host, RoomFiles files, std::uint64_t server_epoch)
+      : host_(host), files_(std::move(files)), server_epoch_(server_epoch) {}
 
   grpc::ServerUnaryReactor* Join(grpc::CallbackServerContext* context, const v1::JoinRequest* request,
                                  v1::JoinResponse* response) override {
@@ -449,6 +469,9 @@ class RoomServiceImpl final : public RoomBase {
       response->set_removed_mm3(status.removed_mm3);
       response->set_rejected(status.counts.rejected);
       response->set_subscribers(static_cast<std::uint32_t>(health.mesh_streams + health.cutting_streams));
+      for (const BodyId body : status.bodies) response->add_bodies(body.value);
+      for (const SceneItem& item : host_.items()) *response->add_items() = wire::to_wire(item);
+      response->set_lease_epoch(host_.lease_epoch());
       v1::TickHealth& tick = *response->mutable_tick();
       tick.set_ticks(health.tick.work.count());
       tick.set_missed(health.tick.missed);
@@ -469,14 +492,155 @@ class RoomServiceImpl final : public RoomBase {
     if (!hash) return refused(invalid("case_hash is not a digest of 32 bytes"));
     if (*hash != host_.bone().hash())
       return refused({StatusCode::NOT_FOUND, "this server has no case " + to_hex(*hash)});
-    CaseStream* stream = CaseStream::launch(std::make_shared<CaseStream>(host_, case_folder_));
+    CaseStream* stream = CaseStream::launch(std::make_shared<CaseStream>(host_, files_.case_folder));
     stream->start();
     return stream;
   }
 
+  grpc::ServerUnaryReactor* ListTools(grpc::CallbackServerContext* context, const v1::ListToolsRequest* request,
+                                      v1::ListToolsResponse* response) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!known("ListToolsRequest", request->author(), reactor)) return reactor;
+    for (const ToolBox::Entry* entry : host_.tools().entries()) {
+      v1::KnownTool& tool = *response->add_tools();
+      tool.set_tool_hash(wire::to_wire(entry->hash));
+      tool.set_name(entry->tool.name);
+      tool.set_title(entry->tool.title);
+      tool.set_cuts(entry->body.cuts());
+    }
+    reactor->Finish(Status::OK);
+    return reactor;
+  }
+
+  grpc::ServerUnaryReactor* GetTool(grpc::CallbackServerContext* context, const v1::GetToolRequest* request,
+                                    v1::GetToolResponse* response) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!known("GetToolRequest", request->author(), reactor)) return reactor;
+    const Result<Digest> hash = wire::digest_from_wire(request->tool_hash());
+    if (!hash) return refuse(reactor, invalid("tool_hash is not a digest of 32 bytes"));
+    const ToolBox::Entry* entry = host_.tools().find(*hash);
+    if (!entry) return refuse(reactor, {StatusCode::NOT_FOUND, "the room knows no tool " + to_hex(*hash)});
+    *response->mutable_tool() = wire::to_wire(entry->tool);
+    reactor->Finish(Status::OK);
+    return reactor;
+  }
+
+  grpc::ServerUnaryReactor* AddTool(grpc::CallbackServerContext* context, const v1::AddToolRequest* request,
+                                    v1::AddToolResponse* response) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    Result<Tool> tool = wire::from_wire(request->tool());
+    if (!tool) return refuse(reactor, invalid(tool.error().message));
+    return change(
+        reactor, [by = AuthorId{request->author()}, tool = *tool](Room& room) { return room.add_tool(by, tool); },
+        [response](const RoomEvent& event) {
+          response->set_room_seq(event.room_seq.value);
+          response->set_tool_hash(wire::to_wire(event.tool->hash));
+        });
+  }
+
+  grpc::ServerUnaryReactor* Undo(grpc::CallbackServerContext* context, const v1::UndoRequest* request,
+                                 v1::UndoResponse* response) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    std::vector<RoomSeq> places;
+    for (const std::uint64_t place : request->room_seqs()) places.push_back(RoomSeq{place});
+    if (!places.empty() && (request->count() != 0 || request->of_author() != 0))
+      return refuse(reactor, invalid("an UndoRequest has either count or room_seqs"));
+    return change(
+        reactor,
+        [by = AuthorId{request->author()}, of = AuthorId{request->of_author()}, count = request->count(), places](Room& room) {
+          return places.empty() ? room.undo_last(by, count, of) : room.undo(by, places);
+        },
+        [response](const RoomEvent& event) {
+          response->set_room_seq(event.room_seq.value);
+          for (const RoomSeq place : event.places) response->add_undone(place.value);
+        });
+  }
+
+  grpc::ServerUnaryReactor* Redo(grpc::CallbackServerContext* context, const v1::RedoRequest* request,
+                                 v1::RedoResponse* response) override {
+    return change(
+        context->DefaultReactor(),
+        [by = AuthorId{request->author()}, count = request->count()](Room& room) { return room.redo_last(by, count); },
+        [response](const RoomEvent& event) {
+          response->set_room_seq(event.room_seq.value);
+          for (const RoomSeq place : event.places) response->add_redone(place.value);
+        });
+  }
+
+  grpc::ServerUnaryReactor* RemoveBody(grpc::CallbackServerContext* context, const v1::RemoveBodyRequest* request,
+                                       v1::RemoveBodyResponse* response) override {
+    return change(
+        context->DefaultReactor(),
+        [by = AuthorId{request->author()}, body = BodyId{request->body()}](Room& room) { return room.remove_body(by, body); },
+        [response](const RoomEvent& event) { response->set_room_seq(event.room_seq.value); });
+  }
+
+  grpc::ServerUnaryReactor* SetSceneItem(grpc::CallbackServerContext* context, const v1::SetSceneItemRequest* request,
+                                         v1::SetSceneItemResponse* response) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    const Result<SceneItem> item = wire::from_wire(request->item());
+    if (!item) return refuse(reactor, invalid(item.error().message));
+    return change(
+        reactor, [by = AuthorId{request->author()}, item = *item](Room& room) { return room.set_item(by, item); },
+        [response](const RoomEvent& event) {
+          response->set_room_seq(event.room_seq.value);
+          response->set_item(event.item);
+        });
+  }
+
+  grpc::ServerUnaryReactor* RemoveSceneItem(grpc::CallbackServerContext* context, const v1::RemoveSceneItemRequest* request,
+                                            v1::RemoveSceneItemResponse* response) override {
+    return change(
+        context->DefaultReactor(),
+        [by = AuthorId{request->author()}, item = request->item()](Room& room) { return room.remove_item(by, item); },
+        [response](const RoomEvent& event) { response->set_room_seq(event.room_seq.value); });
+  }
+
+  grpc::ServerUnaryReactor* SaveFields(grpc::CallbackServerContext* context, const v1::SaveFieldsRequest* request,
+                                       v1::SaveFieldsResponse* response) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!known("SaveFieldsRequest", request->author(), reactor)) return reactor;
+    if (files_.save.empty())
+      return refuse(reactor, {StatusCode::FAILED_PRECONDITION, "this server saves nothing; start it with --save FILE.vdb"});
+    // A client names no folder: it may not write elsewhere on the server's disk.
+    const std::filesystem::path name = request->file_name();
+    if (!name.empty() && (name != name.filename() || name.extension() != ".vdb" || request->file_name().front() == '.'))
+      return refuse(reactor, invalid("file_name is not a plain name that ends in .vdb"));
+    const std::filesystem::path file = name.empty() ? files_.save : files_.save.parent_path() / name;
+    host_.run_slowly([this, reactor, response, file] {
+      const SavedFields saved = host_.saved_fields();
+      if (const Result<void> written = save_fields(file, saved); !written)
+        return reactor->Finish({StatusCode::INTERNAL, written.error().message});
+      response->set_room_seq(saved.room_seq.value);
+      response->set_field_hash(wire::to_wire(field_hash(saved.leaves, host_.bone().pitch_mm())));
+      response->set_file(file.string());
+      reactor->Finish(Status::OK);
+    });
+    return reactor;
+  }
+
  private:
+  static grpc::ServerUnaryReactor* refuse(grpc::ServerUnaryReactor* reactor, Status status) {
+    reactor->Finish(std::move(status));
+    return reactor;
+  }
+  bool known(const char* message, std::uint64_t author, grpc::ServerUnaryReactor* reactor) {
+    if (host_.knows(AuthorId{author})) return true;
+    reactor->Finish(not_joined(message, author));
+    return false;
+  }
+  // An event of the room; answered when every session has been told.
+  template <class Fill>
+  grpc::ServerUnaryReactor* change(grpc::ServerUnaryReactor* reactor, std::function<Result<RoomEvent>(Room&)> event, Fill fill) {
+    host_.queue_event(std::move(event), [reactor, fill](const Result<RoomEvent>& decided) {
+      if (decided) fill(*decided);
+      reactor->Finish(decided ? Status::OK : status_of(decided.error()));
+    });
+    return reactor;
+  }
+
   RoomHost& host_;
-  const std::filesystem::path case_folder_;
+  const RoomFiles files_;
   const std::uint64_t server_epoch_;
 };
 
@@ -526,9 +690,8 @@ class WatchServiceImpl final : public WatchBase {
 
 }  // namespace
 
-std::unique_ptr<grpc::Service> make_room_service(RoomHost& host, std::filesystem::path case_folder,
-                                                 std::uint64_t server_epoch) {
-  return std::make_unique<RoomServiceImpl>(host, std::move(case_folder), server_epoch);
+std::unique_ptr<grpc::Service> make_room_service(RoomHost& host, RoomFiles files, std::uint64_t server_epoch) {
+  return std::make_unique<RoomServiceImpl>(host, std::move(files), server_epoch);
 }
 std::unique_ptr<grpc::Service> make_cutting_service(RoomHost& host, std::uint64_t server_epoch) {
   return std::make_unique<CuttingServiceImpl>(host, server_epoch);

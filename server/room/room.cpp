@@ -55,8 +55,10 @@ std::string_view sentence(Rejection reason) {
   return "the reason is unknown";
 }
 
-Room::Room(Case bone, CutLimits limits, std::shared_ptr<ToolBox> tools)
-    : limits_(limits), tools_(std::move(tools)), field_(std::move(bone), BodyId{0}, tools_), surface_(BodyId{0}) {}
+Room::Room(Case bone, CutLimits limits, std::shared_ptr<ToolBox> tools) : limits_(limits), tools_(std::move(tools)) {
+  const CoordBox reach = bone.bounds_samples();
+  bodies_.emplace(BodyId{0}, Body{CutField(std::move(bone), BodyId{0}, tools_), {}, SurfaceBlocks(BodyId{0}), reach});
+}
 
 AuthorId Room::join(MemberKind kind) {
   const AuthorId author{++authors_};
@@ -97,13 +99,24 @@ Result<Outcome> Room::submit(const Cut& cut) {
     return Outcome{room_seq_, rejection, false, {}};
   }
   ++counts_.committed;
-  CutReport report = field_.apply(cut);
-  for (const BlockKey& key : surface_.touch(cut.level, report.changed_leaves)) stale_.insert(key);
+  events_[room_seq_] = {.kind = EventKind::cut, .author = cut.author};
+  CutReport report;
+  report.level = cut.level;
+  for (auto& [id, body] : bodies_) {
+    if (!body.present) continue;
+    CutReport part = body.field.apply(cut);
+    if (!part.reached_leaves.empty()) body.history.add(room_seq_, cut, part.reached_leaves);
+    report.visited += part.visited;
+    report.computed += part.computed;
+    report.modified += part.modified;
+    report.changed_leaves.insert(report.changed_leaves.end(), part.changed_leaves.begin(), part.changed_leaves.end());
+    if (!part.changed_leaves.empty()) note_changed(id, {{cut.level, std::move(part.changed_leaves)}}, nullptr);
+  }
   return Outcome{room_seq_, Rejection::none, false, std::move(report)};
 }
 
 Rejection Room::judge(const Cut& cut) const {
-  if (cut.body != BodyId{0}) return Rejection::body;
+  if (!exists(cut.body)) return Rejection::body;
   if (cut.lease_epoch != lease_epoch()) return Rejection::lease;
   const ToolBox::Entry* entry = tools_->find(cut.tool);
   if (!entry || !entry->body.cuts()) return Rejection::tool;
@@ -137,23 +150,26 @@ std::vector<BlockKey> Room::take_stale_blocks() {
 
 std::vector<BlockKey> Room::bone_blocks() const {
   std::vector<BlockKey> keys;
-  const CoordBox samples = bone().bounds_samples();
-  if (samples.empty()) return keys;
-  // Cells reach one sample beyond the block, so a surface may lie in the block below the first sample.
-  const Coord first = shift_down(samples.min - Coord{1, 1, 1}, 4), last = shift_down(samples.max, 4);
-  static_assert(kBlockCells == 1 << 4);
-  for (int x = first.x; x <= last.x; ++x)
-    for (int y = first.y; y <= last.y; ++y)
-      for (int z = first.z; z <= last.z; ++z) {
-        const BlockKey key{BodyId{0}, 0, {x, y, z}};
-        if (bone().has_bone(block_samples(key))) keys.push_back(key);
-      }
+  for (const auto& [id, body] : bodies_) {
+    const CoordBox& samples = body.reach;
+    if (!body.present || samples.empty()) continue;
+    // Cells reach one sample beyond the block, so a surface may lie in the block below the first sample.
+    const Coord first = shift_down(samples.min - Coord{1, 1, 1}, 4), last = shift_down(samples.max, 4);
+    static_assert(kBlockCells == 1 << 4);
+    for (int x = first.x; x <= last.x; ++x)
+      for (int y = first.y; y <= last.y; ++y)
+        for (int z = first.z; z <= last.z; ++z) {
+          const BlockKey key{id, 0, {x, y, z}};
+          if (bone().has_bone(block_samples(key))) keys.push_back(key);
+        }
+  }
   return keys;
 }
 
 BlockSamples Room::gather_block(const BlockKey& key) const {
+  const Body& body = bodies_.at(key.body);
   BlockSamples out;
-  osteon::gather_block(field_, surface_, key, bone().pitch_mm(), out);
+  osteon::gather_block(body.field, body.surface, key, bone().pitch_mm(), out);
   return out;
 }
 

@@ -1,5 +1,5 @@
-// The room: owns the bone, puts cuts in one order, judges them, applies them. A function of what it was given: no
-// clock, thread, log, file or network, so a test runs it on virtual time.
+// The room: owns the bone and the scene, puts cuts and all other events in one order, judges them, applies them. A
+// function of what it was given: no clock, thread, log, file or network, so a test runs it on virtual time.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -7,13 +7,18 @@
 #include <set>
 #include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "common/core/result.hpp"
 #include "common/field/cut.hpp"
 #include "common/surface/surface_blocks.hpp"
-#include "common/tools/tool.hpp"
+#include "common/tools/scene_item.hpp"
+#include "common/tools/tool_box.hpp"
 #include "common/volume/cut_field.hpp"
+#include "common/volume/cut_history.hpp"
+#include "common/volume/field_file.hpp"
+#include "common/volume/fragments.hpp"
 #include "server/room/block_store.hpp"
 
 namespace osteon {
@@ -48,8 +53,32 @@ struct Outcome {
   RoomSeq room_seq;
   Rejection rejection = Rejection::none;
   bool repeated = false;   // decided before: this is its first outcome
-  CutReport report;        // of an applied cut
+  CutReport report;        // of an applied cut, of all bodies together
   [[nodiscard]] bool committed() const { return rejection == Rejection::none; }
+};
+
+enum class EventKind : std::uint8_t { cut, split, undo, redo, remove_body, scene, tool };
+
+// A decided event that is not a cut, with what every holder of the bone must take over.
+struct RoomEvent {
+  RoomSeq room_seq;
+  EventKind kind = EventKind::cut;
+  AuthorId author;                        // null: the room itself
+  bool bone = false;                      // bodies or leaves changed
+  bool scene = false;                     // items changed
+  std::vector<BodyId> bodies;             // that exist from now on
+  std::vector<FieldLeaf> leaves;          // changed ones as they are now, and all of a body that is new
+  std::uint64_t lease_epoch = 0;          // from now on
+  const ToolBox::Entry* tool = nullptr;   // one that was added
+  std::uint32_t item = 0;                 // one that was set or taken out
+  std::vector<RoomSeq> places;            // undo, redo: of the events taken back or done again, oldest first
+};
+
+// Leaves of one body that changed, for whoever looks for pieces.
+struct BodyLeaves {
+  BodyId body;
+  int level = 0;
+  std::vector<Coord> origins;
 };
 
 struct RoomCounts {
@@ -59,33 +88,65 @@ struct RoomCounts {
   std::uint64_t refused = 0;  // breaches that got no place in the order
 };
 
-// Not synchronised: one thread calls the changing functions, or several the const ones.
+inline constexpr std::size_t kMostItems = 256, kMostTools = 1024, kMostBodies = 64;
+
+// Every body holds every cut: all bodies share the case's lattice and frame, a piece has all but itself taken away, and a
+// cut is applied to each of them, so the server, every replica and the undo of a split need no notion of which body a
+// tool meets. Not synchronised: one thread calls the changing functions, or several the const ones.
 class Room {
  public:
   explicit Room(Case bone, CutLimits limits = {}, std::shared_ptr<ToolBox> tools = builtin_tool_box());
+  // Goes on from saved fields; what came before cannot be undone. Errors: unsupported (of another case or kernel).
+  static Result<Room> resume(Case bone, const SavedFields& saved, CutLimits limits = {},
+                             std::shared_ptr<ToolBox> tools = builtin_tool_box());
 
   // A new identity, never given twice.
   AuthorId join(MemberKind kind);
   [[nodiscard]] bool knows(AuthorId author) const;
   [[nodiscard]] bool may_cut(AuthorId author) const { return surgeons_.contains(author); }
-  [[nodiscard]] std::uint64_t lease_epoch() const { return 1; }  // no event of this room ends a lease
+  // Rises with every undo and redo: what was cut on the sight of bone that has come back is void.
+  [[nodiscard]] std::uint64_t lease_epoch() const { return lease_epoch_; }
 
-  // Gives the cut its place and applies it. Error invalid_input, without a place in the order: an author that may not
-  // cut, a gap in author_seq, or a number that was decided with other bytes.
+  // Gives the cut its place and applies it to every body. Error invalid_input, without a place in the order: an author
+  // that may not cut, a gap in author_seq, or a number that was decided with other bytes.
   Result<Outcome> submit(const Cut& cut);
+
+  // The other events. Errors, without a place in the order: invalid_input (an author who has not joined, an unknown
+  // body, item, tool or place), unavailable (nothing to undo or redo, or the bone has changed meanwhile).
+  Result<RoomEvent> add_tool(AuthorId by, const Tool& tool);  // place 0 when it is known already
+  // Takes back these events, or the newest `count` of one author or (null) of all. With a cut falls every later split of
+  // a body that it had reached, and what was done to the piece as such; cuts made since stay in the bone.
+  Result<RoomEvent> undo(AuthorId by, std::span<const RoomSeq> places);
+  Result<RoomEvent> undo_last(AuthorId by, std::size_t count, AuthorId of);
+  Result<RoomEvent> redo_last(AuthorId by, std::size_t count);  // the newest undo events that still stand
+  Result<RoomEvent> remove_body(AuthorId by, BodyId body);
+  Result<RoomEvent> set_item(AuthorId by, SceneItem item);  // id 0: a new one
+  Result<RoomEvent> remove_item(AuthorId by, std::uint32_t item);
+  // What a FragmentFinder has found in `parent`; `seen`: the lease_epoch() when it looked.
+  Result<RoomEvent> split(BodyId parent, std::vector<Fragment> fragments, std::uint64_t seen);
 
   [[nodiscard]] RoomSeq room_seq() const { return room_seq_; }
   [[nodiscard]] const RoomCounts& counts() const { return counts_; }
-  [[nodiscard]] const Case& bone() const { return field_.bone(); }
-  [[nodiscard]] const CutField& field() const { return field_; }
-  [[nodiscard]] Digest field_hash() const { return field_.hash(); }
+  [[nodiscard]] const Case& bone() const { return field().bone(); }
+  [[nodiscard]] const std::shared_ptr<ToolBox>& tools() const { return tools_; }
+  [[nodiscard]] std::vector<BodyId> bodies() const;  // that exist, in order
+  [[nodiscard]] const CutField* find_field(BodyId body) const;  // null: no such body
+  [[nodiscard]] const CutField& field() const { return bodies_.at(BodyId{0}).field; }  // of the case's bone
+  [[nodiscard]] Digest field_hash() const;           // of all bodies
+  [[nodiscard]] std::vector<SceneItem> items() const;
+  // Events so far that changed the bone otherwise than by cutting.
+  [[nodiscard]] std::uint64_t bone_changes() const { return bone_changes_; }
+  // Leaves that changed since the last call.
+  [[nodiscard]] std::vector<BodyLeaves> take_changes() { return std::exchange(changes_, {}); }
+  [[nodiscard]] bool has_changes() const { return !changes_.empty(); }
 
-  // Blocks whose payload the cuts since the last call have made stale, each once.
+  // Blocks whose payload the events since the last call have made stale, each once.
   [[nodiscard]] std::vector<BlockKey> take_stale_blocks();
   [[nodiscard]] std::size_t stale_blocks() const { return stale_.size(); }
-  // Every block that the uncut bone may have a surface in.
+  // Every block that the bodies may have a surface in before they are cut further.
   [[nodiscard]] std::vector<BlockKey> bone_blocks() const;
-  // Copies what make_block() needs, so that only this has to be kept from running beside submit().
+  // Copies what make_block() needs, so that only this has to be kept from running beside submit(). Of a body that
+  // exists.
   [[nodiscard]] BlockSamples gather_block(const BlockKey& key) const;
 
  private:
@@ -94,15 +155,57 @@ class Room {
     RoomSeq room_seq;
     Rejection rejection = Rejection::none;
   };
+  struct Body {
+    CutField field;
+    CutHistory history;
+    SurfaceBlocks surface;
+    CoordBox reach;       // samples of level 0 that its bone was in when it came to be
+    bool present = true;  // false: taken away
+  };
+  // One piece of a split, or debris.
+  struct Piece {
+    BodyId body;  // of debris null
+    CoordBox reach;
+    std::vector<FieldLeaf> left;
+  };
+  struct Event {
+    EventKind kind = EventKind::cut;
+    AuthorId author{};
+    bool undone = false;
+    BodyId body{};                      // split: its parent; remove_body
+    std::vector<FieldLeaf> taken = {};  // split
+    std::vector<Piece> pieces = {};
+    std::uint32_t item = 0;             // scene
+    std::vector<RoomSeq> places = {};   // undo
+  };
+  // What an item was set to; nothing: taken out.
+  struct ItemRow {
+    RoomSeq place;
+    std::optional<SceneItem> item;
+  };
+
   [[nodiscard]] Rejection judge(const Cut& cut) const;
+  [[nodiscard]] Result<void> check_member(AuthorId by) const;
+  [[nodiscard]] bool exists(BodyId body) const;
+  [[nodiscard]] std::set<RoomSeq> with_what_falls_too(std::set<RoomSeq> places) const;
+  RoomEvent begin_event(EventKind kind, AuthorId by, Event row);
+  void finish_event(RoomEvent& event) const;  // says what exists after it
+  void note_changed(BodyId body, const std::vector<LevelLeaves>& changed, RoomEvent* event);
+  void add_body(BodyId id, CutField field, CutHistory history, const CoordBox& reach);
+  void show_whole(BodyId body, RoomEvent& event);
+  void cut_apart(RoomSeq place, Event& row, RoomEvent& event);
+  RoomEvent take_back(AuthorId by, const std::set<RoomSeq>& falls);
 
   CutLimits limits_;
-  std::shared_ptr<ToolBox> tools_;  // shared with the field and, beyond the room, with those that list tools
-  CutField field_;
-  SurfaceBlocks surface_;
+  std::shared_ptr<ToolBox> tools_;  // shared with the fields and, beyond the room, with those that list tools
+  std::map<BodyId, Body> bodies_;
+  std::uint32_t last_body_ = 0, last_item_ = 0;
+  std::map<std::uint32_t, std::vector<ItemRow>> items_;  // rows in order
+  std::map<RoomSeq, Event> events_;                      // committed ones, tombstones included
   std::set<BlockKey> stale_;
+  std::vector<BodyLeaves> changes_;
   RoomSeq room_seq_;
-  std::uint64_t authors_ = 0;
+  std::uint64_t authors_ = 0, lease_epoch_ = 1, bone_changes_ = 0;
   std::map<AuthorId, std::vector<Decided>> surgeons_;  // row author_seq − 1
   RoomCounts counts_;
 };

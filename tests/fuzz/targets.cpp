@@ -16,6 +16,13 @@ Cut a_cut() {
           .path = {quantise(pose_along({0, 0, 1}, {0, 0, -1})), quantise(pose_along({0, 0, -1}, {0, 0.1, -1}))}, .spindle_rpm = 1000};
 }
 
+SceneItem an_item() {
+  SceneItem item;
+  item.tool = builtin_tools()[0].hash();
+  item.pose_bone_item = pose_along({1, 2, 3}, {0, 0, -1});
+  return item;
+}
+
 // What is accepted must come back the same when it is sent on.
 template <class Message>
 void parse_and_convert(std::span<const std::uint8_t> data) {
@@ -47,6 +54,8 @@ std::vector<Target> targets() {
   return {{"cut", parse_and_convert<v1::Cut>, {bytes_of(wire::to_wire(a_cut()).SerializeAsString())}},
           {"cutting_state", parse_and_convert<v1::CuttingState>, {bytes_of(wire::to_wire(CuttingState{}).SerializeAsString())}},
           {"field_leaf", parse_and_convert<v1::FieldLeaf>, {bytes_of(wire::to_wire(leaf).SerializeAsString())}},
+          {"scene_item", parse_and_convert<v1::SceneItem>, {bytes_of(wire::to_wire(an_item()).SerializeAsString())}},
+          {"tool_definition", parse_and_convert<v1::ToolDefinition>, {bytes_of(wire::to_wire(builtin_tools()[0]).SerializeAsString())}},
           {"mesh_block", decode_any_block, {a_block().bytes}}};
 }
 

@@ -56,12 +56,18 @@ bool ScriptedViewer::tell(const std::string& command, std::chrono::milliseconds 
   return answer && answer->starts_with("ok");
 }
 
-Stage::Stage(double width_mm) {
+Stage::Stage(double width_mm, std::vector<std::string> server_arguments) {
   const RunResult imported = run(program("osteon-import"), {"phantom", "block", "--layers", "5:1.9,20:0.3,5:1.9", "--width",
                                                             std::to_string(width_mm), "--pitch", "0.5", "--out", temp_ / "case"}, 120s);
   if (imported.exit_code != 0) throw std::runtime_error("osteon-import failed: " + imported.err);
-  server_ = std::make_unique<Process>(start("osteon-server", {"--case", temp_ / "case", "--address-file", temp_ / "address",
-                                                              "--summary", temp_ / "server.json"}));
+  start_server(std::move(server_arguments));
+}
+
+void Stage::start_server(std::vector<std::string> more) {
+  std::vector<std::string> arguments{"--case", temp_ / "case", "--address-file", temp_ / "address", "--summary", temp_ / "server.json"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  std::filesystem::remove(temp_ / "address");
+  server_ = std::make_unique<Process>(start("osteon-server", arguments));
   const auto address = wait_for_address(temp_ / "address", 60s);
   if (!address) throw std::runtime_error("osteon-server did not come up: " + server_->err());
   address_ = *address;

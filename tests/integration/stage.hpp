@@ -37,11 +37,13 @@ class ScriptedViewer {
 class Stage {
  public:
   // Imports the layered block of force-laws.md and starts a server on it.
-  explicit Stage(double width_mm = 40.0);
+  explicit Stage(double width_mm = 40.0, std::vector<std::string> server_arguments = {});
 
   [[nodiscard]] const std::string& address() const { return address_; }
   [[nodiscard]] std::filesystem::path operator/(const std::string& name) const { return temp_ / name; }
   [[nodiscard]] Process& server() { return *server_; }
+  // Another server on the same case, after the first has ended; the stage's address is its own now.
+  void start_server(std::vector<std::string> more);
   [[nodiscard]] Process start(const std::string& name, std::vector<std::string> arguments, ProcessOptions options = {}) const;
   // A haptic client that carries out a plan and leaves NAME.csv, NAME-cuts.csv and NAME.json.
   [[nodiscard]] Process start_haptic(const std::string& name, const nlohmann::json& plan) const;

@@ -23,6 +23,12 @@ constexpr const char* kScriptHelp =
     "Script commands, one a line, each answered by `ok ...` or `error ...` on standard output:\n"
     "  wait surface                          until the whole surface is drawn\n"
     "  wait seq N                            until the room's event N is drawn\n"
+    "  wait bodies N                         until the room has so many bodies\n"
+    "  wait items N                          until so many guides, pins, screws and implants stand\n"
+    "  undo N, redo N                        the newest N events of all; N undo events\n"
+    "  take-away BODY                        a sawn-off piece\n"
+    "  place TOOL at X Y Z along X Y Z [on BODY]   a guide, pin, screw or implant\n"
+    "  save [NAME.vdb]                       the cut fields, on the server beside its --save\n"
     "  look overview                         the whole bone\n"
     "  look at X Y Z from X Y Z up X Y Z     millimetres in the bone's frame (x left, y back, z up)\n"
     "  look tool DIST_MM                     the tip of the tool from this distance\n"
@@ -86,6 +92,18 @@ Result<void> run(const Arguments& arguments) {
   options.case_title = (*watch)->room().case_title;
   options.bounds = (*watch)->room().bounds;
   options.frame_log = arguments.frame_log;
+  options.ask = [&watch = **watch](const RoomRequest& request) {
+    return std::visit(
+        [&](const auto& asked) -> Result<RoomSeq> {
+          using Asked = std::decay_t<decltype(asked)>;
+          if constexpr (std::is_same_v<Asked, UndoLast>) return watch.undo(asked.count);
+          if constexpr (std::is_same_v<Asked, RedoLast>) return watch.redo(asked.count);
+          if constexpr (std::is_same_v<Asked, TakeAway>) return watch.remove_body(asked.body);
+          if constexpr (std::is_same_v<Asked, PlaceTool>) return watch.place(asked.tool, asked.pose_bone_item, asked.body);
+          if constexpr (std::is_same_v<Asked, SaveBone>) return watch.save(asked.file_name);
+        },
+        request);
+  };
   options.answers = !arguments.script.empty();
   options.stop_at_error = scripted && arguments.script != "-";
   auto viewer = Viewer::make(options, **window, inbox, std::move(script));

@@ -68,7 +68,30 @@ Parsed parse_wait(const std::vector<std::string_view>& words) {
   if (words.size() == 3 && words[1] == "seq") {
     if (const auto seq = number<std::uint64_t>(words[2])) return Command(WaitForSeq{RoomSeq{*seq}});
   }
-  return expected("wait surface` or `wait seq NUMBER");
+  if (words.size() == 3 && (words[1] == "bodies" || words[1] == "items")) {
+    if (const auto count = number<std::size_t>(words[2])) {
+      if (words[1] == "bodies") return Command(WaitForBodies{*count});
+      return Command(WaitForItems{*count});
+    }
+  }
+  return expected("wait surface`, `wait seq NUMBER`, `wait bodies NUMBER` or `wait items NUMBER");
+}
+
+// undo N, redo N, take-away BODY: one number.
+template <class Make>
+Parsed parse_number(const std::vector<std::string_view>& words, std::string_view form, std::uint32_t least, Make make) {
+  const auto value = words.size() == 2 ? number<std::uint32_t>(words[1]) : std::nullopt;
+  if (!value || *value < least) return expected(form);
+  return Command(RoomRequest(make(*value)));
+}
+
+Parsed parse_place(const std::vector<std::string_view>& words) {
+  constexpr std::string_view kForm = "place TOOL at X Y Z along X Y Z` or `place TOOL at X Y Z along X Y Z on BODY";
+  if ((words.size() != 10 && words.size() != 12) || words[2] != "at" || words[6] != "along") return expected(kForm);
+  const auto at = vector_at(words, 3), along = vector_at(words, 7);
+  const auto body = words.size() == 12 ? number<std::uint32_t>(words[11]) : std::optional<std::uint32_t>(0);
+  if (!at || !along || !body || along->norm() < 1e-9 || (words.size() == 12 && words[10] != "on")) return expected(kForm);
+  return Command(RoomRequest(PlaceTool{std::string(words[1]), pose_along(*at, along->normalized()), BodyId{*body}}));
 }
 
 Parsed parse_look(const std::vector<std::string_view>& words) {
@@ -114,9 +137,15 @@ Parsed parse_command(std::string_view line) {
     if (verb == "status") return Command(SaveStatus{file});
     return Command(SaveScreenshot{file});
   }
+  if (verb == "undo") return parse_number(words, "undo NUMBER", 1, [](std::uint32_t n) { return UndoLast{n}; });
+  if (verb == "redo") return parse_number(words, "redo NUMBER", 1, [](std::uint32_t n) { return RedoLast{n}; });
+  if (verb == "take-away") return parse_number(words, "take-away BODY", 0, [](std::uint32_t n) { return TakeAway{BodyId{n}}; });
+  if (verb == "place") return parse_place(words);
+  if (verb == "save") return Command(RoomRequest(SaveBone{rest_of(line, verb)}));
   if (verb == "quit" && words.size() == 1) return Command(Quit{});
   return failure(ErrorCode::invalid_input, "there is no command `" + std::string(verb) +
-                                               "`; the commands are wait, look, tool, screenshot, status and quit");
+                                               "`; the commands are wait, look, tool, undo, redo, take-away, place, save, screenshot, "
+                                               "status and quit");
 }
 
 Result<ScriptReader> ScriptReader::open(const std::string& file) {

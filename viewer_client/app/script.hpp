@@ -1,5 +1,6 @@
 // The viewer's script: one command a line, so that a person, a test or the demo can direct the camera.
 #pragma once
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -8,6 +9,7 @@
 
 #include "common/core/id.hpp"
 #include "common/core/result.hpp"
+#include "common/geometry/pose.hpp"
 #include "viewer_client/scene/camera_view.hpp"
 
 namespace osteon {
@@ -33,9 +35,35 @@ struct SaveStatus {
   std::filesystem::path file;
 };
 struct Quit {};
+struct WaitForBodies {
+  std::size_t count = 0;
+};
+struct WaitForItems {
+  std::size_t count = 0;
+};
 
-using Command = std::variant<WaitForSurface, WaitForSeq, LookAtWhole, LookFrom, LookAtTool, ShowTool, SaveScreenshot,
-                             SaveStatus, Quit>;
+// What is asked of the room; obeyed when its event is drawn.
+struct UndoLast {
+  std::uint32_t count = 1;
+};
+struct RedoLast {
+  std::uint32_t count = 1;
+};
+struct TakeAway {
+  BodyId body;
+};
+struct PlaceTool {
+  std::string tool;
+  Pose pose_bone_item;
+  BodyId body;
+};
+struct SaveBone {
+  std::string file_name;  // empty: the server's own
+};
+using RoomRequest = std::variant<UndoLast, RedoLast, TakeAway, PlaceTool, SaveBone>;
+
+using Command = std::variant<WaitForSurface, WaitForSeq, WaitForBodies, WaitForItems, LookAtWhole, LookFrom, LookAtTool,
+                             ShowTool, SaveScreenshot, SaveStatus, RoomRequest, Quit>;
 
 // Null for an empty line and for one that begins with #. Error invalid_input, naming the form expected.
 [[nodiscard]] Result<std::optional<Command>> parse_command(std::string_view line);

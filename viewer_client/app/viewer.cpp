@@ -67,9 +67,16 @@ Result<Viewer::State> Viewer::turn(bool interrupted) {
 
 void Viewer::receive() {
   Delivery delivery = inbox_->take();
+  for (const Tool& tool : delivery.tools) window_->learn_tool(tool);
   if (delivery.any_states) {
     states_ = std::move(delivery.states);
+    bodies_ = std::move(delivery.bodies);
     dirty_ = dirty_ || tool_shown_;
+    if (items_ != delivery.items || !delivery.tools.empty()) {
+      items_ = std::move(delivery.items);
+      window_->show_items(items_);
+      dirty_ = true;
+    }
   }
   if (delivery.snapshot_begun) {
     scene_.begin_snapshot();
@@ -201,6 +208,13 @@ std::optional<Result<void>> Viewer::obey(const Command& command) {
           [&](const WaitForSeq& wait) {
             return surface_shown_ && shown_seq_ >= wait.room_seq ? Answer(Result<void>{}) : Answer{};
           },
+          [&](const WaitForBodies& wait) {
+            return surface_shown_ && !dirty_ && bodies_.size() == wait.count ? Answer(Result<void>{}) : Answer{};
+          },
+          [&](const WaitForItems& wait) {
+            return surface_shown_ && !dirty_ && items_.size() == wait.count ? Answer(Result<void>{}) : Answer{};
+          },
+          [&](const RoomRequest& request) { return obey_room(request); },
           [&](const LookAtWhole&) {
             window_->look(overview(options_.bounds));
             return done();
@@ -231,18 +245,35 @@ std::optional<Result<void>> Viewer::obey(const Command& command) {
       command);
 }
 
+std::optional<Result<void>> Viewer::obey_room(const RoomRequest& request) {
+  if (!asked_) {
+    const Result<RoomSeq> answer =
+        options_.ask ? options_.ask(request) : failure(ErrorCode::unavailable, "this viewer has no room to ask");
+    if (!answer) return Result<void>(tl::unexpected(answer.error()));
+    if (std::holds_alternative<SaveBone>(request)) return Result<void>{};
+    asked_ = *answer;
+  }
+  if (!surface_shown_ || shown_seq_ < *asked_) return std::nullopt;
+  asked_.reset();
+  return Result<void>{};
+}
+
 std::string Viewer::summary_json() const {
   const auto milliseconds = [](const DurationHistogram& times) {
     return nlohmann::ordered_json{{"p50", times.percentile_us(50) / 1000.0},
                                   {"p99", times.percentile_us(99) / 1000.0},
                                   {"max", times.max_us() / 1000.0}};
   };
+  nlohmann::ordered_json bodies = nlohmann::ordered_json::array();
+  for (const BodyId body : bodies_) bodies.push_back(body.value);
   const nlohmann::ordered_json summary{
       {"blocks", scene_.blocks()},
       {"regions", scene_.regions()},
       {"triangles", scene_.triangles()},
       {"scene_mesh_hash", to_hex(scene_.hash())},
       {"room_seq", shown_seq_.value},
+      {"bodies", bodies},
+      {"items", items_.size()},
       {"frames", frames_},
       {"frame_ms", milliseconds(frame_times_)},
       {"update_ms", milliseconds(update_times_)},

@@ -24,6 +24,8 @@ struct ViewerOptions {
   std::filesystem::path frame_log;  // empty: none
   bool answers = false;             // say ok or error on standard output after each command
   bool stop_at_error = false;       // a command that fails ends the run
+  // Asks the room and waits for its answer: the place of the event.
+  std::function<Result<RoomSeq>(const RoomRequest&)> ask;
 };
 
 // [render]
@@ -52,6 +54,7 @@ class Viewer {
   [[nodiscard]] Result<State> obey_script();
   // Null: not yet, ask again in the next turn.
   [[nodiscard]] std::optional<Result<void>> obey(const Command& command);
+  [[nodiscard]] std::optional<Result<void>> obey_room(const RoomRequest& request);
   [[nodiscard]] std::string notice() const;
 
   ViewerOptions options_;
@@ -62,6 +65,9 @@ class Viewer {
 
   SurfaceScene scene_;
   std::vector<CuttingState> states_;
+  std::vector<SceneItem> items_;
+  std::vector<BodyId> bodies_;
+  std::optional<RoomSeq> asked_;   // the event that the pending command has caused
   bool tool_shown_ = true;
   bool interrupted_ = false;
   bool surface_complete_ = false;  // the whole surface has come

@@ -5,12 +5,14 @@
 #include <atomic>
 #include <condition_variable>
 #include <mutex>
+#include <set>
 #include <thread>
 #include <utility>
 
 #include "common/runtime/log.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/room_client.hpp"
+#include "osteon/v1/room.grpc.pb.h"
 #include "osteon/v1/watch.grpc.pb.h"
 
 namespace osteon {
@@ -20,6 +22,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kRetryPause{200};
+constexpr std::chrono::seconds kAnswerTime{10};
 
 std::int64_t mono_ns() { return std::chrono::nanoseconds(Clock::now().time_since_epoch()).count(); }
 
@@ -48,6 +51,42 @@ Result<ReceivedBlock> receive(const v1::MeshBlock& wire_block, double pitch_mm) 
   }
   return block;
 }
+
+// One question to the room and its answer.
+template <class Response, class Request>
+Result<Response> ask(const std::shared_ptr<grpc::Channel>& channel,
+                     grpc::Status (v1::RoomService::Stub::*call)(grpc::ClientContext*, const Request&, Response*),
+                     const Request& request) {
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kAnswerTime);
+  Response response;
+  const auto stub = v1::RoomService::NewStub(channel);
+  const grpc::Status status = (stub.get()->*call)(&context, request, &response);
+  if (status.ok()) return response;
+  const ErrorCode code = status.error_code() == grpc::StatusCode::INVALID_ARGUMENT ? ErrorCode::invalid_input : ErrorCode::unavailable;
+  return failure(code, status.error_message());
+}
+
+// The tools that the window can draw without being sent them.
+class KnownTools {
+ public:
+  KnownTools() {
+    for (const Tool& tool : builtin_tools()) add(tool);
+  }
+  void add(const Tool& tool) {
+    names_.insert(tool.name);
+    hashes_.insert(tool.hash());
+  }
+  [[nodiscard]] bool has(const std::string& name) const { return names_.contains(name); }
+  [[nodiscard]] bool has(const Digest& hash) const { return hashes_.contains(hash); }
+  // True the first time only: a room is not asked again and again for a tool that it does not know itself.
+  bool miss(const std::string& name) { return !has(name) && missed_names_.insert(name).second; }
+  bool miss(const Digest& hash) { return !has(hash) && missed_hashes_.insert(hash).second; }
+
+ private:
+  std::set<std::string> names_, missed_names_;
+  std::set<Digest> hashes_, missed_hashes_;
+};
 
 }  // namespace
 
@@ -79,6 +118,12 @@ struct RoomWatch::Impl {
   void read_mesh();
   void read_cutting();
   Result<void> read_mesh_stream();
+  void fetch_tools(const std::shared_ptr<grpc::Channel>& channel, std::uint64_t author, KnownTools& known);
+  // Channel and author of the newest join.
+  std::pair<std::shared_ptr<grpc::Channel>, std::uint64_t> line() const {
+    const std::lock_guard lock(mutex);
+    return {joined.channel, joined.author.value};
+  }
   bool enter(grpc::ClientContext*& slot, grpc::ClientContext& context);
   void leave(grpc::ClientContext*& slot);
 };
@@ -184,8 +229,32 @@ void RoomWatch::Impl::read_mesh() {
   }
 }
 
+// [cutting thread] Those that the room knows and this program does not.
+void RoomWatch::Impl::fetch_tools(const std::shared_ptr<grpc::Channel>& channel, std::uint64_t author, KnownTools& known) {
+  v1::ListToolsRequest list;
+  list.set_author(author);
+  const auto tools = ask(channel, &v1::RoomService::Stub::ListTools, list);
+  if (!tools) return;
+  for (const v1::KnownTool& listed : tools->tools()) {
+    const Result<Digest> hash = wire::digest_from_wire(listed.tool_hash());
+    if (!hash || known.has(*hash)) continue;
+    v1::GetToolRequest request;
+    request.set_author(author);
+    request.set_tool_hash(listed.tool_hash());
+    const auto answer = ask(channel, &v1::RoomService::Stub::GetTool, request);
+    const Result<Tool> tool = answer ? wire::from_wire(answer->tool()) : tl::unexpected(answer.error());
+    if (!tool) {
+      log::warn("a tool of the room cannot be drawn", {{"name", listed.name()}, {"reason", tool.error().message}});
+      continue;
+    }
+    known.add(*tool);
+    inbox.put_tool(*tool);
+  }
+}
+
 // [cutting thread]
 void RoomWatch::Impl::read_cutting() {
+  KnownTools known;
   std::uint64_t of_join = 0;
   while (!stopping()) {
     std::shared_ptr<grpc::Channel> channel;  // shared with the stub, which may outlive a rejoin
@@ -212,7 +281,16 @@ void RoomWatch::Impl::read_cutting() {
         // A state that cannot be read is left out: the next one comes within 10 ms.
         if (Result<CuttingState> state = wire::from_wire(wire_state)) states.push_back(std::move(*state));
       }
-      inbox.put_states(std::move(states));
+      std::vector<SceneItem> items;
+      for (const v1::SceneItem& wire_item : message.items())
+        if (Result<SceneItem> item = wire::from_wire(wire_item)) items.push_back(std::move(*item));
+      std::vector<BodyId> bodies;
+      for (const std::uint32_t body : message.bodies()) bodies.push_back(BodyId{body});
+      bool missed = false;
+      for (const CuttingState& state : states) missed |= known.miss(state.tool_name);
+      for (const SceneItem& item : items) missed |= known.miss(item.tool);
+      if (missed) fetch_tools(channel, request.author(), known);
+      inbox.put_states(std::move(states), std::move(items), std::move(bodies));
     }
     reader->Finish();
     leave(cutting_context);
@@ -251,5 +329,58 @@ std::optional<Error> RoomWatch::failure_seen() const {
 }
 
 bool RoomWatch::interrupted() const { return impl_->interrupted.load(); }
+
+Result<RoomSeq> RoomWatch::undo(std::uint32_t count) {
+  const auto [channel, author] = impl_->line();
+  v1::UndoRequest request;
+  request.set_author(author);
+  request.set_count(count);
+  const auto answer = ask(channel, &v1::RoomService::Stub::Undo, request);
+  return answer ? Result<RoomSeq>(RoomSeq{answer->room_seq()}) : tl::unexpected(answer.error());
+}
+
+Result<RoomSeq> RoomWatch::redo(std::uint32_t count) {
+  const auto [channel, author] = impl_->line();
+  v1::RedoRequest request;
+  request.set_author(author);
+  request.set_count(count);
+  const auto answer = ask(channel, &v1::RoomService::Stub::Redo, request);
+  return answer ? Result<RoomSeq>(RoomSeq{answer->room_seq()}) : tl::unexpected(answer.error());
+}
+
+Result<RoomSeq> RoomWatch::remove_body(BodyId body) {
+  const auto [channel, author] = impl_->line();
+  v1::RemoveBodyRequest request;
+  request.set_author(author);
+  request.set_body(body.value);
+  const auto answer = ask(channel, &v1::RoomService::Stub::RemoveBody, request);
+  return answer ? Result<RoomSeq>(RoomSeq{answer->room_seq()}) : tl::unexpected(answer.error());
+}
+
+Result<RoomSeq> RoomWatch::place(const std::string& tool, const Pose& pose_bone_item, BodyId body) {
+  const auto [channel, author] = impl_->line();
+  v1::ListToolsRequest list;
+  list.set_author(author);
+  const auto tools = ask(channel, &v1::RoomService::Stub::ListTools, list);
+  if (!tools) return tl::unexpected(tools.error());
+  v1::SetSceneItemRequest request;
+  request.set_author(author);
+  for (const v1::KnownTool& known : tools->tools())
+    if (known.name() == tool) request.mutable_item()->set_tool_hash(known.tool_hash());
+  if (request.item().tool_hash().empty()) return failure(ErrorCode::not_found, "the room knows no tool of the name " + tool);
+  request.mutable_item()->set_body(body.value);
+  *request.mutable_item()->mutable_pose_bone_item() = wire::to_wire(pose_bone_item);
+  const auto answer = ask(channel, &v1::RoomService::Stub::SetSceneItem, request);
+  return answer ? Result<RoomSeq>(RoomSeq{answer->room_seq()}) : tl::unexpected(answer.error());
+}
+
+Result<RoomSeq> RoomWatch::save(const std::string& file_name) {
+  const auto [channel, author] = impl_->line();
+  v1::SaveFieldsRequest request;
+  request.set_author(author);
+  request.set_file_name(file_name);
+  const auto answer = ask(channel, &v1::RoomService::Stub::SaveFields, request);
+  return answer ? Result<RoomSeq>(RoomSeq{answer->room_seq()}) : tl::unexpected(answer.error());
+}
 
 }  // namespace osteon

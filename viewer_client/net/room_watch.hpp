@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "common/core/id.hpp"
 #include "common/core/result.hpp"
 #include "common/geometry/lattice.hpp"
 #include "viewer_client/scene/inbox.hpp"
@@ -39,6 +40,14 @@ class RoomWatch {
   [[nodiscard]] std::optional<Error> failure_seen() const;
   // The connection is lost and being made anew.
   [[nodiscard]] bool interrupted() const;
+
+  // What a viewer may ask of the room, and the place of the event that follows. They wait for the answer. Errors:
+  // invalid_input, not_found (no such tool), unavailable (nothing to undo, no answer).
+  [[nodiscard]] Result<RoomSeq> undo(std::uint32_t count);
+  [[nodiscard]] Result<RoomSeq> redo(std::uint32_t count);
+  [[nodiscard]] Result<RoomSeq> remove_body(BodyId body);
+  [[nodiscard]] Result<RoomSeq> place(const std::string& tool, const Pose& pose_bone_item, BodyId body);
+  [[nodiscard]] Result<RoomSeq> save(const std::string& file_name);  // of the server; contained in the file
 
  private:
   struct Impl;

@@ -47,6 +47,7 @@ using Colour = std::array<std::uint8_t, 3>;
 
 constexpr Colour kBone{241, 226, 196};     // dry ivory
 constexpr Colour kCutBone{219, 143, 117};  // fresh bone with marrow in it
+constexpr std::array<Colour, 3> kPieces{{{214, 226, 200}, {200, 214, 236}, {236, 206, 214}}};  // sawn-off, by turns
 constexpr Colour kSteel{222, 227, 234};
 constexpr Colour kCuttingSteel{205, 205, 202};
 
@@ -110,6 +111,17 @@ vtkSmartPointer<vtkActor> actor_of(vtkPolyData* data) {
   mapper->SetInputData(data);
   auto actor = vtkSmartPointer<vtkActor>::New();
   actor->SetMapper(mapper);
+  return actor;
+}
+
+vtkSmartPointer<vtkActor> steel_actor(vtkPolyData* data) {
+  auto actor = actor_of(data);
+  vtkProperty* steel = actor->GetProperty();
+  steel->SetInterpolationToPhong();
+  steel->SetAmbient(0.14);
+  steel->SetDiffuse(0.74);
+  steel->SetSpecular(0.75);
+  steel->SetSpecularPower(38.0);
   return actor;
 }
 
@@ -212,20 +224,25 @@ struct BoneWindow::Impl {
   };
   std::map<AuthorId, DrawnTool> tools;
   std::map<std::string, vtkSmartPointer<vtkPolyData>> tool_data;  // null: no such tool
+  std::map<Digest, std::string> tool_names;                       // of all tools that can be drawn
+  std::map<std::uint32_t, vtkSmartPointer<vtkActor>> items;
 
   vtkPolyData* data_of(const std::string& name);
+  static vtkSmartPointer<vtkPolyData> data_of(const Tool& tool);
   void add_in_order();
 };
 
 vtkPolyData* BoneWindow::Impl::data_of(const std::string& name) {
   const auto [place, fresh] = tool_data.try_emplace(name);
   if (fresh) {
-    if (const Result<Tool> tool = find_tool(name)) {
-      const ToolMesh mesh = tool_mesh(*tool);
-      place->second = poly_data(mesh.positions_mm, mesh.normals, mesh.cutting, mesh.triangles, kSteel, kCuttingSteel);
-    }
+    if (const Result<Tool> tool = find_tool(name)) place->second = data_of(*tool);
   }
   return place->second;
+}
+
+vtkSmartPointer<vtkPolyData> BoneWindow::Impl::data_of(const Tool& tool) {
+  const ToolMesh mesh = tool_mesh(tool);
+  return poly_data(mesh.positions_mm, mesh.normals, mesh.cutting, mesh.triangles, kSteel, kCuttingSteel);
 }
 
 // Regions that are equally near are drawn in the order of their keys, however they came, so that one surface gives one
@@ -236,7 +253,9 @@ void BoneWindow::Impl::add_in_order() {
     renderer->RemoveActor(tool.body);
     renderer->RemoveActor(tool.ghost);
   }
+  for (const auto& [id, actor] : items) renderer->RemoveActor(actor);
   for (const auto& [key, actor] : regions) renderer->AddActor(actor);
+  for (const auto& [id, actor] : items) renderer->AddActor(actor);
   for (const auto& [author, tool] : tools) {
     renderer->AddActor(tool.body);
     renderer->AddActor(tool.ghost);
@@ -291,6 +310,8 @@ Result<std::unique_ptr<BoneWindow>> BoneWindow::open(const WindowOptions& option
   impl->notice->GetPositionCoordinate()->SetCoordinateSystemToNormalizedViewport();
   impl->notice->SetPosition(0.016, 0.024);
 
+  for (const Tool& tool : builtin_tools()) impl->tool_names.emplace(tool.hash(), tool.name);
+
   impl->interactor = vtkSmartPointer<vtkRenderWindowInteractor>::New();
   impl->interactor->SetRenderWindow(window);
   impl->interactor->SetInteractorStyle(impl->style);
@@ -331,7 +352,8 @@ void BoneWindow::show_region(const RegionKey& region, const Mesh& mesh) {
     return;
   }
 
-  const auto data = poly_data(mesh.positions_mm, mesh.normals, mesh.cut_face, mesh.triangles, kBone, kCutBone);
+  const auto data = poly_data(mesh.positions_mm, mesh.normals, mesh.cut_face, mesh.triangles,
+                              region.body == BodyId{0} ? kBone : kPieces[region.body.value % kPieces.size()], kCutBone);
   if (held != impl_->regions.end()) {
     static_cast<vtkPolyDataMapper*>(held->second->GetMapper())->SetInputData(data);
     return;
@@ -364,13 +386,7 @@ void BoneWindow::show_tools(std::span<const CuttingState> states) {
       if (!held.empty()) impl_->tools.insert(std::move(held));
       changed = true;
       tool.name = state.tool_name;
-      tool.body = actor_of(data);
-      vtkProperty* steel = tool.body->GetProperty();
-      steel->SetInterpolationToPhong();
-      steel->SetAmbient(0.14);
-      steel->SetDiffuse(0.74);
-      steel->SetSpecular(0.75);
-      steel->SetSpecularPower(38.0);
+      tool.body = steel_actor(data);
       tool.ghost = actor_of(data);
       tool.ghost->GetMapper()->ScalarVisibilityOff();
       tool.ghost->GetProperty()->SetColor(0.55, 0.78, 0.95);
@@ -390,6 +406,25 @@ void BoneWindow::show_tools(std::span<const CuttingState> states) {
   }
   impl_->tools = std::move(shown);
   if (changed) impl_->add_in_order();
+}
+
+void BoneWindow::learn_tool(const Tool& tool) {
+  impl_->tool_data[tool.name] = Impl::data_of(tool);
+  impl_->tool_names[tool.hash()] = tool.name;
+}
+
+void BoneWindow::show_items(std::span<const SceneItem> items) {
+  for (const auto& [id, actor] : impl_->items) impl_->renderer->RemoveActor(actor);
+  impl_->items.clear();
+  for (const SceneItem& item : items) {
+    const auto name = impl_->tool_names.find(item.tool);
+    vtkPolyData* data = name == impl_->tool_names.end() ? nullptr : impl_->data_of(name->second);
+    if (data == nullptr) continue;
+    const auto actor = steel_actor(data);
+    set_pose(actor, item.pose_bone_item);
+    impl_->items.emplace(item.id, actor);
+  }
+  impl_->add_in_order();
 }
 
 void BoneWindow::show_text(const std::string& gauges, const std::string& notice) {

@@ -11,6 +11,7 @@
 
 #include "common/core/result.hpp"
 #include "common/mechanics/cutting_state.hpp"
+#include "common/tools/scene_item.hpp"
 #include "viewer_client/scene/camera_view.hpp"
 #include "viewer_client/scene/surface_scene.hpp"
 
@@ -50,6 +51,10 @@ class BoneWindow {
   void show_region(const RegionKey& region, const Mesh& mesh);
   // The tools of the room; those not in the list vanish. A translucent ghost stands where the hand is, if not there.
   void show_tools(std::span<const CuttingState> states);
+  // A tool that is not built in, as the room defines it; from now on states and items may name it.
+  void learn_tool(const Tool& tool);
+  // What stands on the bone; what is not in the list vanishes.
+  void show_items(std::span<const SceneItem> items);
   void show_text(const std::string& gauges, const std::string& notice);
 
   void look(const CameraView& view);

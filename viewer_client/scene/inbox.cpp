@@ -36,10 +36,17 @@ void Inbox::put_mesh(RoomSeq room_seq, std::vector<ReceivedBlock> blocks, bool s
   arrived_.notify_one();
 }
 
-void Inbox::put_states(std::vector<CuttingState> states) {
+void Inbox::put_tool(Tool tool) {
+  const std::lock_guard lock(mutex_);
+  next_.tools.push_back(std::move(tool));
+}
+
+void Inbox::put_states(std::vector<CuttingState> states, std::vector<SceneItem> items, std::vector<BodyId> bodies) {
   {
     const std::lock_guard lock(mutex_);
     next_.states = std::move(states);
+    next_.items = std::move(items);
+    next_.bodies = std::move(bodies);
     next_.any_states = true;
     waiting_ = true;
   }

@@ -9,6 +9,7 @@
 
 #include "common/core/id.hpp"
 #include "common/mechanics/cutting_state.hpp"
+#include "common/tools/scene_item.hpp"
 #include "viewer_client/scene/surface_scene.hpp"
 
 namespace osteon {
@@ -30,6 +31,9 @@ struct Delivery {
   bool any_mesh = false;
   bool any_states = false;
   std::vector<CuttingState> states;
+  std::vector<SceneItem> items;   // with any_states
+  std::vector<BodyId> bodies;     // with any_states
+  std::vector<Tool> tools;        // that this program did not know
 };
 
 // Any thread may call any function; one mutex, held for a few moves at a time.
@@ -39,7 +43,8 @@ class Inbox {
   void begin_stream();
   void put_mesh(RoomSeq room_seq, std::vector<ReceivedBlock> blocks, bool snapshot_complete,
                 std::uint32_t snapshot_blocks, std::int64_t received_mono_ns);
-  void put_states(std::vector<CuttingState> states);
+  void put_states(std::vector<CuttingState> states, std::vector<SceneItem> items = {}, std::vector<BodyId> bodies = {});
+  void put_tool(Tool tool);
 
   [[nodiscard]] Delivery take();
   // Returns early when something waits.

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "common/wire/convert.hpp"
+#include "haptic_client/control/replica.hpp"
 #include "tests/unit/room/cuts.hpp"
 
 namespace osteon {
@@ -19,12 +20,12 @@ using test::strokes;
 // Keeps a replica from what a session's stream would carry.
 class FakeSession final : public SessionSink {
  public:
-  FakeSession(AuthorId author, const Case& bone) : author_(author), replica_(bone, BodyId{0}) {}
+  FakeSession(AuthorId author, const Case& bone) : author_(author), replica_(bone, BodyId{0}, tools_) {}
 
   AuthorId author() const override { return author_; }
-  void begin(RoomSeq contained) override {
+  void begin(RoomSeq contained, MessageParts before, Bytes complete) override {
     const std::lock_guard lock(mutex_);
-    outbox_.begin(contained);
+    outbox_.begin(contained, std::move(before), std::move(complete));
   }
   void set_leaves(std::vector<FieldLeaf> leaves) override {
     const std::lock_guard lock(mutex_);
@@ -54,19 +55,32 @@ class FakeSession final : public SessionSink {
     for (MessageParts parts = outbox_.take(); !parts.empty(); parts = outbox_.take()) {
       v1::SessionResponse response;
       ASSERT_TRUE(response.ParseFromString(*parts.front()));
+      if (response.has_tool()) tools_->add(wire::from_wire(response.tool().tool()).value());
       if (response.has_leaf()) replica_.restore(wire::from_wire(response.leaf()).value());
       if (response.has_complete()) seq_ = RoomSeq{response.complete().room_seq()};
+      if (response.has_change()) take(response.change());
+      if (response.has_scene()) seq_ = std::max(seq_, RoomSeq{response.scene().room_seq()});
       if (!response.has_committed()) continue;
       EXPECT_EQ(response.committed().room_seq(), seq_.value + 1) << "every row once and in order";
-      replica_.apply(wire::from_wire(response.committed().cut()).value());
+      replica_.commit(RoomSeq{response.committed().room_seq()}, wire::from_wire(response.committed().cut()).value(), false);
       seq_ = RoomSeq{response.committed().room_seq()};
     }
+  }
+  void take(const v1::BoneChange& change) {
+    std::vector<BodyId> bodies;
+    for (const std::uint32_t body : change.bodies()) bodies.push_back(BodyId{body});
+    std::vector<FieldLeaf> leaves;
+    for (const v1::FieldLeaf& leaf : change.leaves()) leaves.push_back(wire::from_wire(leaf).value());
+    EXPECT_EQ(change.room_seq(), seq_.value + 1);
+    replica_.change(RoomSeq{change.room_seq()}, bodies, leaves);
+    if (change.last()) seq_ = RoomSeq{change.room_seq()};
   }
 
   const AuthorId author_;
   mutable std::mutex mutex_;
   SessionOutbox outbox_;
-  CutField replica_;
+  std::shared_ptr<ToolBox> tools_ = builtin_tool_box();
+  haptic::Replica replica_;
   RoomSeq seq_;
   std::atomic<int> decided_{0};
   std::atomic<bool> ended_{false};

@@ -135,6 +135,18 @@ TEST(MeshOutbox, ClaimsOnlyWhatTheReaderHolds) {
   }
 }
 
+Bytes complete(std::uint64_t seq) {
+  v1::SessionResponse response;
+  response.mutable_complete()->set_room_seq(seq);
+  return std::make_shared<const std::string>(response.SerializeAsString());
+}
+
+Bytes tool() {
+  v1::SessionResponse response;
+  response.mutable_tool();
+  return std::make_shared<const std::string>(response.SerializeAsString());
+}
+
 Bytes row(std::uint64_t seq) {
   v1::SessionResponse response;
   response.mutable_committed()->set_room_seq(seq);
@@ -150,14 +162,15 @@ v1::SessionResponse parsed(const MessageParts& parts) {
 
 TEST(SessionOutbox, SendsLeavesThenCompleteThenOnlyTheRowsAfterThem) {
   SessionOutbox outbox;
-  outbox.begin(RoomSeq{4});
+  outbox.begin(RoomSeq{4}, {tool()}, complete(4));
   std::vector<FieldLeaf> leaves(2);
   for (FieldLeaf& leaf : leaves) leaf.values.assign(kLeafVoxels, 5);
   leaves[1].origin = {8, 0, 0};
   // The publisher may still bring the row that the leaves already contain.
   EXPECT_TRUE(outbox.add(RoomSeq{4}, row(4)));
   EXPECT_TRUE(outbox.add(RoomSeq{5}, row(5)));
-  EXPECT_TRUE(outbox.take().empty()) << "nothing before the leaves are known";
+  EXPECT_TRUE(parsed(outbox.take()).has_tool()) << "tools go before the leaves";
+  EXPECT_TRUE(outbox.take().empty()) << "no row before the leaves are known";
   outbox.set_leaves(leaves);
   EXPECT_EQ(parsed(outbox.take()).leaf().origin().x(), 0);
   EXPECT_EQ(parsed(outbox.take()).leaf().origin().x(), 8);
@@ -170,7 +183,7 @@ TEST(SessionOutbox, SendsLeavesThenCompleteThenOnlyTheRowsAfterThem) {
 
 TEST(SessionOutbox, GivesUpAReaderThatIsTooFarBehind) {
   SessionOutbox outbox;
-  outbox.begin(RoomSeq{0});
+  outbox.begin(RoomSeq{0}, {}, complete(0));
   outbox.set_leaves({});
   std::uint64_t seq = 0;
   while (outbox.add(RoomSeq{seq + 1}, row(seq + 1))) ++seq;

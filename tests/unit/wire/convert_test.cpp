@@ -81,5 +81,69 @@ TEST(Wire, RefusesPosesAndStatesThatAreNotNumbers) {
   EXPECT_FALSE(wire::from_wire(leaf));
 }
 
+TEST(Wire, ALeafOfOneValueTravelsAsThatValue) {
+  const FieldLeaf gone{{3}, 0, {8, 0, -16}, std::vector<std::int16_t>(kLeafVoxels, -2048)};
+  const v1::FieldLeaf message = wire::to_wire(gone);
+  EXPECT_EQ(message.values().size(), 2u);
+  const auto back = wire::from_wire(message);
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(*back, gone);
+  v1::FieldLeaf bad = message;
+  for (const std::size_t size : {0u, 1u, 4u, 1023u}) {
+    bad.set_values(std::string(size, 'x'));
+    EXPECT_FALSE(wire::from_wire(bad)) << size;
+  }
+}
+
+TEST(Wire, EveryBuiltinToolComesBackWithItsHash) {
+  for (const Tool& tool : builtin_tools()) {
+    const auto back = wire::from_wire(wire::to_wire(tool));
+    ASSERT_TRUE(back) << tool.name << ": " << back.error().message;
+    EXPECT_EQ(back->hash(), tool.hash()) << tool.name;
+    EXPECT_EQ(back->cut_body(), tool.cut_body()) << tool.name;
+  }
+}
+
+TEST(Wire, RefusesToolsThatAreNotWhatTheySay) {
+  v1::ToolDefinition tool = wire::to_wire(*find_tool("drill-3.2"));
+  tool.set_tool_hash(std::string(32, 'x'));
+  EXPECT_FALSE(wire::from_wire(tool));
+  tool.clear_tool_hash();
+  EXPECT_TRUE(wire::from_wire(tool)) << "the sender need not know it";
+  for (const char* text : {"", "name: a\n", "{", "- 1", "name: drill-3.2\nkind: spoon\n"}) {
+    tool.set_yaml(text);
+    EXPECT_FALSE(wire::from_wire(tool)) << text;
+  }
+}
+
+TEST(Wire, ASceneItemComesBackAndBadOnesAreRefused) {
+  SceneItem item;
+  item.id = 4;
+  item.body = {2};
+  item.tool = find_tool("screw-1")->hash();
+  item.pose_bone_item = pose_along({1, 2, 3}, {0, 1, 0});
+  item.turns = 7.5;
+  item.seated = true;
+  item.set_at = 99;
+  const auto back = wire::from_wire(wire::to_wire(item));
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(back->id, 4u);
+  EXPECT_EQ(back->body, item.body);
+  EXPECT_EQ(back->tool, item.tool);
+  EXPECT_EQ(back->turns, 7.5);
+  EXPECT_TRUE(back->seated);
+  EXPECT_EQ(back->set_at, 99u);
+  EXPECT_LT((back->pose_bone_item.position_mm - item.pose_bone_item.position_mm).norm(), 1e-9);
+  v1::SceneItem bad = wire::to_wire(item);
+  bad.set_tool_hash("short");
+  EXPECT_FALSE(wire::from_wire(bad));
+  bad = wire::to_wire(item);
+  bad.clear_pose_bone_item();
+  EXPECT_FALSE(wire::from_wire(bad));
+  bad = wire::to_wire(item);
+  bad.set_turns(std::numeric_limits<double>::infinity());
+  EXPECT_FALSE(wire::from_wire(bad));
+}
+
 }  // namespace
 }  // namespace osteon

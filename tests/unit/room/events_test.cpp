@@ -1,0 +1,480 @@
+// The room's events beside cuts. The other road to every bone: a fresh room that only ever had what is left.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "common/field/kernel.hpp"
+#include "haptic_client/control/replica.hpp"
+#include "server/room/room.hpp"
+#include "tests/unit/room/cuts.hpp"
+
+namespace osteon {
+namespace {
+
+using haptic::Replica;
+using test::strokes;
+using test::test_block;
+using test::tool_named;
+
+RoomSeq commit(Room& room, const Cut& cut) {
+  const Result<Outcome> outcome = room.submit(cut);
+  EXPECT_TRUE(outcome.has_value()) << outcome.error().message;
+  EXPECT_TRUE(outcome->committed()) << sentence(outcome->rejection);
+  return outcome->room_seq;
+}
+
+// A room's bone after these cuts alone.
+Digest bone_after(const std::vector<Cut>& cuts) {
+  CutField field(test_block(), BodyId{0});
+  for (const Cut& cut : cuts) field.apply(cut);
+  return field.hash();
+}
+
+// The part of the block on one side of x = 0, as a saw would part it: by masks that take whole samples.
+Fragment half(const Case& bone, bool upper, double volume_mm3 = 1000.0) {
+  const double h = bone.pitch_mm();
+  const auto band = static_cast<std::int16_t>(4 * h * 1024);
+  Fragment fragment;
+  fragment.volume_mm3 = volume_mm3;
+  fragment.bounds = bone.bounds();
+  (upper ? fragment.bounds.min_mm : fragment.bounds.max_mm).x() = 0.0;
+  const CoordBox all = bone.bounds_samples();
+  const Coord first = floor_to(all.min, kLeafSize);
+  for (int x = first.x; x <= all.max.x; x += kLeafSize)
+    for (int y = first.y; y <= all.max.y; y += kLeafSize)
+      for (int z = first.z; z <= all.max.z; z += kLeafSize) {
+        FieldLeaf taken{BodyId{0}, 0, {x, y, z}, std::vector<std::int16_t>(kLeafVoxels)}, left = taken;
+        for (std::size_t i = 0; i < kLeafVoxels; ++i) {
+          const bool of_piece = (x + static_cast<int>(i / (kLeafSize * kLeafSize)) >= 0) == upper;
+          taken.values[i] = of_piece ? static_cast<std::int16_t>(-band) : band;
+          left.values[i] = of_piece ? band : static_cast<std::int16_t>(-band);
+        }
+        if (std::ranges::any_of(taken.values, [](std::int16_t v) { return v < 0; })) fragment.taken.push_back(std::move(taken));
+        if (std::ranges::any_of(left.values, [](std::int16_t v) { return v < 0; })) fragment.left.push_back(std::move(left));
+      }
+  return fragment;
+}
+
+void hear(Replica& replica, const RoomEvent& event) {
+  if (event.bone) replica.change(event.room_seq, event.bodies, event.leaves);
+  replica.lease(event.lease_epoch);
+  replica.settle();
+}
+
+TEST(RoomUndo, LeavesTheBoneOfTheOtherCuts) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  const auto cuts = strokes(surgeon, 5, 31);
+  std::vector<RoomSeq> places;
+  for (const Cut& cut : cuts) places.push_back(commit(room, cut));
+  const Digest all = room.field_hash();
+  EXPECT_EQ(all, bone_after(cuts));
+
+  const RoomSeq second[] = {places[1]};
+  const auto undone = room.undo(surgeon, second);
+  ASSERT_TRUE(undone) << undone.error().message;
+  EXPECT_EQ(undone->room_seq.value, 6u);
+  EXPECT_EQ(undone->places, std::vector<RoomSeq>{places[1]});
+  EXPECT_EQ(room.field_hash(), bone_after({cuts[0], cuts[2], cuts[3], cuts[4]}));
+  EXPECT_FALSE(room.undo(surgeon, second)) << "it is undone already";
+  ASSERT_TRUE(room.undo_last(surgeon, 2, {}));
+  EXPECT_EQ(room.field_hash(), bone_after({cuts[0], cuts[2]}));
+
+  ASSERT_TRUE(room.redo_last(surgeon, 1));
+  EXPECT_EQ(room.field_hash(), bone_after({cuts[0], cuts[2], cuts[3], cuts[4]}));
+  ASSERT_TRUE(room.redo_last(surgeon, 1));
+  EXPECT_EQ(room.field_hash(), all);
+  EXPECT_FALSE(room.redo_last(surgeon, 1)) << "there is nothing left to redo";
+  ASSERT_TRUE(room.undo_last(surgeon, 99, {}));
+  EXPECT_EQ(room.field_hash(), Room(test_block()).field_hash());
+  EXPECT_FALSE(room.undo_last(surgeon, 1, {}));
+}
+
+TEST(RoomUndo, CountsTheEventsOfOneAuthorOrOfAll) {
+  Room room(test_block());
+  const AuthorId a = room.join(MemberKind::surgeon), b = room.join(MemberKind::surgeon), watcher = room.join(MemberKind::watcher);
+  const auto of_a = strokes(a, 2, 32), of_b = strokes(b, 2, 33);
+  for (int i = 0; i < 2; ++i) {
+    commit(room, of_a[static_cast<std::size_t>(i)]);
+    commit(room, of_b[static_cast<std::size_t>(i)]);
+  }
+  ASSERT_TRUE(room.undo_last(watcher, 1, a));
+  EXPECT_EQ(room.field_hash(), bone_after({of_a[0], of_b[0], of_b[1]}));
+  ASSERT_TRUE(room.undo_last(watcher, 1, {}));
+  EXPECT_EQ(room.field_hash(), bone_after({of_a[0], of_b[0]}));
+}
+
+TEST(RoomUndo, EndsTheLeasesUnderWhichOthersCut) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  auto cuts = strokes(surgeon, 3, 34);
+  commit(room, cuts[0]);
+  const std::uint64_t before = room.lease_epoch();
+  ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
+  EXPECT_GT(room.lease_epoch(), before);
+  EXPECT_EQ(room.submit(cuts[1])->rejection, Rejection::lease);
+  cuts[2].lease_epoch = room.lease_epoch();
+  commit(room, cuts[2]);
+}
+
+TEST(RoomUndo, RefusesWhatCannotBeTakenBackWithoutAPlaceInTheOrder) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  const RoomSeq cut = commit(room, strokes(surgeon, 1, 35)[0]);
+  ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
+  const RoomSeq undo = room.room_seq(), unknown{77};
+  for (const RoomSeq place : {cut, undo, unknown}) {
+    const RoomSeq places[] = {place};
+    EXPECT_FALSE(room.undo(surgeon, places)) << place.value;
+  }
+  EXPECT_FALSE(room.undo(surgeon, {}));
+  EXPECT_FALSE(room.undo_last(surgeon, 0, {}));
+  EXPECT_FALSE(room.undo_last(AuthorId{9}, 1, {})) << "a stranger";
+  EXPECT_FALSE(room.redo_last(AuthorId{9}, 1));
+  EXPECT_EQ(room.room_seq(), undo);
+}
+
+// Two roads to one surface: blocks made anew where an event made them stale, or all at the end.
+TEST(RoomUndo, NamesEveryBlockThatItMakesStale) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  BlockStore live;
+  std::set<BlockKey> keys;
+  const auto refresh = [&](const std::vector<BlockKey>& stale) {
+    for (const BlockKey& key : stale) {
+      live.put(key, room.find_field(key.body) ? make_block(room.gather_block(key)) : BlockPayload{});
+      keys.insert(key);
+    }
+  };
+  refresh(room.bone_blocks());
+  for (const Cut& cut : strokes(surgeon, 8, 36)) {
+    commit(room, cut);
+    refresh(room.take_stale_blocks());
+  }
+  ASSERT_TRUE(room.undo_last(surgeon, 3, {}));
+  refresh(room.take_stale_blocks());
+  ASSERT_TRUE(room.split(BodyId{0}, {half(room.bone(), true)}, room.lease_epoch()));
+  refresh(room.take_stale_blocks());
+  int of_piece = 0;
+  for (const BlockKey& key : keys) {
+    const BlockPayload anew = make_block(room.gather_block(key));
+    const auto kept = live.blocks().find(key);
+    EXPECT_EQ(anew, kept == live.blocks().end() ? BlockPayload{} : kept->second.payload) << key.body.value << ": " << key.index.x;
+    of_piece += key.body == BodyId{1} && !anew.bytes.empty();
+  }
+  EXPECT_GT(of_piece, 0) << "the piece is drawn";
+}
+
+TEST(RoomSplit, MakesABodyOfThePieceAndCutsReachBoth) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  const auto cuts = strokes(surgeon, 4, 37);
+  const RoomSeq saw = commit(room, cuts[0]);
+  commit(room, cuts[1]);
+  const double before_mm3 = room.field().removed_mm3();
+  const auto split = room.split(BodyId{0}, {half(room.bone(), true)}, room.lease_epoch());
+  ASSERT_TRUE(split) << split.error().message;
+  EXPECT_EQ(split->bodies, (std::vector<BodyId>{BodyId{0}, BodyId{1}}));
+  ASSERT_NE(room.find_field(BodyId{1}), nullptr);
+
+  // Each point of the bone is in one of the two.
+  const Vec3 up{6, 0, -6}, down{-6, 0, -6};
+  EXPECT_GT(room.field().solid_mm(up), 0.0);
+  EXPECT_LT(room.field().solid_mm(down), 0.0);
+  EXPECT_LT(room.find_field(BodyId{1})->solid_mm(up), 0.0);
+  EXPECT_GT(room.find_field(BodyId{1})->solid_mm(down), 0.0);
+  const double parted_mm3 = room.field().removed_mm3() + room.find_field(BodyId{1})->removed_mm3() - room.bone().volume_mm3();
+  EXPECT_NEAR(parted_mm3, before_mm3, 0.02 * room.bone().volume_mm3()) << "no bone is lost by parting";
+
+  // A burr across the parting line takes bone of both.
+  Cut across = test::straight_cut(tool_named("burr-round-5"), {-4, 0, -1}, {4, 0, -1}, {0, 0, -1}, 3);
+  across.author = surgeon;
+  commit(room, across);
+  EXPECT_GT(room.find_field(BodyId{1})->solid_mm({3, 0, -0.5}), 0.0);
+  EXPECT_GT(room.field().solid_mm({-3, 0, -0.5}), 0.0);
+
+  // The first cut is older than the split: that falls too, and what was cut since stays in the bone.
+  const RoomSeq oldest[] = {saw};
+  const auto undone = room.undo(surgeon, oldest);
+  ASSERT_TRUE(undone) << undone.error().message;
+  EXPECT_EQ(undone->places, (std::vector<RoomSeq>{saw, split->room_seq}));
+  EXPECT_EQ(room.bodies(), std::vector<BodyId>{BodyId{0}});
+  EXPECT_EQ(room.field_hash(), bone_after({cuts[1], across}));
+
+  // And both come again.
+  ASSERT_TRUE(room.redo_last(surgeon, 1));
+  EXPECT_EQ(room.bodies().size(), 2u);
+  CutField whole(room.bone(), BodyId{0}), piece(room.bone(), BodyId{1});
+  for (CutField* field : {&whole, &piece})
+    for (const Cut& cut : {cuts[0], cuts[1], across}) field->apply(cut);
+  for (const FieldLeaf& leaf : half(room.bone(), true).taken) whole.merge(leaf);
+  for (const FieldLeaf& leaf : half(room.bone(), true).left) piece.merge(leaf);
+  EXPECT_EQ(room.field().hash(), whole.hash());
+  EXPECT_EQ(room.find_field(BodyId{1})->hash(), piece.hash());
+}
+
+TEST(RoomSplit, DebrisVanishesInTheSameEvent) {
+  Room room(test_block());
+  const auto split = room.split(BodyId{0}, {half(room.bone(), true, 0.5)}, room.lease_epoch());
+  ASSERT_TRUE(split);
+  EXPECT_EQ(room.bodies(), std::vector<BodyId>{BodyId{0}});
+  EXPECT_GT(room.field().solid_mm({6, 0, -6}), 0.0);
+  const RoomSeq places[] = {split->room_seq};
+  ASSERT_TRUE(room.undo(room.join(MemberKind::watcher), places));
+  EXPECT_LT(room.field().solid_mm({6, 0, -6}), 0.0);
+}
+
+TEST(RoomSplit, IsRefusedWhereBoneHasComeBackMeanwhile) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  commit(room, strokes(surgeon, 1, 38)[0]);
+  const std::uint64_t seen = room.lease_epoch();
+  ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
+  EXPECT_FALSE(room.split(BodyId{0}, {half(room.bone(), true)}, seen));
+  EXPECT_FALSE(room.split(BodyId{5}, {half(room.bone(), true)}, room.lease_epoch()));
+  EXPECT_FALSE(room.split(BodyId{0}, {}, room.lease_epoch()));
+}
+
+TEST(RoomSplit, APieceIsTakenAwayAndComesBack) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  EXPECT_FALSE(room.remove_body(surgeon, BodyId{0})) << "the last one stays";
+  ASSERT_TRUE(room.split(BodyId{0}, {half(room.bone(), true)}, room.lease_epoch()));
+  const Digest parted = room.field_hash();
+  const auto removed = room.remove_body(surgeon, BodyId{1});
+  ASSERT_TRUE(removed) << removed.error().message;
+  EXPECT_EQ(removed->bodies, std::vector<BodyId>{BodyId{0}});
+  EXPECT_FALSE(room.remove_body(surgeon, BodyId{1}));
+  EXPECT_EQ(room.field_hash(), room.field().hash());
+  Cut cut = strokes(surgeon, 1, 39)[0];
+  cut.body = BodyId{1};
+  EXPECT_EQ(room.submit(cut)->rejection, Rejection::body);
+  ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
+  EXPECT_EQ(room.field_hash(), parted);
+}
+
+TEST(RoomScene, KeepsWhatWasSetAndTakesItBack) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  SceneItem guide;
+  guide.tool = tool_named("guide-1").hash();
+  guide.pose_bone_item = pose_along({1, 2, 0}, {0, 0, -1});
+  const auto set = room.set_item(surgeon, guide);
+  ASSERT_TRUE(set) << set.error().message;
+  EXPECT_EQ(set->item, 1u);
+  ASSERT_EQ(room.items().size(), 1u);
+  EXPECT_EQ(room.items()[0].set_at, set->room_seq.value);
+
+  SceneItem moved = room.items()[0];
+  moved.seated = true;
+  moved.pose_bone_item.position_mm.x() = 3;
+  ASSERT_TRUE(room.set_item(surgeon, moved));
+  EXPECT_TRUE(room.items()[0].seated);
+  ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
+  EXPECT_FALSE(room.items()[0].seated);
+  EXPECT_EQ(room.lease_epoch(), 1u) << "no bone came back";
+  ASSERT_TRUE(room.redo_last(surgeon, 1));
+  EXPECT_TRUE(room.items()[0].seated);
+
+  const auto second = room.set_item(surgeon, guide);
+  EXPECT_EQ(second->item, 2u);
+  ASSERT_TRUE(room.remove_item(surgeon, 1));
+  EXPECT_FALSE(room.remove_item(surgeon, 1)) << "it stands no more";
+  ASSERT_EQ(room.items().size(), 1u);
+  EXPECT_EQ(room.items()[0].id, 2u);
+  ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
+  EXPECT_EQ(room.items().size(), 2u);
+}
+
+TEST(RoomScene, RefusesItemsThatCannotStandHere) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  SceneItem item;
+  item.tool = tool_named("pin-1").hash();
+  const auto refused = [&](const std::function<void(SceneItem&)>& change) {
+    SceneItem bad = item;
+    change(bad);
+    return !room.set_item(surgeon, bad).has_value();
+  };
+  EXPECT_TRUE(refused([](SceneItem& i) { i.body = BodyId{1}; }));
+  EXPECT_TRUE(refused([](SceneItem& i) { i.tool.bytes[0] ^= 1; }));
+  EXPECT_TRUE(refused([](SceneItem& i) { i.id = 4; }));
+  EXPECT_TRUE(refused([](SceneItem& i) { i.pose_bone_item.position_mm.x() = 900; }));
+  EXPECT_FALSE(room.set_item(AuthorId{9}, item));
+  EXPECT_EQ(room.room_seq().value, 0u);
+}
+
+TEST(RoomScene, AnItemGoesWithItsBody) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  ASSERT_TRUE(room.split(BodyId{0}, {half(room.bone(), true)}, room.lease_epoch()));
+  SceneItem screw;
+  screw.tool = tool_named("screw-1").hash();
+  screw.body = BodyId{1};
+  ASSERT_TRUE(room.set_item(surgeon, screw));
+  ASSERT_TRUE(room.remove_body(surgeon, BodyId{1}));
+  EXPECT_TRUE(room.items().empty());
+  ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
+  EXPECT_EQ(room.items().size(), 1u);
+}
+
+TEST(RoomTools, AToolIsAddedOnceAndCutsFromThenOn) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  Tool burr = tool_named("burr-round-5");
+  burr.name = "burr-of-the-test";
+  burr.diameter_mm = burr.cutting_length_mm = 4.2;
+  Cut cut = test::straight_cut(burr, {0, 0, 0}, {1, 0, 0}, {0, 0, -1});
+  cut.author = surgeon;
+  EXPECT_EQ(room.submit(cut)->rejection, Rejection::tool);
+  const auto added = room.add_tool(surgeon, burr);
+  ASSERT_TRUE(added) << added.error().message;
+  EXPECT_EQ(added->room_seq.value, 2u);
+  EXPECT_EQ(added->tool->hash, burr.hash());
+  cut.author_seq = 2;
+  commit(room, cut);
+
+  EXPECT_EQ(room.add_tool(surgeon, burr)->room_seq, RoomSeq{}) << "known, so no event";
+  EXPECT_EQ(room.add_tool(surgeon, tool_named("drill-3.2"))->room_seq, RoomSeq{});
+  burr.diameter_mm = burr.cutting_length_mm = 4.4;
+  EXPECT_EQ(room.add_tool(surgeon, burr).error().code, ErrorCode::exists) << "another tool of that name";
+  EXPECT_FALSE(room.add_tool(AuthorId{9}, burr));
+  EXPECT_EQ(room.room_seq().value, 3u);
+}
+
+// A prediction that an undo overtakes falls, and the replica is the room's when all is heard.
+TEST(RoomReplica, DropsWhatWasPredictedOnFallenBone) {
+  Room room(test_block());
+  const AuthorId a = room.join(MemberKind::surgeon), b = room.join(MemberKind::surgeon);
+  const auto cuts = strokes(a, 4, 40);
+  Replica replica(room.bone(), BodyId{0});
+  for (int i = 0; i < 2; ++i) replica.add_own(cuts[static_cast<std::size_t>(i)]);
+  for (int i = 0; i < 2; ++i) replica.commit(commit(room, cuts[static_cast<std::size_t>(i)]), cuts[static_cast<std::size_t>(i)], true);
+  replica.add_own(cuts[2]);  // on its way when the other hand undoes
+  const auto undo = room.undo_last(b, 1, {});
+  ASSERT_TRUE(undo);
+  replica.add_own(cuts[3]);
+  EXPECT_EQ(room.submit(cuts[2])->rejection, Rejection::lease);
+  EXPECT_EQ(room.submit(cuts[3])->rejection, Rejection::lease);
+  hear(replica, *undo);
+  EXPECT_EQ(replica.unconfirmed(), 0u);
+  EXPECT_FALSE(replica.reject(RoomSeq{4}, 3)) << "it has fallen already";
+  EXPECT_FALSE(replica.reject(RoomSeq{5}, 4));
+  replica.settle();
+  EXPECT_EQ(replica.hash(), room.field_hash());
+  EXPECT_EQ(replica.hash(), bone_after({cuts[0]}));
+  EXPECT_EQ(replica.room_seq(), room.room_seq());
+}
+
+// A split that others caused while own cuts are pending: they reach the piece as well.
+TEST(RoomReplica, PredictsInPiecesThatItHearsOfLate) {
+  Room room(test_block());
+  const AuthorId a = room.join(MemberKind::surgeon);
+  const auto cuts = strokes(a, 12, 41);
+  Replica replica(room.bone(), BodyId{0});
+  for (const Cut& cut : cuts) replica.add_own(cut);
+  const auto split = room.split(BodyId{0}, {half(room.bone(), false)}, room.lease_epoch());
+  ASSERT_TRUE(split);
+  hear(replica, *split);
+  EXPECT_EQ(replica.bodies().size(), 2u);
+  EXPECT_EQ(replica.unconfirmed(), cuts.size());
+  const Digest predicted = replica.hash();
+  for (const Cut& cut : cuts) replica.commit(commit(room, cut), cut, true);
+  replica.settle();
+  EXPECT_EQ(replica.hash(), room.field_hash());
+  EXPECT_EQ(predicted, room.field_hash()) << "the prediction was right";
+}
+
+// Any mixture of events by two hands: who was there from the start and who joins on the way have the room's bone.
+TEST(RoomReplica, EveryHolderHasTheRoomsHashAfterAnyEvents) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    Room room(test_block());
+    const AuthorId hands[] = {room.join(MemberKind::surgeon), room.join(MemberKind::surgeon)};
+    std::vector<Cut> cuts[] = {strokes(hands[0], 40, seed), strokes(hands[1], 40, 100 + seed)};
+    std::size_t next[] = {0, 0};
+    std::vector<Replica> holders;
+    holders.emplace_back(room.bone(), BodyId{0});
+    bool upper = false;
+    for (int i = 0; i < 36; ++i) {
+      const std::size_t who = random() % 2;
+      Result<RoomEvent> event = failure(ErrorCode::internal, "");
+      switch (random() % 8) {
+        case 0: event = room.undo_last(hands[who], 1 + random() % 3, {}); break;
+        case 1: event = room.redo_last(hands[who], 1); break;
+        case 2:
+          if (room.bodies().size() == 1) event = room.split(BodyId{0}, {half(room.bone(), upper = !upper)}, room.lease_epoch());
+          break;
+        case 3:
+          if (room.bodies().size() > 1) event = room.remove_body(hands[who], room.bodies().back());
+          break;
+        default: {
+          Cut& cut = cuts[who][next[who]++];
+          cut.lease_epoch = room.lease_epoch();
+          const RoomSeq place = commit(room, cut);
+          for (Replica& holder : holders) holder.commit(place, cut, false);
+        }
+      }
+      if (event)
+        for (Replica& holder : holders) hear(holder, *event);
+      if (i % 12 == 11) {
+        Replica& late = holders.emplace_back(room.bone(), BodyId{0});
+        for (const BodyId body : room.bodies())
+          for (const FieldLeaf& leaf : room.find_field(body)->leaves()) late.restore(leaf);
+        late.change(room.room_seq(), room.bodies(), {});
+        late.joined(room.room_seq());
+      }
+    }
+    for (const Replica& holder : holders) EXPECT_EQ(holder.hash(), room.field_hash());
+    // With every undo redone or not, what stands is what the remaining cuts leave where nothing was parted.
+    while (room.undo_last(hands[0], 50, {})) {
+    }
+    if (room.bodies() == std::vector<BodyId>{BodyId{0}} && room.field_hash() != Room(test_block()).field_hash())
+      ADD_FAILURE() << "an undone room is not the imported bone";
+  }
+}
+
+TEST(RoomResume, GoesOnFromWhatWasSaved) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  const auto cuts = strokes(surgeon, 6, 42);
+  for (int i = 0; i < 3; ++i) commit(room, cuts[static_cast<std::size_t>(i)]);
+  ASSERT_TRUE(room.split(BodyId{0}, {half(room.bone(), true)}, room.lease_epoch()));
+  SavedFields saved;
+  saved.case_hash = room.bone().hash();
+  saved.kernel_version = kKernelVersion;
+  saved.room_seq = room.room_seq();
+  saved.bodies = room.bodies();
+  for (const BodyId body : saved.bodies)
+    for (const FieldLeaf& leaf : room.find_field(body)->leaves()) saved.leaves.push_back(leaf);
+
+  Result<Room> resumed = Room::resume(test_block(), saved);
+  ASSERT_TRUE(resumed) << resumed.error().message;
+  EXPECT_EQ(resumed->field_hash(), room.field_hash());
+  EXPECT_EQ(resumed->room_seq(), room.room_seq());
+  const AuthorId again = resumed->join(MemberKind::surgeon);
+  EXPECT_EQ(resumed->undo_last(again, 1, {}).error().code, ErrorCode::unavailable) << "what came before stays";
+  for (int i = 3; i < 6; ++i) {
+    Cut cut = cuts[static_cast<std::size_t>(i)];
+    commit(room, cut);
+    cut.author = again;
+    cut.author_seq = static_cast<std::uint64_t>(i) - 2;
+    commit(*resumed, cut);
+  }
+  EXPECT_EQ(resumed->field_hash(), room.field_hash());
+  ASSERT_TRUE(room.undo_last(surgeon, 2, {}));
+  ASSERT_TRUE(resumed->undo_last(again, 2, {}));
+  EXPECT_EQ(resumed->field_hash(), room.field_hash()) << "undo rebuilds on top of what was loaded";
+  ASSERT_TRUE(resumed->remove_body(again, BodyId{1}));
+
+  SavedFields other = saved;
+  other.case_hash.bytes[0] ^= 1;
+  EXPECT_EQ(Room::resume(test_block(), other).error().code, ErrorCode::unsupported);
+  other = saved;
+  ++other.kernel_version;
+  EXPECT_EQ(Room::resume(test_block(), other).error().code, ErrorCode::unsupported);
+}
+
+}  // namespace
+}  // namespace osteon

@@ -1,0 +1,174 @@
+// Members of a room as tests hold them: haptic clients with their replicas, and viewers without a window.
+#pragma once
+#include <grpcpp/grpcpp.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "common/wire/convert.hpp"
+#include "common/wire/room_client.hpp"
+#include "haptic_client/control/replica.hpp"
+#include "haptic_client/net/room_session.hpp"
+#include "osteon/v1/cutting.grpc.pb.h"
+#include "osteon/v1/room.grpc.pb.h"
+#include "osteon/v1/watch.grpc.pb.h"
+#include "tests/support/wait.hpp"
+
+namespace osteon::test {
+
+inline constexpr std::chrono::seconds kPatience{20};
+
+inline wire::JoinedRoom join(const std::string& address, wire::ClientKind kind) {
+  auto room = wire::join_room(address, kind, "test", std::chrono::seconds{5}, {});
+  EXPECT_TRUE(room.has_value()) << room.error().message;
+  return room.value();
+}
+
+inline v1::GetStatusResponse status_of(const wire::JoinedRoom& room) {
+  v1::GetStatusResponse response;
+  grpc::ClientContext context;
+  const grpc::Status status = v1::RoomService::NewStub(room.channel)->GetStatus(&context, {}, &response);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  return response;
+}
+
+// A haptic client that keeps a replica, as osteon-haptic does.
+class Surgeon {
+ public:
+  Surgeon(const std::string& address, const std::filesystem::path& cache) {
+    auto joined = RoomSession::join({.address = address, .cache = cache}, {});
+    EXPECT_TRUE(joined.has_value()) << joined.error().message;
+    session_.emplace(std::move(*joined));
+    replica_.emplace(session_->bone(), BodyId{0}, session_->tools());
+    session_->open({.leaf = [this](const FieldLeaf& leaf) { on([&] { replica_->restore(leaf); }); },
+                    .complete = [this](const RoomAtJoin& room) { on([&] { complete_ = true, seq_ = room.contained, lease_ = room.lease_epoch, bodies_ = room.bodies; }); },
+                    .committed =
+                        [this](RoomSeq seq, const Cut& cut) {
+                          on([&] {
+                            EXPECT_TRUE(complete_);
+                            EXPECT_GT(seq, seq_) << "committed cuts come in order";
+                            replica_->commit(seq, cut, false);
+                            seq_ = seq;
+                            own_ += cut.author == session_->room().author;
+                          });
+                        },
+                    .rejected = [this](RoomSeq, std::uint64_t, const std::string& reason) { on([&] { rejected_ = reason; }); },
+                    .change =
+                        [this](BonePart&& part) {
+                          on([&] {
+                            replica_->change(part.place, part.bodies, part.leaves);
+                            if (part.last) seq_ = part.place, lease_ = part.lease_epoch, bodies_ = part.bodies;
+                          });
+                        },
+                    .scene =
+                        [this](RoomSeq seq, const std::vector<SceneItem>& items) {
+                          on([&] { items_ = items, seq_ = std::max(seq_, seq); });
+                        },
+                    .tool = [this](RoomSeq seq) { on([&] { seq_ = seq; }); },
+                    .lost = [this](const Error& why) { on([&] { lost_ = why.message; }); }});
+  }
+  ~Surgeon() { session_->close(); }
+
+  RoomSession& session() { return *session_; }
+  AuthorId author() const { return session_->room().author; }
+  bool complete() { return read(complete_); }
+  RoomSeq seq() { return read(seq_); }
+  std::uint64_t own() { return read(own_); }
+  std::string rejected() { return read(rejected_); }
+  std::string lost() { return read(lost_); }
+  std::uint64_t lease() { return read(lease_); }
+  std::vector<BodyId> bodies() { return read(bodies_); }
+  std::vector<SceneItem> items() { return read(items_); }
+  Digest hash() {
+    const std::lock_guard lock(mutex_);
+    return replica_->hash();
+  }
+
+ private:
+  template <class Call>
+  void on(Call call) {
+    const std::lock_guard lock(mutex_);
+    call();
+  }
+  template <class T>
+  T read(const T& value) {
+    const std::lock_guard lock(mutex_);
+    return value;
+  }
+
+  std::mutex mutex_;
+  std::optional<RoomSession> session_;
+  std::optional<haptic::Replica> replica_;
+  bool complete_ = false;
+  RoomSeq seq_;
+  std::uint64_t own_ = 0, lease_ = 0;
+  std::vector<BodyId> bodies_;
+  std::vector<SceneItem> items_;
+  std::string rejected_, lost_;
+};
+
+// Whether the room has come to rest and every one of them is there.
+inline bool settled(const std::vector<Surgeon*>& holders) {
+  const auto there = [&] {
+    const std::uint64_t seq = status_of(holders.front()->session().room()).room_seq();
+    return std::ranges::all_of(holders, [&](Surgeon* holder) { return holder->complete() && holder->seq().value == seq; }) ? seq : 0;
+  };
+  const std::uint64_t seq = there();
+  if (seq == 0) return false;
+  std::this_thread::sleep_for(std::chrono::milliseconds{500});  // a search for pieces may be on its way
+  return there() == seq;
+}
+
+// What a viewer holds of the surface.
+class MeshReader {
+ public:
+  explicit MeshReader(const std::string& address) : room_(join(address, wire::ClientKind::viewer)) {
+    v1::WatchMeshRequest request;
+    request.set_author(room_.author.value);
+    stream_ = v1::WatchService::NewStub(room_.channel)->WatchMesh(&context_, request);
+  }
+  ~MeshReader() {
+    context_.TryCancel();
+    status_ = stream_->Finish();
+  }
+  // Reads until the surface contains this place of the order.
+  bool read_to(RoomSeq seq) {
+    v1::WatchMeshResponse message;
+    while ((!complete_ || seq_ < seq) && stream_->Read(&message)) {
+      largest_ = std::max(largest_, message.ByteSizeLong());
+      for (const v1::MeshBlock& b : message.blocks()) {
+        const BlockKey key{BodyId{b.body()}, static_cast<int>(b.level()), wire::from_wire(b.index())};
+        const BlockPayload payload{{b.payload().begin(), b.payload().end()}};
+        EXPECT_EQ(b.mesh_hash(), wire::to_wire(mesh_hash(payload)));
+        if (payload.bytes.empty())
+          hashes_.erase(key);
+        else
+          hashes_[key] = b.mesh_hash();
+      }
+      complete_ = message.snapshot_complete();
+      seq_ = RoomSeq{message.room_seq()};
+    }
+    return complete_ && seq_ >= seq;
+  }
+  const std::map<BlockKey, std::string>& hashes() const { return hashes_; }
+  std::size_t largest_message() const { return largest_; }
+
+ private:
+  wire::JoinedRoom room_;
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReader<v1::WatchMeshResponse>> stream_;
+  std::map<BlockKey, std::string> hashes_;
+  bool complete_ = false;
+  RoomSeq seq_;
+  std::size_t largest_ = 0;
+  grpc::Status status_;
+};
+
+}  // namespace osteon::test
