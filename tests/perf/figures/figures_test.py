@@ -12,7 +12,7 @@ import registry  # noqa: E402
 from registry import Figure  # noqa: E402
 
 FORM = re.compile(r"^\S+ \S+ \S+ \(baseline \S+, ratio \S+(, min \S+, max \S+)?(, threads \d+)?\) target \S+ (ok|short|info)$")
-TIMES = {"us", "ms", "s"}
+TIMES = {"ns", "us", "ms", "s"}
 
 
 class Registry(unittest.TestCase):

@@ -215,6 +215,50 @@ def undo(run):
     }
 
 
+def of(out, name, beside, threads=None):
+    """What a program prints as NAME_p50, NAME_min, NAME_max."""
+    return Measured(out[f"{name}_p50"], out[f"{beside}_p50"], out[f"{name}_min"], out[f"{name}_max"], threads)
+
+
+def refinement(run):
+    """The dissertation's Table 5.4: method 1 resamples the whole sub-volume that a tool meets, method 2 where it cuts."""
+    run.say("adaptive resolution")
+    out = json.loads(run.output("osteon-refinement-bench"))
+    rows = [("resolution, method", "first cut us", "later cuts us", "memory MB", "finest mm in 1 GB", "areas")]
+    values = {}
+    for times in ("2x", "4x"):
+        for method in (1, 2):
+            name = f"{times}_method{method}"
+            rows.append((f"{times}, method {method}", f"{out[f'{name}_first_us_p50']:.0f}", f"{out[f'{name}_later_us_p50']:.0f}",
+                         f"{out[f'{name}_megabytes']:.2f}", f"{out[f'{name}_reachable_mm']:.4f}", out[f"{name}_areas"]))
+        values |= {
+            f"refinement_{times}_first": of(out, f"{times}_method2_first_us", f"{times}_method1_first_us", 1),
+            f"refinement_{times}_later": of(out, f"{times}_method2_later_us", f"{times}_method1_later_us", 1),
+            f"refinement_{times}_memory_saved": Measured(out[f"{times}_method1_megabytes"] / out[f"{times}_method2_megabytes"]),
+        }
+    values["refinement_differences"] = Measured(sum(not out[f"{times}_same"] for times in ("2x", "4x")))
+    run.tables.append(("adaptive resolution, after Table 5.4", rows))
+    return values
+
+
+def collision(run):
+    """Section 7.2: segmentation cells, all in, all out or mixed, against the distance field."""
+    run.say("collision")
+    out = json.loads(run.output("osteon-collision-bench"))
+    ways = ("nearest", "trilinear", "distance")
+    run.tables.append(("collision on a sphere: where a point counts as inside, and what asking costs", [
+        ("way", "mean error pitches", "rms", "largest", "ns p50", "min", "max")] + [
+        (way, *(f"{out[f'{way}_{what}_pitches']:.4f}" for what in ("mean", "rms", "largest")),
+         *(f"{out[f'{way}_ns_{what}']:.1f}" for what in ("p50", "min", "max"))) for way in ways]))
+    return {
+        **{f"collision_{way}_error": Measured(out[f"{way}_rms_pitches"], None, None, out[f"{way}_largest_pitches"])
+           for way in ways},
+        **{f"collision_{way}_cost": of(out, f"{way}_ns", "field_ns", 1) for way in ways},
+        "collision_distance_gain": Measured(out["nearest_rms_pitches"] / out["distance_rms_pitches"]),
+        "collision_cells_memory": Measured(out["cells_bytes"] / out["distance_bytes"]),
+    }
+
+
 FRAME_MS = 1000.0 / 30.0
 
 
@@ -265,4 +309,5 @@ def real_skull(run):
 
 GROUPS = {"cutting": cutting, "accuracy": accuracy, "set_property": set_property, "set_property_full": set_property_full,
           "growth": growth, "undo": undo, "surface": surface,
+          "refinement": refinement, "collision": collision,
           "real_temporal": real_temporal, "real_skull": real_skull}

@@ -98,8 +98,9 @@ FIGURES = [
         Figure(f"cut_{tool}_speedup_2", "ratio", "the same with two threads for ours", "cutting", (">=", least)),
         Figure(f"cut_{tool}_speedup_near", "ratio", f"{what}: a ValueAccessor over no leaves but those near the tool, over ours",
                "cutting"),
-        *[Figure(f"cut_{tool}_cold_p99{suffix}", "of_budget", f"{what} where nothing was touched before, {threads}: 99th percentile "
-                 "as a part of 200 us", "cutting", ("<=", 1.0)) for suffix, threads in (("", "one thread"), ("_2", "two threads"))])],
+        *[Figure(f"cut_{tool}_cold_p99{suffix}", "of_budget", f"{what} where nothing was touched before, {threads}: 99th "
+                 "percentile as a part of 200 us", "cutting", ("<=", 1.0))
+          for suffix, threads in (("", "one thread"), ("_2", "two threads"))])],
     Figure("tools_slowest_cut", "of_budget", "the slowest of the cutting tools, each at its own level: median as a part of 2 ms",
            "cutting", ("<=", 1.0)),
     Figure("tools_slowest_cut_2", "of_budget", "the same with two threads", "cutting", ("<=", 1.0)),
@@ -155,6 +156,26 @@ FIGURES = [
     Figure("undo_share", "ratio", "time to take one cut back over that of applying all the others again", "undo",
            ("<=", 0.1)),
     Figure("undo_differences", "count", "bones that were not as if the cut had never been made", "undo", ("==", 0)),
+    # Adaptive resolution: method 1 resamples a whole sub-volume, method 2, ours, where the tool cuts (Table 5.4).
+    *[figure for times in ("2x", "4x") for figure in (
+        Figure(f"refinement_{times}_first", "us", f"first cut in new bone at {times} resolution, method 2", "refinement",
+               baseline="method 1"),
+        Figure(f"refinement_{times}_later", "us", f"later cuts at {times} resolution, method 2", "refinement",
+               baseline="method 1"),
+        Figure(f"refinement_{times}_memory_saved", "ratio", f"memory of method 1 over that of method 2 at {times} resolution",
+               "refinement", (">=", 1.0)))],
+    Figure("refinement_differences", "count", "resolutions at which the two methods gave different bone", "refinement",
+           ("==", 0)),
+    # Collision by segmentation cells (7.2) and by the distance field, on a sphere.
+    *[figure for way, what in (("nearest", "cells, the nearest voxel of a mixed one"),
+                               ("trilinear", "cells, mixed ones trilinear"), ("distance", "distance field")) for figure in (
+        Figure(f"collision_{way}_error", "pitches", f"{what}: where a point counts as inside, rms and largest error",
+               "collision"),
+        Figure(f"collision_{way}_cost", "ns", f"{what}: asking for one point", "collision",
+               baseline="the cut field's own grids"))],
+    Figure("collision_distance_gain", "ratio", "error of cells with the nearest voxel over that of the distance field",
+           "collision", (">=", 1.0)),
+    Figure("collision_cells_memory", "ratio", "memory of the cells over that of the distance field's samples", "collision"),
     # Bones from real images, burred in frames of 33 cuts.
     *[figure for name, what in (("temporal", "a temporal bone at its own 0.096 mm"),
                                 ("skull", "a skull, cuts at a quarter of its pitch")) for figure in (
