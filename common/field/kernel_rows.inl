@@ -245,6 +245,49 @@ struct LeafPlaces {
   float x[kLeafSize], y[kLeafSize], z[kLeafSize];
 };
 
+// Half of the way between the outermost samples of a bar of two rows (1 x 2 x 8 samples), in pitches.
+constexpr float kBarRadius = 3.5356f;
+constexpr int kBars = kLeafVoxels / (2 * kLeafSize);
+
+// What a bar is spared by: its distance at the middle is known, and it can change by no more than `radius` within.
+struct Spare {
+  float radius, enough, band;
+};
+
+// Evaluates bars of two rows. `middle` is the same distance, exact also where `distance` spares itself a search.
+template <class Distance, class Middle>
+OSTEON_INLINE void each_bar(const LeafPlaces& at, bool first, const Spare& spare, float* distances, Distance distance, Middle middle) {
+  float middles_mm[kBars];
+  const Row mz = splat(0.5f * (at.z[3] + at.z[4]));
+  for (int bar = 0; bar < kBars; bar += kLanes) {
+    float x[kLanes], y[kLanes];
+    for (int lane = 0; lane < kLanes; ++lane) {
+      x[lane] = at.x[(bar + lane) / 4];
+      y[lane] = 0.5f * (at.y[2 * ((bar + lane) % 4)] + at.y[2 * ((bar + lane) % 4) + 1]);
+    }
+    store(middles_mm + bar, middle(load(x), load(y), mz));
+  }
+  for (int bar = 0; bar < kBars; ++bar) {
+    float* out = distances + 2 * kLeafSize * bar;
+    const bool far = middles_mm[bar] - spare.radius >= spare.enough, deep = middles_mm[bar] + spare.radius <= -spare.band;
+    if (far && !first) continue;
+    if (far || deep) {
+      std::fill_n(out, 2 * kLeafSize, deep ? -spare.band : spare.band);
+      continue;
+    }
+    const Row px = splat(at.x[bar / 4]);
+    for (int i = 0; i < 2 * kLeafSize; i += kLanes) {
+      float py[kLanes], pz[kLanes];
+      for (int lane = 0; lane < kLanes; ++lane) {
+        py[lane] = at.y[2 * (bar % 4) + (i + lane) / kLeafSize];
+        pz[lane] = at.z[(i + lane) % kLeafSize];
+      }
+      const Row d = distance(px, load(py), load(pz));
+      store(out + i, first ? d : low(load(out + i), d));
+    }
+  }
+}
+
 template <class Distance>
 OSTEON_INLINE void each_row(const LeafPlaces& at, bool first, float* distances, Distance distance) {
   constexpr int kRowsAtOnce = kLanes >= kLeafSize ? kLanes / kLeafSize : 1;
@@ -291,19 +334,23 @@ Turned near_edges(const ToolSweep& s, const SweptTool::Body& body, const LeafPla
 }
 
 template <bool kDome>
-void turned_rows(const ToolSweep& s, const Turned& turned, const LeafPlaces& at, bool first, float enough, float band, float* distances) {
+void turned_rows(const ToolSweep& s, const Turned& turned, const LeafPlaces& at, bool first, const Spare& spare, float* distances) {
   if (s.kind == SweepKind::axial) {
-    each_row(at, first, distances, [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return axial_distance<kDome>(s, turned, x, y, z); });
+    const auto distance = [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return axial_distance<kDome>(s, turned, x, y, z); };
+    each_bar(at, first, spare, distances, distance, distance);
   } else if (s.kind == SweepKind::across) {
-    each_row(at, first, distances, [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return across_distance<kDome>(s, turned, x, y, z); });
+    const auto distance = [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return across_distance<kDome>(s, turned, x, y, z); };
+    each_bar(at, first, spare, distances, distance, distance);
   } else {
-    each_row(at, first, distances, [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA {
-      return oblique_distance<kDome>(s, turned, x, y, z, enough, band);
-    });
+    constexpr float kFar = 1e9f;
+    each_bar(at, first, spare, distances,
+             [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return oblique_distance<kDome>(s, turned, x, y, z, spare.enough, spare.band); },
+             [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return oblique_distance<kDome>(s, turned, x, y, z, kFar, kFar); });
   }
 }
 
-void hull_rows(const ToolSweep& s, const SweptTool::Body& body, const LeafPlaces& at, float radius, bool first, float* distances) {
+void hull_rows(const ToolSweep& s, const SweptTool::Body& body, const LeafPlaces& at, float radius, bool first, const Spare& spare,
+               float* distances) {
   // Planes that can be the highest somewhere in the leaf.
   const float px = 0.5f * (at.x[3] + at.x[4]), py = 0.5f * (at.y[3] + at.y[4]), pz = 0.5f * (at.z[3] + at.z[4]);
   const SweptPlane* planes = body.planes.data() + s.first;
@@ -316,7 +363,8 @@ void hull_rows(const ToolSweep& s, const SweptTool::Body& body, const LeafPlaces
   std::uint32_t count = 0;
   for (std::uint32_t i = 0; i < s.count; ++i)
     if (value[i] >= most - 2.0f * radius) kept[count++] = planes[i];
-  each_row(at, first, distances, [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return hull_distance(kept, count, x, y, z); });
+  const auto distance = [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return hull_distance(kept, count, x, y, z); };
+  each_bar(at, first, spare, distances, distance, distance);
 }
 
 void evaluate(const ToolSweep& s, const SweptTool::Body& body, Coord origin, double pitch, float radius, bool first, float enough,
@@ -327,19 +375,23 @@ void evaluate(const ToolSweep& s, const SweptTool::Body& body, Coord origin, dou
     at.y[i] = static_cast<float>((origin.y + i) * pitch - s.start_mm[1]);
     at.z[i] = static_cast<float>((origin.z + i) * pitch - s.start_mm[2]);
   }
+  // From a leaf's radius to a bar's: what is left of it is room for rounding and search.
+  const Spare spare{radius + (kBarRadius - 6.0621778f) * static_cast<float>(pitch), enough, band};
   if (s.kind == SweepKind::ball) {
-    // A copy: a compiler that knows that nothing written can be part of it keeps it in registers.
+    // A copy: a compiler that knows that nothing written can be part of it keeps it in registers. A ball's distance costs
+    // no more than sparing it.
     const ToolSweep ball = s;
     each_row(at, first, distances, [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return ball_distance(ball, x, y, z); });
   } else if (s.kind == SweepKind::hull) {
-    hull_rows(s, body, at, radius, first, distances);
+    hull_rows(s, body, at, radius, first, spare, distances);
   } else if (s.kind == SweepKind::sampled) {
-    each_row(at, first, distances, [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return sampled_distance(s, body, x, y, z); });
+    const auto distance = [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return sampled_distance(s, body, x, y, z); };
+    each_bar(at, first, spare, distances, distance, distance);
   } else {
     const ToolSweep copy = s;
     const Turned turned = near_edges(s, body, at, radius);
-    if (s.dome > 0.0f) turned_rows<true>(copy, turned, at, first, enough, band, distances);
-    else turned_rows<false>(copy, turned, at, first, enough, band, distances);
+    if (s.dome > 0.0f) turned_rows<true>(copy, turned, at, first, spare, distances);
+    else turned_rows<false>(copy, turned, at, first, spare, distances);
   }
 }
 
