@@ -198,7 +198,8 @@ void add_interface(const CutField& field, const SidesOf& all, int level, Coord o
         const std::uint8_t side = grown.side[g] ? grown.side[g] : near[g];
         if (side == (kPiece | kRest)) taken[i] = left[i] = 0;
         if (side == kPiece) taken[i] = none;
-        if (side == kRest) left[i] = none;
+        // Air beside neither: slivers thinner than the lattice may end there, and stay with the parent.
+        if (side == kRest || side == 0) left[i] = none;
       }
   add_leaves(field.body(), level, origin, taken, band, fragment.taken);
   add_leaves(field.body(), level, origin, left, band, fragment.left);
