@@ -182,7 +182,8 @@ Result<FieldLeaf> from_wire(const v1::FieldLeaf& leaf) {
   out.origin = from_wire(leaf.origin());
   if (floor_to(out.origin, kLeafSize) != out.origin) return bad("origin", "is not the first sample of a leaf");
   const std::size_t size = leaf.values().size();
-  if (size != 2 && size != std::size_t{2} * kLeafVoxels) return bad("values", "needs 1024 bytes or 2, this has " + std::to_string(size));
+  if (size != 2 && size != std::size_t{2} * kLeafVoxels)
+    return bad("values", "needs 1024 bytes or 2, this has " + std::to_string(size));
   const auto value = [&](std::size_t i) {
     const auto low = static_cast<std::uint8_t>(leaf.values()[2 * i]), high = static_cast<std::uint8_t>(leaf.values()[2 * i + 1]);
     return static_cast<std::int16_t>(low | high << 8);
@@ -231,7 +232,8 @@ v1::ToolDefinition to_wire(const Tool& tool) {
 Result<Tool> from_wire(const v1::ToolDefinition& tool) {
   Result<Tool> parsed = parse_tool(tool.yaml(), "the tool definition");
   if (!parsed) return bad("tool.yaml:", parsed.error().message);
-  if (!tool.tool_hash().empty() && tool.tool_hash() != to_wire(parsed->hash())) return bad("tool.tool_hash", "is not that of the definition");
+  if (!tool.tool_hash().empty() && tool.tool_hash() != to_wire(parsed->hash()))
+    return bad("tool.tool_hash", "is not that of the definition");
   return parsed;
 }
 

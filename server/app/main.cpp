@@ -91,7 +91,8 @@ Result<void> load_tools(const std::filesystem::path& folder, ToolBox& box) {
     const auto entries = box.entries();
     const auto same = std::find_if(entries.begin(), entries.end(), [&](const auto* e) { return e->tool.name == tool->name; });
     if (same != entries.end() && (*same)->hash != tool->hash())
-      return failure(ErrorCode::exists, file.string() + ": there is another tool of the name " + tool->name + "; give this one a name of its own");
+      return failure(ErrorCode::exists, file.string() + ": there is another tool of the name " + tool->name +
+                                            "; give this one a name of its own");
     const ToolBox::Entry& entry = box.add(*tool);
     log::info("tool", {{"name", entry.tool.name}, {"hash", to_hex(entry.hash)}, {"file", file.filename().string()}});
   }
@@ -107,7 +108,9 @@ Result<Room> make_room(const Options& options, const Case& bone) {
   if (!saved) return tl::unexpected(saved.error());
   Result<Room> room = Room::resume(bone, *saved, {}, tools);
   if (!room) return failure(room.error().code, options.resume_file.string() + ": " + room.error().message);
-  log::info("resumed", {{"file", options.resume_file.string()}, {"room_seq", saved->room_seq.value}, {"bodies", saved->bodies.size()}});
+  log::info("resumed", {{"file", options.resume_file.string()},
+                        {"room_seq", saved->room_seq.value},
+                        {"bodies", saved->bodies.size()}});
   return room;
 }
 

@@ -95,7 +95,8 @@ Digest Room::field_hash() const {
 std::vector<SceneItem> Room::items() const {
   std::vector<SceneItem> standing;
   for (const auto& [id, rows] : items_) {
-    const auto newest = std::find_if(rows.rbegin(), rows.rend(), [&](const ItemRow& row) { return !events_.at(row.place).undone; });
+    const auto newest =
+        std::find_if(rows.rbegin(), rows.rend(), [&](const ItemRow& row) { return !events_.at(row.place).undone; });
     if (newest != rows.rend() && newest->item && exists(newest->item->body)) standing.push_back(*newest->item);
   }
   return standing;
@@ -211,7 +212,8 @@ Result<RoomEvent> Room::undo(AuthorId by, std::span<const RoomSeq> places) {
   for (const RoomSeq place : places) {
     const auto found = events_.find(place);
     const auto is = [&](EventKind kind) { return found->second.kind == kind; };
-    if (found == events_.end() || !(is(EventKind::cut) || is(EventKind::split) || is(EventKind::remove_body) || is(EventKind::scene)))
+    if (found == events_.end() ||
+        !(is(EventKind::cut) || is(EventKind::split) || is(EventKind::remove_body) || is(EventKind::scene)))
       return refuse("event " + std::to_string(place.value) + " is none that can be undone");
     if (found->second.undone) return refuse("event " + std::to_string(place.value) + " is undone already");
   }
@@ -225,7 +227,8 @@ Result<RoomEvent> Room::undo_last(AuthorId by, std::size_t count, AuthorId of) {
   for (auto event = events_.rbegin(); event != events_.rend() && places.size() < count; ++event) {
     const Event& row = event->second;
     if (row.undone || (of && row.author != of)) continue;
-    if (row.kind == EventKind::cut || row.kind == EventKind::remove_body || row.kind == EventKind::scene) places.insert(event->first);
+    if (row.kind == EventKind::cut || row.kind == EventKind::remove_body || row.kind == EventKind::scene)
+      places.insert(event->first);
   }
   if (places.empty()) return failure(ErrorCode::unavailable, "there is nothing to undo");
   return take_back(by, with_what_falls_too(std::move(places)));
@@ -336,7 +339,8 @@ Result<RoomEvent> Room::split(BodyId parent, std::vector<Fragment> fragments, st
     std::ranges::move(fragment.taken, std::back_inserter(taken));
     if (fragment.debris()) continue;
     const double h = bone().pitch_mm();
-    row.pieces.push_back({BodyId{++next}, covering_samples(fragment.bounds.grown((kBandVoxels + 1) * h), h), united(std::move(fragment.left))});
+    const CoordBox reach = covering_samples(fragment.bounds.grown((kBandVoxels + 1) * h), h);
+    row.pieces.push_back({BodyId{++next}, reach, united(std::move(fragment.left))});
   }
   if (bodies().size() + row.pieces.size() > kMostBodies)
     return refuse("the room has " + std::to_string(kMostBodies) + " bodies and makes no more; take some away");
@@ -386,7 +390,8 @@ Result<RoomEvent> Room::set_item(AuthorId by, SceneItem item) {
   if (!exists(item.body)) return refuse("item.body: the room has no body " + std::to_string(item.body.value));
   if (!tools_->find(item.tool)) return refuse("item.tool_hash is of no tool that the room knows");
   if (item.id != 0 && !items_.contains(item.id)) return refuse("item.item: the room has no item " + std::to_string(item.id));
-  if (item.id == 0 && items_.size() >= kMostItems) return refuse("the scene has had " + std::to_string(kMostItems) + " items and takes no more");
+  if (item.id == 0 && items_.size() >= kMostItems)
+    return refuse("the scene has had " + std::to_string(kMostItems) + " items and takes no more");
   const Box room = bone().bounds().grown(limits_.beyond_bone_mm);
   const Vec3& at = item.pose_bone_item.position_mm;
   if (!((at.array() >= room.min_mm.array()).all() && (at.array() <= room.max_mm.array()).all()))

@@ -27,7 +27,24 @@ TEST(Script, ReadsEveryCommand) {
   EXPECT_FALSE(parsed<ShowTool>("tool off").on);
   EXPECT_EQ(parsed<SaveScreenshot>("screenshot  a picture.png ").file, "a picture.png");
   EXPECT_EQ(parsed<SaveStatus>("status now.json").file, "now.json");
+  EXPECT_EQ(parsed<WaitForBodies>("wait bodies 2").count, 2u);
+  EXPECT_EQ(parsed<WaitForItems>("wait items 0").count, 0u);
   parsed<Quit>("quit");
+}
+
+TEST(Script, ReadsWhatIsAskedOfTheRoom) {
+  const auto asked = [](std::string_view line) { return parsed<RoomRequest>(line); };
+  EXPECT_EQ(std::get<UndoLast>(asked("undo 3")).count, 3u);
+  EXPECT_EQ(std::get<RedoLast>(asked("redo 1")).count, 1u);
+  EXPECT_EQ(std::get<TakeAway>(asked("take-away 2")).body, BodyId{2});
+  EXPECT_EQ(std::get<SaveBone>(asked("save")).file_name, "");
+  EXPECT_EQ(std::get<SaveBone>(asked("save half way.vdb")).file_name, "half way.vdb");
+  const auto placed = std::get<PlaceTool>(asked("place guide-1 at 1 2 3 along 0 0 -2 on 4"));
+  EXPECT_EQ(placed.tool, "guide-1");
+  EXPECT_EQ(placed.body, BodyId{4});
+  EXPECT_EQ(placed.pose_bone_item.position_mm, Vec3(1, 2, 3));
+  EXPECT_LT((placed.pose_bone_item.rotation * Vec3::UnitZ() - Vec3(0, 0, -1)).norm(), 1e-12) << "+z is out of its tip";
+  EXPECT_EQ(std::get<PlaceTool>(asked("place pin-2 at 0 0 0 along 1 0 0")).body, BodyId{0});
 }
 
 TEST(Script, SkipsEmptyLinesAndComments) {
@@ -42,7 +59,10 @@ TEST(Script, SaysWhatItExpected) {
   for (const char* line :
        {"wait", "wait seq", "wait seq -1", "wait seq 1x", "look", "look tool 0", "look tool nan",
         "look at 1 2 3 from 1 2 3 up 0 0 1", "look at 0 0 0 from 0 0 5 up 0 0 1", "look at 0 0 0 from 0 0 5 up 0 0 0",
-        "tool", "tool maybe", "screenshot", "status ", "quit now", "dance"}) {
+        "tool", "tool maybe", "screenshot", "status ", "quit now", "dance", "wait bodies",
+        "wait items -1", "undo", "undo 0", "undo -1", "undo all", "redo", "redo 1 2", "take-away", "take-away x", "place",
+        "place pin-1 at 0 0 0", "place pin-1 at 0 0 0 along 0 0 0", "place pin-1 at 0 0 x along 0 0 1",
+        "place pin-1 at 0 0 0 along 0 0 1 on", "place pin-1 at 0 0 0 along 0 0 1 in 2"}) {
     const auto command = parse_command(line);
     ASSERT_FALSE(command) << line;
     EXPECT_EQ(command.error().code, ErrorCode::invalid_input);

@@ -1,0 +1,71 @@
+#include "server/net/room_rows.hpp"
+
+#include "common/wire/convert.hpp"
+
+namespace osteon {
+namespace {
+
+// Events that changed the bone in other ways than by cutting travel as leaves; a message holds about so much of them.
+constexpr std::size_t kChangeBytes = 128 * 1024;
+
+v1::BoneChangeKind wire_kind(EventKind kind) {
+  switch (kind) {
+    case EventKind::split: return v1::BONE_CHANGE_KIND_SPLIT;
+    case EventKind::undo: return v1::BONE_CHANGE_KIND_UNDO;
+    case EventKind::redo: return v1::BONE_CHANGE_KIND_REDO;
+    case EventKind::remove_body: return v1::BONE_CHANGE_KIND_REMOVE_BODY;
+    default: return v1::BONE_CHANGE_KIND_UNSPECIFIED;
+  }
+}
+
+}  // namespace
+
+Bytes block_message(const BlockKey& key, const StoredBlock& block) {
+  v1::WatchMeshResponse response;
+  v1::MeshBlock& out = *response.add_blocks();
+  out.set_body(key.body.value);
+  out.set_level(static_cast<std::uint32_t>(key.level));
+  *out.mutable_index() = wire::to_wire(key.index);
+  out.set_version(block.version);
+  out.set_payload(block.payload.bytes.data(), block.payload.bytes.size());
+  out.set_mesh_hash(wire::to_wire(block.mesh_hash));
+  return serialised(response);
+}
+
+Bytes tool_row(RoomSeq place, const Tool& tool) {
+  v1::SessionResponse response;
+  response.mutable_tool()->set_room_seq(place.value);
+  *response.mutable_tool()->mutable_tool() = wire::to_wire(tool);
+  return serialised(response);
+}
+
+Bytes scene_row(RoomSeq place, const std::vector<SceneItem>& items) {
+  v1::SessionResponse response;
+  response.mutable_scene()->set_room_seq(place.value);
+  for (const SceneItem& item : items) *response.mutable_scene()->add_items() = wire::to_wire(item);
+  return serialised(response);
+}
+
+MessageParts change_rows(const RoomEvent& event) {
+  MessageParts rows;
+  std::size_t next = 0;
+  do {
+    v1::SessionResponse response;
+    v1::BoneChange& change = *response.mutable_change();
+    change.set_room_seq(event.room_seq.value);
+    change.set_kind(wire_kind(event.kind));
+    change.set_author(event.author.value);
+    change.set_lease_epoch(event.lease_epoch);
+    for (const BodyId body : event.bodies) change.add_bodies(body.value);
+    for (std::size_t size = 0; next < event.leaves.size() && size < kChangeBytes; ++next) {
+      v1::FieldLeaf& leaf = *change.add_leaves();
+      leaf = wire::to_wire(event.leaves[next]);
+      size += leaf.values().size() + 24;
+    }
+    change.set_last(next == event.leaves.size());
+    rows.push_back(serialised(response));
+  } while (next < event.leaves.size());
+  return rows;
+}
+
+}  // namespace osteon
