@@ -1,5 +1,6 @@
 // A room with a real bone, burred for some seconds of frames of 33 cuts each: time of the cuts and of the blocks that
-// they made stale, and memory. Takes the case's folder and the number of frames, prints JSON.
+// they made stale, and memory. Takes the case's folder, the number of frames, and a file for the vertices that are then
+// there, from which a picture can be made: x, y, z, the normal, and 1 on cuts, as floats. Prints JSON.
 #include <malloc.h>
 #include <tbb/global_control.h>
 
@@ -7,6 +8,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <set>
 #include <vector>
 
 #include "common/core/check.hpp"
@@ -54,7 +56,22 @@ SurfacePoint point_on(const Room& room, const std::vector<BlockKey>& blocks, Ran
   }
 }
 
-int run(const char* folder, int frames) {
+bool write_vertices(const Room& room, const std::set<BlockKey>& blocks, const char* file) {
+  std::FILE* out = std::fopen(file, "wb");
+  if (!out) return false;
+  bool written = true;
+  for (const BlockKey& key : blocks) {
+    const Mesh mesh = mesh_of(room, key);
+    for (std::size_t i = 0; i < mesh.positions_mm.size(); ++i) {
+      const auto &p = mesh.positions_mm[i], &n = mesh.normals[i];
+      const float row[] = {p[0], p[1], p[2], n[0], n[1], n[2], static_cast<float>(mesh.cut_face[i])};
+      written = written && std::fwrite(row, sizeof row, 1, out) == 1;
+    }
+  }
+  return std::fclose(out) == 0 && written;
+}
+
+int run(const char* folder, int frames, const char* vertices) {
   const double empty = heap_bytes();
   auto loaded = Case::load(folder);
   if (!loaded) {
@@ -80,6 +97,7 @@ int run(const char* folder, int frames) {
   const double uncut = heap_bytes();
   std::vector<double> cut_us, frame_ms, stale;
   std::uint64_t seq = 0;
+  std::set<BlockKey> drawn(blocks.begin(), blocks.end());
   for (int frame = 0; frame < frames; ++frame) {
     const SurfacePoint at = point_on(room, blocks, random);
     // A stroke along the surface, pressed in by a quarter of the bur's radius, at 15 mm/s: 0.12 mm a cut.
@@ -100,6 +118,7 @@ int run(const char* folder, int frames) {
     for (const BlockKey& key : changed) (void)make_block(room.gather_block(key));
     frame_ms.push_back(ms_since(start));
     stale.push_back(static_cast<double>(changed.size()));
+    drawn.insert(changed.begin(), changed.end());
   }
   const Coord samples = room.bone().bounds_samples().dims();
   std::printf("{\"pitch_mm\": %.5f, \"cut_pitch_mm\": %.5f, \"samples\": [%d, %d, %d], \"bone_cm3\": %.2f, \"case_mb\": %.1f, "
@@ -110,6 +129,10 @@ int run(const char* folder, int frames) {
               whole_ms, triangles, frames, quantile(cut_us, 0.5), quantile(cut_us, 0.99), quantile(frame_ms, 0.5),
               quantile(frame_ms, 0), quantile(frame_ms, 1), quantile(stale, 0.5), room.field().removed_mm3(),
               (heap_bytes() - uncut) / 1e6);
+  if (vertices && !write_vertices(room, drawn, vertices)) {
+    std::fprintf(stderr, "osteon-real-case: cannot write %s\n", vertices);
+    return 1;
+  }
   return 0;
 }
 
@@ -123,5 +146,5 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "osteon-real-case: needs a case's folder and the number of frames\n");
     return 1;
   }
-  return osteon::test::run(argv[1], frames);
+  return osteon::test::run(argv[1], frames, argc > 3 ? argv[3] : nullptr);
 }

@@ -12,10 +12,15 @@ CUT_BUDGET_US = 200.0
 TOOL_BUDGET_US = 2000.0
 
 
+def plain_name(b):
+    """A benchmark's name without how it was run."""
+    return re.sub(r"/(iterations|repeats|min_time):[0-9.]+|/(manual_time|real_time)", "", b["name"])
+
+
 def benchmarks(run, pattern):
     """Google Benchmark's counters by name."""
     out = json.loads(run.output("osteon-bench", "--benchmark_format=json", f"--benchmark_filter={pattern}"))
-    return {b["name"].removesuffix("/iterations:1"): b for b in out["benchmarks"] if b.get("run_type") != "aggregate"}
+    return {plain_name(b): b for b in out["benchmarks"] if b.get("run_type") != "aggregate"}
 
 
 def spread(counters, name="ratio", threads=None):
@@ -31,8 +36,7 @@ def repeated(run, pattern, repetitions):
     runs = {}
     for b in out["benchmarks"]:
         if b.get("run_type") != "aggregate":
-            name = re.sub(r"/(iterations|repeats|min_time):[0-9.]+|/(manual_time|real_time)", "", b["name"])
-            runs.setdefault(name, []).append(b)
+            runs.setdefault(plain_name(b), []).append(b)
     return runs
 
 
@@ -271,9 +275,13 @@ def real_case(run, name, make_case):
         run.skip(f"real_{name}", reason)
         return {f"real_{name}_{what}": Measured(None) for what in names}
     run.say(f"burring {name}")
-    out = json.loads(run.output("osteon-real-case", case, 200 if run.soak else 60))
+    vertices, picture = run.folder / f"{name}.vertices", run.folder / f"{name}.png"
+    out = json.loads(run.output("osteon-real-case", case, 200 if run.soak else 60, vertices))
+    import pictures  # draws with matplotlib
+    pictures.burred_bone(vertices, out["pitch_mm"], picture)
+    vertices.unlink()
     run.tables.append((f"{name}: bone of {'x'.join(map(str, out['samples']))} samples at {out['pitch_mm']:.4g} mm, cut at "
-                       f"{out['cut_pitch_mm']:.4g} mm", [(key, value) for key, value in out.items()]))
+                       f"{out['cut_pitch_mm']:.4g} mm; picture: {picture}", [(key, value) for key, value in out.items()]))
     # A frame's whole work, cuts and blocks, beside the surface of the whole bone by the same mesher.
     return {
         f"real_{name}_frame": Measured(out["frame_ms_p50"], out["whole_ms"], out["frame_ms_min"], out["frame_ms_max"], 1),
