@@ -19,15 +19,16 @@ struct LabelVolume {
 };
 
 struct SmoothingParams {
-  int rounds = 8;        // of the filter [1 2 1]/4 along every axis
-  float least = 0.15f;   // how far each voxel's value stays on its own side
+  int rounds = 8;        // each blurs with [1 2 1]/4 along every axis, and takes most of the shrinking back
+  float least = 0.05f;   // how far each voxel's value stays on its own side
 };
 
-// A field whose zero is the bone's surface: 1 deep in bone, -1 far from it, of the labels' box.
-// Steps of binary voxels are taken out by diffusion that leaves every voxel on its side of zero, so that thin walls and
-// small cells stay and the volume hardly moves; this minimises the field's roughness under that bound (compare
-// Whitaker, Reducing aliasing artifacts in iso-surfaces of binary volumes, IEEE Volume Visualization 2000). It fails
-// where the steps are farther apart than the filter reaches, about 4 voxels: such a terrace stays, as a gentle one.
+// A field whose zero is the bone's surface: about 1 deep in bone, -1 far from it, of the labels' box.
+// Steps of binary voxels are taken out by a low-pass filter without shrinkage, a blur u <- Bu followed by its counterpart
+// u <- u + μ(u - Bu) (Taubin, A signal processing approach to fair surface design, SIGGRAPH 1995, here for a field), and
+// every voxel is held on its side of zero, so that thin walls and small cells stay (compare Whitaker, Reducing aliasing
+// artifacts in iso-surfaces of binary volumes, IEEE Volume Visualization 2000). It fails where the steps are farther
+// apart than the filter reaches, some 8 voxels: such a terrace stays, with a rounded edge.
 // Error: cancelled.
 [[nodiscard]] Result<DenseVolume<float>> smooth_labels(const LabelVolume& volume, const SmoothingParams& params,
                                                        const KeepGoing& keep_going);

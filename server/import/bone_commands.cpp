@@ -1,11 +1,205 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 #include <memory>
 
-#include "common/volume/cut_field.hpp"
+#include "common/geometry/mesh_file.hpp"
+#include "common/runtime/files.hpp"
+#include "common/tools/tool_file.hpp"
+#include "common/tools/tool_surface.hpp"
+#include "common/volume/field_file.hpp"
+#include "server/import/bone_surface.hpp"
+#include "server/import/carving.hpp"
 #include "server/import/command.hpp"
 
 namespace osteon::import {
+namespace {
 
-void add_bone_commands(CLI::App&, std::vector<Command>&) {}
+namespace fs = std::filesystem;
+
+struct Arguments {
+  std::string bone, script, out, fields, surface, report, file, stl;
+  double cut_mm = 1.0;
+  std::uint32_t body = 0;
+};
+
+Result<void> check_mesh_name(const std::string& path) {
+  const fs::path ending = fs::path(path).extension();
+  if (ending != ".stl" && ending != ".ply" && ending != ".obj")
+    return failure(ErrorCode::invalid_input, path + " does not end in .stl, .ply or .obj");
+  return check_free(path);
+}
+
+Result<std::string> write_surface(const CutField& field, const std::string& file, const KeepGoing& keep_going) {
+  const auto mesh = bone_surface(field, keep_going);
+  if (!mesh) return tl::unexpected(mesh.error());
+  if (auto written = write_mesh(*mesh, file); !written) return tl::unexpected(written.error());
+  char text[320];
+  std::snprintf(text, sizeof text, "%s: %zu triangles, %zu open edges, %.3f cm3 within\n", file.c_str(), mesh->triangles.size(), open_edges(*mesh),
+                enclosed_mm3(*mesh) * 1e-3);
+  return std::string(text);
+}
+
+Result<std::string> run_surface(const Arguments& a, const StopSignal& stop) {
+  if (auto good = check_mesh_name(a.out); !good) return tl::unexpected(good.error());
+  auto bone = Case::load(a.bone);
+  if (!bone) return tl::unexpected(bone.error());
+  CutField field(*bone, BodyId{a.body});
+  if (!a.fields.empty()) {
+    const auto saved = load_fields(a.fields, *bone);
+    if (!saved) return tl::unexpected(saved.error());
+    if (std::ranges::find(saved->bodies, BodyId{a.body}) == saved->bodies.end())
+      return failure(ErrorCode::not_found, a.fields + " has no body " + std::to_string(a.body));
+    for (const FieldLeaf& leaf : saved->leaves)
+      if (leaf.body == BodyId{a.body}) field.restore(leaf);
+  }
+  Bar bar(stop, "meshing");
+  return write_surface(field, a.out, bar.stage(0.0, 1.0));
+}
+
+// Peak memory of this process, MB; zero where the system does not say.
+double peak_memory_mb() {
+  const auto status = read_file("/proc/self/status");
+  if (!status) return 0.0;
+  const std::size_t at = status->find("VmHWM:");
+  return at == std::string::npos ? 0.0 : std::strtod(status->c_str() + at + 6, nullptr) / 1024.0;
+}
+
+Result<std::string> run_carve(const Arguments& a, const StopSignal& stop) {
+  for (const std::string& file : {a.out, a.report})
+    if (!file.empty())
+      if (auto is_free = check_free(file); !is_free) return tl::unexpected(is_free.error());
+  if (!a.surface.empty())
+    if (auto good = check_mesh_name(a.surface); !good) return tl::unexpected(good.error());
+  const auto steps = read_carve_script(a.script);
+  if (!steps) return tl::unexpected(steps.error());
+  auto bone = Case::load(a.bone);
+  if (!bone) return tl::unexpected(bone.error());
+
+  Carving carving(std::move(*bone), a.cut_mm);
+  std::vector<StepReport> reports;
+  std::string text = heading();
+  {
+    Bar bar(stop, "carving");
+    for (std::size_t i = 0; i < steps->size(); ++i) {
+      const double count = static_cast<double>(steps->size());
+      const auto report = carving.run((*steps)[i], bar.stage(static_cast<double>(i) / count, static_cast<double>(i + 1) / count));
+      if (!report) return tl::unexpected(report.error());
+      reports.push_back(*report);
+      text += line(i + 1, *report);
+    }
+  }
+  if (stop.requested()) return tl::unexpected(stopped());
+  const SavedFields fields = carving.fields();
+  if (auto saved = save_fields(a.out, fields); !saved) return tl::unexpected(saved.error());
+  if (!a.report.empty())
+    if (auto written = write_file(a.report, to_json(reports, fields)); !written) return tl::unexpected(written.error());
+  double removed = 0;
+  for (const StepReport& report : reports) removed += report.removed_mm3;
+  char totals[320];
+  std::snprintf(totals, sizeof totals, "removed    %.2f mm3\nbodies     %zu\nmemory     %.0f MB at most\nhash       %s\n", removed, carving.bodies(), peak_memory_mb(),
+                to_hex(field_hash(fields.leaves, fields.pitch_mm)).c_str());
+  text += totals;
+  if (!a.surface.empty()) {
+    Bar bar(stop, "meshing");
+    const auto written = write_surface(carving.field(0), a.surface, bar.stage(0.0, 1.0));
+    if (!written) return tl::unexpected(written.error());
+    text += *written;
+  }
+  return text;
+}
+
+// What says a kind's size best, in words.
+std::string dimensions(const Tool& tool) {
+  std::string text;
+  for (const EditableField& field : editable_fields(tool.kind)) {
+    if (!field.name.ends_with("_mm") && !field.name.ends_with("_rpm")) continue;
+    double value = 0;
+    if (field.name == "diameter_mm") value = tool.diameter_mm;
+    else if (field.name == "cutting_length_mm") value = tool.cutting_length_mm;
+    else if (field.name == "width_mm") value = tool.width_mm;
+    else if (field.name == "thickness_mm") value = tool.thickness_mm;
+    else if (field.name == "set_mm") value = tool.set_mm;
+    else if (field.name == "bore_mm") value = tool.bore_mm;
+    else if (field.name == "stroke_mm") value = tool.stroke_mm;
+    else if (field.name == "spindle_rpm") value = tool.spindle_rpm;
+    else continue;
+    if (value == 0) continue;
+    char part[64];
+    const std::string unit = field.name.substr(field.name.rfind('_') + 1);
+    std::snprintf(part, sizeof part, "%s%s %.4g %s", text.empty() ? "" : ", ", field.name.substr(0, field.name.rfind('_')).c_str(), value, unit == "rpm" ? "/min" : "mm");
+    text += part;
+  }
+  std::ranges::replace(text, '_', ' ');
+  return text;
+}
+
+Result<std::string> run_tools(const Arguments& a) {
+  std::vector<Tool> tools(builtin_tools().begin(), builtin_tools().end());
+  if (!a.file.empty()) {
+    auto own = load_tool(a.file);
+    if (!own) return tl::unexpected(own.error());
+    tools = {std::move(*own)};
+  }
+  if (!a.stl.empty()) {
+    std::error_code error;
+    fs::create_directories(a.stl, error);
+    if (error) return failure(ErrorCode::internal, "cannot make the folder " + a.stl + ": " + error.message());
+    for (const Tool& tool : tools)
+      if (auto is_free = check_free((fs::path(a.stl) / (tool.name + ".stl")).string()); !is_free) return tl::unexpected(is_free.error());
+  }
+  std::string text;
+  for (const Tool& tool : tools) {
+    char line[400];
+    std::snprintf(line, sizeof line, "%-20s %-18s %-7s %.16s  %s\n", tool.name.c_str(), std::string(kind_name(tool.kind)).c_str(),
+                  tool.cuts() ? ("level " + std::to_string(tool.cut_level)).c_str() : "-", to_hex(tool.hash()).c_str(), dimensions(tool).c_str());
+    text += line;
+    if (a.stl.empty()) continue;
+    const TriangleMesh mesh = tool_surface(tool, 0.5);
+    if (auto written = write_stl(mesh, fs::path(a.stl) / (tool.name + ".stl")); !written) return tl::unexpected(written.error());
+  }
+  return text;
+}
+
+Result<std::string> run_hash(const Arguments& a) {
+  const auto saved = load_fields(a.fields);
+  if (!saved) return tl::unexpected(saved.error());
+  return to_hex(field_hash(saved->leaves, saved->pitch_mm)) + "\n";
+}
+
+}  // namespace
+
+void add_bone_commands(CLI::App& app, std::vector<Command>& commands) {
+  // Owners: the options that write into it and the command that reads it, both for as long as the program runs.
+  const auto shared = std::make_shared<Arguments>();
+  Arguments& a = *shared;
+
+  CLI::App* surface = app.add_subcommand("surface", "Write a bone's surface, cut or not, as a closed mesh");
+  surface->add_option("CASE_DIR", a.bone, "Folder of the case")->required();
+  surface->add_option("--out", a.out, "File to write: .stl, .ply or .obj")->required();
+  surface->add_option("--fields", a.fields, "What was cut from it: a file of carve, or of osteon-server --save");
+  surface->add_option("--body", a.body, "Which body of the fields: 0 is the bone, others are pieces sawn off")->capture_default_str();
+  commands.push_back({surface, [shared](const StopSignal& stop) { return run_surface(*shared, stop); }});
+
+  CLI::App* carve = app.add_subcommand("carve", "Cut a bone as a script says, and say what every step did and cost");
+  carve->add_option("CASE_DIR", a.bone, "Folder of the case")->required();
+  carve->add_option("SCRIPT", a.script, "YAML: steps: [{tool: burr-round-5, from: [x, y, z], to: [x, y, z], axis: [x, y, z]}]")->required();
+  carve->add_option("--out", a.out, "File of the cut fields, .vdb")->required();
+  carve->add_option("--surface", a.surface, "Also write what is left of the bone: .stl, .ply or .obj");
+  carve->add_option("--report", a.report, "Also write the steps' numbers as JSON");
+  carve->add_option("--cut", a.cut_mm, "Longest way of one cut, mm")->check(CLI::Range(0.01, 25.0))->capture_default_str();
+  commands.push_back({carve, [shared](const StopSignal& stop) { return run_carve(*shared, stop); }});
+
+  CLI::App* tools = app.add_subcommand("tools", "List the tool box: name, kind, level of its cuts, hash, dimensions");
+  tools->add_option("--file", a.file, "Of a tool file instead");
+  tools->add_option("--stl", a.stl, "Also write each tool as NAME.stl into this folder");
+  commands.push_back({tools, [shared](const StopSignal&) { return run_tools(*shared); }});
+
+  CLI::App* hash = app.add_subcommand("hash", "Print the hash of cut fields");
+  hash->add_option("FIELDS", a.fields, "File of carve, or of osteon-server --save")->required();
+  commands.push_back({hash, [shared](const StopSignal&) { return run_hash(*shared); }});
+}
 
 }  // namespace osteon::import

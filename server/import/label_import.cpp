@@ -51,6 +51,24 @@ void cap_at_volume(const imaging::LabelVolume& volume, double pitch_mm, DenseVol
       }
 }
 
+// Smoothing draws convex bone in by some hundredths of a voxel. Moves the whole surface back by one distance, so that the
+// volume is that of the labels again: dV = A δ, with A from the samples within half a pitch of the surface.
+void restore_volume(double labelled_mm3, double pitch_mm, DenseVolume<float>& surface_mm) {
+  constexpr double kMost = 0.15;  // voxels: more would be another bone
+  double inside = 0, near = 0;
+  for (const float s : surface_mm.values) {
+    const double voxels = static_cast<double>(s) / pitch_mm;
+    if (voxels > 0.5) continue;
+    inside += std::min(1.0, 0.5 - voxels);
+    near += voxels > -0.5 ? 1.0 : 0.0;
+  }
+  const double missing = labelled_mm3 / std::pow(pitch_mm, 3) - inside;
+  const auto out = static_cast<float>(pitch_mm * std::clamp(missing / std::max(1.0, near), -kMost, kMost));
+  const auto band = static_cast<float>(4.0 * pitch_mm);
+  for (float& s : surface_mm.values)
+    if (std::abs(s) < band) s = std::clamp(s - out, -band, band);
+}
+
 }  // namespace
 
 Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, const LabelOptions& options, const KeepGoing& keep_going) {
@@ -86,6 +104,8 @@ Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, c
   auto surface_mm = signed_distance_mm(*field, 0.0f, pitch_mm, part(keep_going, kResampleEnd, kSurfaceEnd));
   if (!surface_mm) return tl::unexpected(surface_mm.error());
   field->values = {};
+  cap_at_volume(volume, pitch_mm, *surface_mm);
+  restore_volume(labelled_mm3, pitch_mm, *surface_mm);
   cap_at_volume(volume, pitch_mm, *surface_mm);
 
   std::vector<float> densities{0.0f};

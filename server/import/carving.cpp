@@ -1,0 +1,209 @@
+#include "server/import/carving.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <set>
+
+#include "common/field/kernel.hpp"
+#include "common/surface/block_source.hpp"
+
+namespace osteon::import {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double kTurn_rad = 5.0 * std::numbers::pi / 180.0;  // of one cut
+
+double milliseconds_since(Clock::time_point begin) { return std::chrono::duration<double, std::milli>(Clock::now() - begin).count(); }
+
+double quantile(std::vector<double> values, double part) {
+  if (values.empty()) return 0.0;
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1) + 0.5);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+CutField piece_of(const CutField& parent, const Fragment& fragment, BodyId body) {
+  CutField piece(parent.bone(), body, parent.tools());
+  for (FieldLeaf leaf : parent.leaves()) {
+    leaf.body = body;
+    piece.restore(leaf);
+  }
+  for (const FieldLeaf& mask : fragment.left) piece.merge(mask);
+  return piece;
+}
+
+}  // namespace
+
+std::vector<Cut> cuts_of(const CarveStep& step, const Digest& tool, int level, double cut_mm) {
+  Cut cut;
+  cut.tool = tool;
+  cut.level = level;
+  cut.spindle_rpm = static_cast<std::uint32_t>(step.tool.spindle_rpm);
+  std::vector<Cut> cuts;
+  if (step.path.size() == 1) {
+    cut.path = {quantise(step.path.front())};
+    cuts.push_back(cut);
+  }
+  QuantisedPose last = quantise(step.path.front());
+  for (std::size_t i = 1; i < step.path.size(); ++i) {
+    const Pose &from = step.path[i - 1], &to = step.path[i];
+    const double way = (to.position_mm - from.position_mm).norm(), turn = from.rotation.angularDistance(to.rotation);
+    const int parts = std::max(1, static_cast<int>(std::ceil(std::max(way / cut_mm, turn / kTurn_rad) - 1e-9)));
+    for (int part = 1; part <= parts; ++part) {
+      const double t = static_cast<double>(part) / parts;
+      const QuantisedPose next = quantise({from.position_mm + t * (to.position_mm - from.position_mm), from.rotation.slerp(t, to.rotation)});
+      cut.path = {last, next};
+      cuts.push_back(cut);
+      last = next;
+    }
+  }
+  return cuts;
+}
+
+Carving::Carving(Case bone, double cut_mm)
+    : cut_mm_(cut_mm),
+      tools_(builtin_tool_box()),
+      bodies_([&] {
+        std::vector<CutField> only;
+        only.emplace_back(std::move(bone), BodyId{0}, tools_);
+        return only;
+      }()),
+      finder_(bodies_.front()),
+      surface_(BodyId{0}) {}
+
+Carving::~Carving() = default;
+
+Result<StepReport> Carving::run(const CarveStep& step, const KeepGoing& keep_going) {
+  StepReport report;
+  const ToolBox::Entry& tool = tools_->add(step.tool);
+  report.tool = step.tool.name;
+  report.level = std::min(step.level.value_or(step.tool.cut_level), finest_level(bodies_.front().bone().pitch_mm()));
+  const double before_mm3 = bodies_.front().removed_mm3();
+  const std::vector<Cut> cuts = cuts_of(step, tool.hash, report.level, cut_mm_);
+  std::vector<double> cut_ms, frame_ms;
+  std::set<Coord> changed;
+  for (std::size_t i = 0; i < cuts.size(); ++i) {
+    if (!keep_going(static_cast<double>(i) / static_cast<double>(cuts.size()))) return failure(ErrorCode::cancelled, "stopped while carving");
+    const auto begin = Clock::now();
+    const CutReport done = bodies_.front().apply(cuts[i]);
+    cut_ms.push_back(milliseconds_since(begin));
+    for (std::size_t b = 1; b < bodies_.size(); ++b) bodies_[b].apply(cuts[i]);
+    report.visited += done.visited;
+    report.computed += done.computed;
+    report.modified += done.modified;
+    mesh_changes(report.level, done.changed_leaves, i + 1 == cuts.size(), frame_ms);
+    changed.insert(done.changed_leaves.begin(), done.changed_leaves.end());
+  }
+  report.cuts = static_cast<int>(cuts.size());
+  cuts_ += cuts.size();
+  report.removed_mm3 = bodies_.front().removed_mm3() - before_mm3;
+  report.cut_ms_median = quantile(cut_ms, 0.5);
+  report.cut_ms_p99 = quantile(cut_ms, 0.99);
+  report.cut_ms_most = quantile(cut_ms, 1.0);
+  report.frame_ms_median = quantile(frame_ms, 0.5);
+  report.frame_ms_most = quantile(frame_ms, 1.0);
+
+  const auto begin = Clock::now();
+  finder_.touch(bodies_.front(), report.level, {changed.begin(), changed.end()});
+  part(report);
+  report.fragment_ms = milliseconds_since(begin);
+  report.field_mb = field_mb();
+  return report;
+}
+
+// The larger part stays body 0; each piece becomes a body of its own, and debris vanishes.
+void Carving::part(StepReport& report) {
+  CutField& bone = bodies_.front();
+  for (const Fragment& fragment : finder_.take_fragments(bone)) {
+    if (fragment.debris()) {
+      ++report.debris;
+    } else {
+      ++report.pieces;
+      report.pieces_mm3 += fragment.volume_mm3;
+      bodies_.push_back(piece_of(bodies_.front(), fragment, BodyId{static_cast<std::uint32_t>(bodies_.size())}));
+    }
+    std::map<int, std::vector<Coord>> leaves;
+    for (const FieldLeaf& mask : fragment.taken)
+      if (bodies_.front().merge(mask)) leaves[mask.level].push_back(mask.origin);
+    for (const auto& [level, origins] : leaves) {
+      finder_.touch(bodies_.front(), level, origins);
+      for (const BlockKey& key : surface_.touch(level, origins)) stale_.push_back(key);
+    }
+  }
+}
+
+// What a server does for its viewers after a frame's cuts: gathers the blocks that changed and makes their surface.
+void Carving::mesh_changes(int level, const std::vector<Coord>& leaves, bool last, std::vector<double>& frame_ms) {
+  for (const BlockKey& key : surface_.touch(level, leaves)) stale_.push_back(key);
+  if (++unmeshed_cuts_ < kCutsPerFrame && !last) return;
+  unmeshed_cuts_ = 0;
+  std::ranges::sort(stale_);
+  stale_.erase(std::ranges::unique(stale_).begin(), stale_.end());
+  const CutField& field = bodies_.front();
+  const auto begin = Clock::now();
+  BlockSamples gathered;
+  for (const BlockKey& key : stale_) {
+    gather_block(field, surface_, key, field.bone().pitch_mm(), gathered);
+    if (gathered.covered != kWhollyCovered) (void)encode_block(gathered);
+  }
+  if (!stale_.empty()) frame_ms.push_back(milliseconds_since(begin));
+  stale_.clear();
+}
+
+double Carving::field_mb() const {
+  std::size_t leaves = 0;
+  for (const CutField& body : bodies_) leaves += body.leaf_places().size();
+  return static_cast<double>(leaves) * kLeafVoxels * sizeof(float) / 1e6;
+}
+
+SavedFields Carving::fields() const {
+  SavedFields out;
+  const Case& bone = bodies_.front().bone();
+  out.case_hash = bone.hash();
+  out.kernel_version = kKernelVersion;
+  out.room_seq = RoomSeq{cuts_};
+  out.pitch_mm = bone.pitch_mm();
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    out.bodies.push_back(BodyId{static_cast<std::uint32_t>(b)});
+    std::vector<FieldLeaf> leaves = bodies_[b].leaves();
+    std::erase_if(leaves, [&](const FieldLeaf& leaf) {
+      const auto band = static_cast<std::int16_t>(band_quanta(level_pitch_mm(out.pitch_mm, leaf.level)));
+      return std::ranges::all_of(leaf.values, [&](std::int16_t v) { return v >= band; });
+    });
+    std::ranges::move(leaves, std::back_inserter(out.leaves));
+  }
+  return out;
+}
+
+std::string heading() {
+  return " step  tool                 level   cuts  removed mm3       visited      computed      modified   cut ms median/p99/max     frame ms  pieces  fields MB\n";
+}
+
+std::string line(std::size_t number, const StepReport& r) {
+  char text[320];
+  std::snprintf(text, sizeof text, "%5zu  %-20s %5d %6d %12.2f %13lld %13lld %13lld %8.3f/%6.3f/%6.3f %6.2f/%6.2f  %3d+%-3d %9.1f\n", number, r.tool.c_str(), r.level, r.cuts,
+                r.removed_mm3, static_cast<long long>(r.visited), static_cast<long long>(r.computed), static_cast<long long>(r.modified), r.cut_ms_median,
+                r.cut_ms_p99, r.cut_ms_most, r.frame_ms_median, r.frame_ms_most, r.pieces, r.debris, r.field_mb);
+  return text;
+}
+
+std::string to_json(const std::vector<StepReport>& steps, const SavedFields& fields) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const StepReport& r : steps)
+    list.push_back({{"tool", r.tool}, {"level", r.level}, {"cuts", r.cuts}, {"removed_mm3", r.removed_mm3},
+                    {"visited", r.visited}, {"computed", r.computed}, {"modified", r.modified},
+                    {"cut_ms", {{"median", r.cut_ms_median}, {"p99", r.cut_ms_p99}, {"max", r.cut_ms_most}}},
+                    {"frame_ms", {{"median", r.frame_ms_median}, {"max", r.frame_ms_most}}},
+                    {"fragment_ms", r.fragment_ms}, {"pieces", r.pieces}, {"pieces_mm3", r.pieces_mm3}, {"debris", r.debris},
+                    {"field_mb", r.field_mb}});
+  const nlohmann::json report{{"case", to_hex(fields.case_hash)}, {"field_hash", to_hex(field_hash(fields.leaves, fields.pitch_mm))},
+                              {"bodies", fields.bodies.size()}, {"steps", list}};
+  return report.dump(2) + "\n";
+}
+
+}  // namespace osteon::import

@@ -1,0 +1,68 @@
+// Cutting a case's bone offline, with the costs of every step.
+#pragma once
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/surface/surface_blocks.hpp"
+#include "common/volume/cut_field.hpp"
+#include "common/volume/field_file.hpp"
+#include "common/volume/fragments.hpp"
+#include "server/import/carve_script.hpp"
+
+namespace osteon::import {
+
+struct StepReport {
+  std::string tool;
+  int level = 0;
+  int cuts = 0;
+  double removed_mm3 = 0;                 // by cutting; pieces that came apart are not counted
+  std::int64_t visited = 0, computed = 0, modified = 0;  // samples, §5.4
+  double cut_ms_median = 0, cut_ms_p99 = 0, cut_ms_most = 0;
+  double frame_ms_median = 0, frame_ms_most = 0;  // of meshing the blocks that kCutsPerFrame cuts changed
+  double fragment_ms = 0;                 // of keeping the components and looking for pieces
+  int pieces = 0;                         // that came apart in this step, debris not counted
+  double pieces_mm3 = 0;
+  int debris = 0;
+  double field_mb = 0;                    // samples of all bodies' cut fields
+};
+
+// A frame of 30 Hz takes what a tool cuts at 1 kHz.
+inline constexpr int kCutsPerFrame = 33;
+
+class Carving {
+ public:
+  Carving(Case bone, double cut_mm);
+  ~Carving();
+
+  // A path is taken in cuts of at most `cut_mm` of the tip's way and 5 degrees. Error: cancelled.
+  Result<StepReport> run(const CarveStep& step, const KeepGoing& keep_going);
+  [[nodiscard]] SavedFields fields() const;
+  [[nodiscard]] const CutField& field(std::size_t body) const { return bodies_[body]; }
+  [[nodiscard]] std::size_t bodies() const { return bodies_.size(); }
+
+ private:
+  void mesh_changes(int level, const std::vector<Coord>& leaves, bool last, std::vector<double>& frame_ms);
+  void part(StepReport& report);
+  [[nodiscard]] double field_mb() const;
+
+  double cut_mm_;
+  std::shared_ptr<ToolBox> tools_;   // shared with the bodies' fields
+  std::vector<CutField> bodies_;     // 0: the bone; others: pieces that came apart
+  FragmentFinder finder_;
+  SurfaceBlocks surface_;
+  std::vector<BlockKey> stale_;
+  int unmeshed_cuts_ = 0;
+  std::uint64_t cuts_ = 0;
+};
+
+// The cuts of a path: each starts at the end of the one before.
+[[nodiscard]] std::vector<Cut> cuts_of(const CarveStep& step, const Digest& tool, int level, double cut_mm);
+
+[[nodiscard]] std::string heading();
+[[nodiscard]] std::string line(std::size_t number, const StepReport& report);
+[[nodiscard]] std::string to_json(const std::vector<StepReport>& steps, const SavedFields& fields);
+
+}  // namespace osteon::import
