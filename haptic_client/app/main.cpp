@@ -50,7 +50,7 @@ json step_summary(const ReadyStep& step, const StepResult& result, double remove
     out["axis"] = vector(step.site.axis);
     return out;
   }
-  const bool drill = step.plan.action == Action::drill;
+  const bool drill = step.feeds();
   constexpr const char* kHands[] = {"expert", "novice", "rig"};
   out["tool"] = step.plan.tool;
   out["hand"] = kHands[static_cast<int>(step.plan.hand)];

@@ -91,11 +91,22 @@ PlanStep read_step(const json& object) {
     step.entry = read_entry(object);
     return step;
   }
+  if (action == "screw") {
+    only(object, {"action", "tool", "spindle_rpm", "entry", "tremor_mm", "wear"});
+    step.action = Action::screw;
+    step.tool = text(object, "tool", "screw-1");
+    if (const Result<Tool> known = find_tool(step.tool); !known) throw Wrong("\"tool\": " + known.error().message);
+    step.spindle_rpm = number(object, "spindle_rpm", 0.0, 50.0, 600.0);
+    step.tremor_mm = number(object, "tremor_mm", 0.0, 0.0, 5.0);
+    step.wear = number(object, "wear", step.wear, 1.0, 5.0);
+    step.entry = read_entry(object);
+    return step;
+  }
   if (action != "drill" && action != "burr")
-    throw Wrong("\"action\" is \"" + action + "\"; choose \"drill\", \"burr\", \"place\" or \"wait\"");
+    throw Wrong("\"action\" is \"" + action + "\"; choose \"drill\", \"burr\", \"screw\", \"place\" or \"wait\"");
   const bool drill = action == "drill";
   only(object, {"action", "tool", "spindle_rpm", "hand", "feed_mm_per_s", "push_n", "entry", "beyond_mm", "window_mm",
-                "depth_mm", "sweep_mm_per_s", "wear", "guide", "tremor_mm", "to_mm"});
+                "depth_mm", "sweep_mm_per_s", "wear", "guide", "tremor_mm", "to_mm", "leave"});
   step.action = drill ? Action::drill : Action::burr;
   step.tool = text(object, "tool", drill ? "drill-3.2" : "burr-round-5");
   if (const Result<Tool> known = find_tool(step.tool); !known) throw Wrong("\"tool\": " + known.error().message);
@@ -123,6 +134,11 @@ PlanStep read_step(const json& object) {
   if (object.contains("guide")) {
     if (!object.at("guide").is_boolean() || !drill) throw Wrong("\"guide\" must be true or false, and belongs to a drill");
     step.through_guide = object.at("guide").get<bool>();
+  }
+  if (object.contains("leave")) {
+    if (!object.at("leave").is_boolean() || !drill || !object.contains("to_mm"))
+      throw Wrong("\"leave\" must be true or false, and belongs to a drill with a pin and \"to_mm\"");
+    step.leave = object.at("leave").get<bool>();
   }
   if (step.through_guide && object.contains("entry")) throw Wrong("\"entry\" and \"guide\" exclude each other: the guide says where");
   if (!step.through_guide) step.entry = read_entry(object);

@@ -1,4 +1,4 @@
-// The plan of a simulated surgeon as JSON: {"steps": [{"action": "drill" | "burr" | "place" | "wait", ...}]}.
+// The plan of a simulated surgeon as JSON: {"steps": [{"action": "drill" | "burr" | "screw" | "place" | "wait", ...}]}.
 #pragma once
 #include <filesystem>
 #include <vector>

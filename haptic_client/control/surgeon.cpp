@@ -110,8 +110,10 @@ bool is_guide(ToolKind kind) {
 Result<void> suits(const Tool& tool, Action action) {
   if (action == Action::place && !is_guide(tool.kind))
     return failure(ErrorCode::invalid_input, sentence(tool, "is not a guide; choose a drill sleeve or a cutting block"));
-  if (action == Action::drill && !feeds_along_axis(tool.kind))
+  if (action == Action::drill && (!feeds_along_axis(tool.kind) || tool.kind == ToolKind::screw))
     return failure(ErrorCode::invalid_input, sentence(tool, "cannot do this action; choose a drill, reamer or pin"));
+  if (action == Action::screw && tool.kind != ToolKind::screw)
+    return failure(ErrorCode::invalid_input, sentence(tool, "is not a screw; choose one"));
   if (action == Action::burr && tool.kind != ToolKind::round_burr)
     return failure(ErrorCode::invalid_input, sentence(tool, "cannot do this action; choose a round burr"));
   return {};
@@ -158,7 +160,7 @@ Result<ReadyStep> make_ready(const PlanStep& plan, const Case& bone, const ToolF
   if (plan.action == Action::place) {
     step.guide = static_cast<int>(ready.guides.size());
     ready.guides.push_back(stand(*tool, step.site, static_cast<std::uint32_t>(ready.guides.size() + 1)));
-    ready.guide_tools.push_back(*tool);
+    step.item = *tool;
     return step;
   }
   step.spindle_rpm = plan.spindle_rpm > 0.0 ? plan.spindle_rpm : tool->spindle_rpm;
@@ -170,7 +172,17 @@ Result<ReadyStep> make_ready(const PlanStep& plan, const Case& bone, const ToolF
     return step;
   }
   step.rotation = pose_along(Vec3::Zero(), step.site.axis).rotation;
-  const double deepest_mm = plan.to_mm > 0.0 ? plan.to_mm : plan.hand == HandKind::rig ? step.site.thickness_mm + plan.beyond_mm : 0.0;
+  step.item = *tool;
+  if (plan.action == Action::screw) {
+    // Turned by a driver that follows the thread, one pitch in a turn, until the head is on the bone.
+    step.plan.leave = true;
+    step.plan.hand = HandKind::rig;
+    step.plan.feed_mm_per_s = tool->thread_pitch_mm * step.spindle_rpm / 60.0;
+    step.plan.to_mm = tool->cutting_length_mm;
+  }
+  if (step.plan.leave && tool->kind != ToolKind::pin && tool->kind != ToolKind::screw)
+    return failure(ErrorCode::invalid_input, sentence(*tool, "cannot be left in the bone; choose a pin"));
+  const double deepest_mm = step.plan.to_mm > 0.0 ? step.plan.to_mm : plan.hand == HandKind::rig ? step.site.thickness_mm + plan.beyond_mm : 0.0;
   if (deepest_mm + guide_length_mm > tool->reach_mm())
     return failure(ErrorCode::invalid_input, plan.to_mm > 0.0 ? "to_mm is deeper than the tool is long; choose a smaller one"
                                                               : "the bone is thicker here than the drill is long; choose another entry");
@@ -193,7 +205,7 @@ Result<ReadyPlan> make_ready(const std::vector<PlanStep>& plan, const Case& bone
 }
 
 const char* name(Action action) {
-  constexpr const char* kNames[] = {"drill", "burr", "wait", "place"};
+  constexpr const char* kNames[] = {"drill", "burr", "wait", "place", "screw"};
   return kNames[static_cast<int>(action)];
 }
 
@@ -212,6 +224,7 @@ void LayerMeans::add(double force, double feed, double density) noexcept {
 }
 
 Surgeon::Surgeon(ReadyPlan plan) : plan_(std::move(plan)), results_(plan_.steps.size()) {
+  left_.reserve(plan_.steps.size());
   if (!plan_.steps.empty() && !plan_.steps[0].takes_tool()) phase_ = SurgeonPhase::wait;
 }
 
@@ -258,14 +271,14 @@ void Surgeon::observe(const ReadyStep& step, const LoopReport& report, double dt
 
   if (report.phase == CuttingPhase::cutting) {
     result.all.add(report.force_physical_n.norm(), report.feed_mm_per_s, report.density_g_cm3);
-    if (step.plan.action == Action::drill && report.engaged > 0.97 && (phase_ == SurgeonPhase::push || phase_ == SurgeonPhase::feed)) {
+    if (step.feeds() && report.engaged > 0.97 && (phase_ == SurgeonPhase::push || phase_ == SurgeonPhase::feed)) {
       LayerMeans& layer = report.density_g_cm3 < kCorticalDensity          ? result.medulla
                           : depth < 0.5 * step.site.thickness_mm ? result.near_cortex
                                                                  : result.far_cortex;
       layer.add(force_n, report.feed_mm_per_s, report.density_g_cm3);
     }
   }
-  if (step.plan.action != Action::drill) return;
+  if (!step.feeds()) return;
   // The cone has left the far surface where it was last engaged; from there on the tip only plunges.
   if (depth <= step.site.thickness_mm || phase_ == SurgeonPhase::retract) return;
   if (report.engaged > 0.0) {
@@ -294,14 +307,13 @@ void Surgeon::drill(const ReadyStep& step, const LoopReport& report, double dt_s
       }
       break;
     case SurgeonPhase::feed:
-      if (carry_to_depth(step, feed_end_mm(step), step.plan.feed_mm_per_s, dt_s)) enter(SurgeonPhase::retract);
-      if (to_mm > 0.0 && depth >= to_mm) enter(SurgeonPhase::retract);
+      if (carry_to_depth(step, feed_end_mm(step), step.plan.feed_mm_per_s, dt_s) || (to_mm > 0.0 && depth >= to_mm)) finish_feed(step, report);
       break;
     case SurgeonPhase::push:
       hand_.mode = HandMode::push;
       if (to_mm > 0.0 && depth >= to_mm) {
         target_depth_mm_ = depth;
-        enter(SurgeonPhase::retract);
+        finish_feed(step, report);
         break;
       }
       // The lips are in the far cortex and the resistance has gone: the bone gives way.
@@ -318,6 +330,20 @@ void Surgeon::drill(const ReadyStep& step, const LoopReport& report, double dt_s
       break;
     default: break;
   }
+}
+
+void Surgeon::finish_feed(const ReadyStep& step, const LoopReport& report) noexcept {
+  if (!step.plan.leave) {
+    enter(SurgeonPhase::retract);
+    return;
+  }
+  LeftItem item{step_, report.pose_bone_proxy, 0.0};
+  if (step.item.thread_pitch_mm > 0.0) {
+    item.turns = depth_mm(step, report.pose_bone_proxy.position_mm) / step.item.thread_pitch_mm;
+    item.pose_bone_item = item.pose_bone_item * Pose{Vec3::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(2.0 * std::numbers::pi * item.turns, Vec3::UnitZ()))};
+  }
+  left_.push_back(item);
+  enter(SurgeonPhase::lift);
 }
 
 void Surgeon::burr(const ReadyStep& step, const LoopReport&, double dt_s) noexcept {
@@ -347,7 +373,7 @@ void Surgeon::burr(const ReadyStep& step, const LoopReport&, double dt_s) noexce
 }
 
 bool Surgeon::work(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept {
-  const bool drills = step.plan.action == Action::drill;
+  const bool drills = step.feeds();
   const double above_mm = drills ? -kNear_mm : depth_mm(step, step.sweep_mm.front()) - kNear_mm;
   const Vec3 beside = drills ? Vec3(Vec3::Zero()) : Vec3(step.sweep_mm.front() - step.site.entry_mm);
   switch (phase_) {
@@ -405,7 +431,10 @@ SurgeonOrder Surgeon::act(const LoopReport& report, double dt_s) noexcept {
   time_s_ += dt_s;
   if (!step.takes_tool()) {
     phase_ = SurgeonPhase::wait;
-    if (step.guide >= 0) guides_placed_ = static_cast<std::size_t>(step.guide) + 1;
+    if (step.guide >= 0 && guides_placed_ <= static_cast<std::size_t>(step.guide)) {
+      guides_placed_ = static_cast<std::size_t>(step.guide) + 1;
+      left_.push_back({step_, plan_.guides[static_cast<std::size_t>(step.guide)].pose_bone_guide, 0.0});
+    }
     results_[step_].duration_s = in_phase_s_;
     results_[step_].completed = finished = in_phase_s_ >= step.plan.seconds;
   } else if (phase_ == SurgeonPhase::take_up) {

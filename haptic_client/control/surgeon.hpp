@@ -14,7 +14,7 @@
 
 namespace osteon::haptic {
 
-enum class Action : std::uint8_t { drill, burr, wait, place };
+enum class Action : std::uint8_t { drill, burr, wait, place, screw };
 [[nodiscard]] const char* name(Action action);
 enum class HandKind : std::uint8_t { expert, novice, rig };
 
@@ -36,6 +36,7 @@ struct PlanStep {
   double window_u_mm = 12, window_v_mm = 8, depth_mm = 2, sweep_mm_per_s = 15;  // burr
   double wear = 1;
   bool through_guide = false;         // drill: through the guide that was placed last, at its site unless an entry is given
+  bool leave = false;                 // drill: the pin stays where it is at the end; a screw always does
   double tremor_mm = 0;               // of the hand: how far it strays at most, across the axis
   PlanEntry entry;
   double seconds = 0;                 // wait, place
@@ -49,17 +50,18 @@ struct ReadyStep {
   double spindle_rpm = 0;
   double stand_off_mm = 0;            // where the tool is taken up, above the surface
   int guide = -1;                     // place: which of the plan's guides
+  Tool item;                          // definition of what the step leaves on the bone
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // of the tool, bone frame
   std::vector<Vec3> sweep_mm;         // places of the tip, burr
   double sweep_length_mm = 0;         // from the first to the last of them
-  [[nodiscard]] bool takes_tool() const { return plan.action == Action::drill || plan.action == Action::burr; }
+  [[nodiscard]] bool takes_tool() const { return plan.action != Action::wait && plan.action != Action::place; }
+  [[nodiscard]] bool feeds() const { return plan.action == Action::drill || plan.action == Action::screw; }
 };
 
 struct ReadyPlan {
   std::vector<ReadyStep> steps;
   std::vector<ToolModel> tools;
   std::vector<PlacedGuide> guides;    // in the order in which the steps place them
-  std::vector<Tool> guide_tools;      // their definitions
 };
 using ToolFinder = std::function<Result<Tool>(std::string_view name)>;
 // Error invalid_input or not_found: names the step, the field and the remedy.
@@ -85,6 +87,13 @@ struct LayerMeans {
   void add(double force, double feed, double density) noexcept;
 };
 
+// What a step has left on the bone.
+struct LeftItem {
+  std::size_t step = 0;
+  Pose pose_bone_item;
+  double turns = 0;  // of a screw, from where its tip was on the surface
+};
+
 struct StepResult {
   bool completed = false;      // false: the time ran out
   bool broke_through = false;
@@ -104,6 +113,8 @@ class Surgeon {
   SurgeonOrder act(const LoopReport& report, double dt_s) noexcept;
   [[nodiscard]] bool done() const noexcept { return step_ >= plan_.steps.size(); }
   [[nodiscard]] const ReadyPlan& plan() const { return plan_; }
+  // What the steps have left so far, in order. Entries stay as they are: another thread may read those that it was told of.
+  [[nodiscard]] const std::vector<LeftItem>& left() const noexcept { return left_; }
   // How many of the plan's guides stand on the bone now.
   [[nodiscard]] std::size_t guides_placed() const noexcept { return guides_placed_; }
   [[nodiscard]] const std::vector<StepResult>& results() const { return results_; }
@@ -122,6 +133,8 @@ class Surgeon {
   bool work(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept;
   // The phase has had its time: draws the tool out, or ends the step (true) where that too takes too long.
   bool give_up(const ReadyStep& step, const LoopReport& report) noexcept;
+  // The tool is as deep as it should be: it is drawn out, or stays.
+  void finish_feed(const ReadyStep& step, const LoopReport& report) noexcept;
   // The hand strays from where it means to be, and tilts the tool.
   void tremble(const ReadyStep& step, SurgeonOrder& order) const noexcept;
   void drill(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept;
@@ -129,6 +142,7 @@ class Surgeon {
 
   ReadyPlan plan_;
   std::vector<StepResult> results_;
+  std::vector<LeftItem> left_;  // room for one of every step
   std::size_t step_ = 0, guides_placed_ = 0;
   SurgeonPhase phase_ = SurgeonPhase::take_up;
   double in_phase_s_ = 0, time_s_ = 0;

@@ -48,7 +48,7 @@ double SweptOutline::distance_mm(const Vec3& p) const noexcept {
 
 bool feeds_along_axis(ToolKind kind) noexcept {
   return kind == ToolKind::drill || kind == ToolKind::end_drill || kind == ToolKind::cylinder_reamer ||
-         kind == ToolKind::sphere_reamer || kind == ToolKind::outside_reamer || kind == ToolKind::pin;
+         kind == ToolKind::sphere_reamer || kind == ToolKind::outside_reamer || kind == ToolKind::pin || kind == ToolKind::screw;
 }
 
 ToolModel::ToolModel(const Tool& definition, double pitch_mm, double wear)
@@ -60,6 +60,10 @@ ToolModel::ToolModel(const Tool& definition, double pitch_mm, double wear)
   constexpr int kActivePoints = 240;
   inset = 0.5 * fine_pitch_mm + kQuantum_mm;
   for (const SamplePoint& p : sample_points(tool, kActivePoints)) {
+    // A screw's thread presses into the wall of its hole, which is its core: it does not hold it back.
+    if (tool.kind == ToolKind::screw && p.position_mm.z() > -tool.cutting_length_mm &&
+        std::hypot(p.position_mm.x(), p.position_mm.y()) > 0.5 * tool.core_diameter_mm + kQuantum_mm)
+      continue;
     const ContactPoint point{p.position_mm, p.position_mm + inset * p.inward, -p.inward, p.area_mm2,
                              std::hypot(p.position_mm.x(), p.position_mm.y())};
     // A drill's flutes hold it in its hole but do not cut sideways, so only the point is active.
@@ -70,6 +74,7 @@ ToolModel::ToolModel(const Tool& definition, double pitch_mm, double wear)
   drilling.wear = milling.wear = wear;
   if (axial) {
     outline = outline_of(tool);
+    if (tool.kind == ToolKind::screw) drilling.diameter_mm = tool.core_diameter_mm;  // its thread is not part of the law
     drilling.point_angle_rad = tool.point_angle_rad > 0.0 ? tool.point_angle_rad : std::numbers::pi;  // else flat or round
   }
   spindle.full_rpm = tool.spindle_rpm;
