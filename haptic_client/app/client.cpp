@@ -14,6 +14,7 @@
 #include "common/runtime/latest_value.hpp"
 #include "common/runtime/log.hpp"
 #include "common/runtime/periodic.hpp"
+#include "haptic_client/control/guiding.hpp"
 #include "haptic_client/control/patch_builder.hpp"
 #include "haptic_client/control/replica.hpp"
 #include "haptic_client/control/room_watch.hpp"
@@ -165,7 +166,7 @@ class Client {
       if (!room_follows) ++outcome_.held_for_room_ticks;
       guides_.refresh();
       const SessionTick now = session_.tick(patches_.value(), link_ok && room_follows, periods, &guides_.value());
-      guides_placed_.store(session_.surgeon().guides_placed(), std::memory_order_relaxed);
+      items_left_.store(session_.surgeon().left().size(), std::memory_order_release);
 
       const std::int64_t woke_ns = ns(timer.woke());
       tick_times_[now.report.state_seq % kTickTimes].store(woke_ns, std::memory_order_relaxed);
@@ -343,7 +344,7 @@ class Client {
         log_.write(row, tool_name(row));
       }
       if (any && link_ok_) room_.send(state_of(row));
-      place_guides();
+      set_items();
       if (over) break;
       if (options_.status && any && Clock::now() >= next_status) {
         next_status += 1s;
@@ -353,13 +354,14 @@ class Client {
     }
   }
 
-  // What the plan has placed goes into the room's scene; from there it comes back and guides the tool.
-  void place_guides() {
-    const ReadyPlan& plan = session_.surgeon().plan();
-    for (; guides_set_ < guides_placed_ && link_ok_; ++guides_set_) {
+  // What the plan has left on the bone goes into the room's scene; guides come back from there and guide the tool.
+  void set_items() {
+    for (; items_set_ < items_left_ && link_ok_; ++items_set_) {
+      const LeftItem& left = session_.surgeon().left()[items_set_];
       SceneItem item;
-      item.tool = plan.guide_tools[guides_set_].hash();
-      item.pose_bone_item = plan.guides[guides_set_].pose_bone_guide;
+      item.tool = session_.surgeon().plan().steps[left.step].item.hash();
+      item.pose_bone_item = left.pose_bone_item;
+      item.turns = left.turns;
       if (const Result<std::uint32_t> set = room_.set_item(item); !set) give_up(set.error());
     }
   }
@@ -418,8 +420,8 @@ class Client {
   std::atomic<std::int64_t> heard_ns_{0};
   std::atomic<RoomHealth> room_health_{RoomHealth::follows};
   std::atomic<std::size_t> unconfirmed_{0};
-  std::atomic<std::size_t> guides_placed_{0};  // by the plan
-  std::size_t guides_set_ = 0;                 // in the room; reporter thread
+  std::atomic<std::size_t> items_left_{0};  // by the plan
+  std::size_t items_set_ = 0;               // in the room; reporter thread
   std::atomic<bool> link_ok_{true}, joined_{false}, touching_over_{false}, all_over_{false};
 
   // Haptic thread.
