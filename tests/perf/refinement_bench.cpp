@@ -55,7 +55,8 @@ void compare(const Case& bone, int level) {
   // Before anything is timed: code and pages that both share.
   {
     CutField warm(bone, {});
-    for (const Cut& cut : strokes(level)[0]) warm.apply(cut);
+    const auto sites = strokes(level);
+    for (const Cut& cut : sites[0]) warm.apply(cut);
   }
   std::vector<double> first[2], later[2];
   for (const auto& site : strokes(level))
