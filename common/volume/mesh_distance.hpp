@@ -16,8 +16,9 @@ inline constexpr double kMostMeshSamples = 32e6;  // of the lattice, two bytes e
 // are clipped.
 inline constexpr double kMeshBand_mm = 3.0;
 
-// Exact to the triangles at every sample of the band, rounded to kQuantum_mm. The mesh may turn either way, and its parts
-// may overlap; the solid is what cannot be reached from outside. Error: invalid_input, for one that is not closed, flat,
+// The distance to the triangles at every sample of the band, rounded to kQuantum_mm: exact near the surface, and within
+// some hundredths of a pitch at the end of the band, where a triangle beside the nearest may stand for it. The mesh may
+// turn either way, and its parts may overlap; the solid is what cannot be reached from outside. Error: invalid_input, for one that is not closed, flat,
 // or too large for the pitch.
 [[nodiscard]] Result<std::shared_ptr<const SampledDistance>> sampled_distance(const TriangleMesh& mesh, double pitch_mm);
 

@@ -50,6 +50,7 @@ std::vector<std::vector<Cut>> strokes(int level) {
 }
 
 void compare(const Case& bone, int level) {
+  const std::vector<std::vector<Cut>> sites = strokes(level);
   SubVolumeField whole(bone, level);
   CutField local(bone, {});
   // Before anything is timed: code and pages that both share.
@@ -59,7 +60,7 @@ void compare(const Case& bone, int level) {
     for (const Cut& cut : sites[0]) warm.apply(cut);
   }
   std::vector<double> first[2], later[2];
-  for (const auto& site : strokes(level))
+  for (const auto& site : sites)
     for (std::size_t i = 0; i < site.size(); ++i) {
       auto start = std::chrono::steady_clock::now();
       const bool new_bone = whole.apply(site[i]).resampled > 0;

@@ -69,7 +69,8 @@ TEST(MeshDistance, OfASphereIsTheDistanceToIt) {
         worst = std::max(worst, std::abs(stored - std::clamp(exact, -kMeshBand_mm, kMeshBand_mm)));
       }
   EXPECT_EQ(i, d.values.size());
-  EXPECT_LT(worst, chord + 0.5 * kQuantum_mm + 1e-4) << "chord " << chord;
+  // The triangle taken for the nearest may be one beside it.
+  EXPECT_LT(worst, chord + 0.5 * kQuantum_mm + 0.06 * pitch) << "chord " << chord;
   EXPECT_GE(d.box.max.x * pitch, centre.x() + radius + kMeshBand_mm - pitch);
 }
 
