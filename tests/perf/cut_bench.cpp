@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <vector>
 
@@ -273,8 +272,11 @@ void cut_with(benchmark::State& state, const Tool& tool) {
     visited = computed = modified = 0;
     const auto pose_at = [&](int i) {
       const double t = i * kCutSeconds, tilt = motion.tilt_rad_s * t;
-      // Begins with half of its tip in the bone.
-      return pose_along(Vec3(0, 0, -0.5) + t * motion.way_mm_s, {std::sin(tilt), 0.3 * std::sin(tilt), -std::cos(tilt)});
+      // Begins with half a millimetre of its tip in the bone. Tilted from one rotation, so that it does not spin: a blade
+      // that spins is another motion.
+      Pose pose = pose_along(Vec3(0, 0, -0.5) + t * motion.way_mm_s, {0, 0, -1});
+      pose.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(tilt, Vec3(0.3, 1.0, 0.0).normalized())) * pose.rotation;
+      return pose;
     };
     for (int i = 0; i < cuts; ++i) {
       Cut cut = straight_cut(tool, Vec3::Zero(), Vec3::Zero(), {0, 0, -1});

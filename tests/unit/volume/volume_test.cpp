@@ -192,6 +192,34 @@ TEST(CutField, UncutBoneKeepsItsDepthBesideACut) {
   EXPECT_NEAR(solid.back(), before, 1e-3);
 }
 
+// A large cut is shared out to threads and finds out at once what matters in each leaf; leaf by leaf it is neither. The
+// field and what is said of it must be the same, also where leaves became all removed.
+TEST(CutField, ALargeCutIsThatOfItsLeavesOneByOne) {
+  const Case bone = plain_block(40.0, 20.0, 0.5);
+  const Tool mill = *find_tool("burr-round-5");
+  Cut cut = straight_cut(mill, {-15, -3, -4}, {15, 4, -2}, {0, 0, -1});
+  cut.path.push_back(quantise(pose_along({-10, 10, -6}, {0.2, 0.1, -1})));
+  CutField at_once(bone, {}), one_by_one(bone, {});
+  const CutReport whole = at_once.apply(cut);
+  ASSERT_GT(whole.reached_leaves.size(), 500u);
+  EXPECT_EQ(whole.reached_leaves, one_by_one.reach(cut));
+  std::int64_t modified = 0;
+  std::vector<Coord> changed;
+  for (const Coord leaf : whole.reached_leaves) {
+    const CutReport part = one_by_one.apply_to(cut, std::span(&leaf, 1));
+    modified += part.modified;
+    changed.insert(changed.end(), part.changed_leaves.begin(), part.changed_leaves.end());
+  }
+  EXPECT_EQ(at_once.hash(), one_by_one.hash());
+  EXPECT_EQ(whole.modified, modified);
+  EXPECT_EQ(whole.changed_leaves, changed);
+  EXPECT_EQ(at_once.memory_bytes(), one_by_one.memory_bytes());
+  EXPECT_GT(at_once.memory_bytes(), 4u * kLeafVoxels * changed.size() / 2);
+  // Again it changes nothing.
+  EXPECT_EQ(at_once.apply(cut).modified, 0);
+  EXPECT_EQ(at_once.hash(), one_by_one.hash());
+}
+
 TEST(CutField, CountsVisitedComputedAndModifiedSamples) {
   CutField field(plain_block(16.0, 8.0, 0.5), {});
   const CutReport report = field.apply(some_cuts()[0]);
