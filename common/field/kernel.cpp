@@ -154,8 +154,8 @@ bool is_ring(const CutBody& body) {
 void add_edge(std::vector<OutlineEdge>& edges, double r0, double s0, double r1, double s1) {
   const double dr = r1 - r0, ds = s1 - s0, length = root(dr * dr + ds * ds);
   if (!(length > 0.0) || (r0 == 0.0 && r1 == 0.0)) return;  // what lies on the axis bounds nothing
-  edges.push_back({static_cast<float>(r0), static_cast<float>(s0), static_cast<float>(dr / length), static_cast<float>(ds / length),
-                   static_cast<float>(length)});
+  const auto f = [](double x) { return static_cast<float>(x); };
+  edges.push_back({f(r0), f(s0), f(dr / length), f(ds / length), f(length)});
 }
 
 // The outline when the body moves along its axis from `down` ≤ 0 to `up` ≥ 0: edges that face forwards move up, those
@@ -441,7 +441,8 @@ void SweptTool::add_hull(const CutBody& body, const double from[3], const double
   std::array<Plane, kMostHullPlanes> planes;
   const std::size_t count = body.planes.size();
   const auto add = [&](const double normal[3], double offset) {
-    planes_.push_back({static_cast<float>(normal[0]), static_cast<float>(normal[1]), static_cast<float>(normal[2]), static_cast<float>(offset)});
+    const auto f = [](double x) { return static_cast<float>(x); };
+    planes_.push_back({f(normal[0]), f(normal[1]), f(normal[2]), f(offset)});
   };
   for (std::size_t i = 0; i < count; ++i) {
     const HullPlane& plane = body.planes[i];

@@ -256,7 +256,8 @@ struct Spare {
 
 // Evaluates bars of two rows. `middle` is the same distance, exact also where `distance` spares itself a search.
 template <class Distance, class Middle>
-OSTEON_INLINE void each_bar(const LeafPlaces& at, bool first, const Spare& spare, float* distances, Distance distance, Middle middle) {
+OSTEON_INLINE void each_bar(const LeafPlaces& at, bool first, const Spare& spare, float* distances, Distance distance,
+                            Middle middle) {
   float middles_mm[kBars];
   const Row mz = splat(0.5f * (at.z[3] + at.z[4]));
   for (int bar = 0; bar < kBars; bar += kLanes) {
@@ -313,7 +314,8 @@ Turned near_edges(const ToolSweep& s, const SweptTool::Body& body, const LeafPla
   const float px = 0.5f * (at.x[3] + at.x[4]), py = 0.5f * (at.y[3] + at.y[4]), pz = 0.5f * (at.z[3] + at.z[4]);
   const auto along = [&](const float* a) { return (px * a[0] + py * a[1]) + pz * a[2]; };
   const float half = s.kind == SweepKind::axial ? 0.0f : 0.5f;
-  const float u = along(s.u) - half * s.across_mm, v = along(s.v), w = along(s.axis) - (s.kind == SweepKind::oblique ? 0.5f * s.along_mm : 0.0f);
+  const float risen = s.kind == SweepKind::oblique ? 0.5f * s.along_mm : 0.0f;
+  const float u = along(s.u) - half * s.across_mm, v = along(s.v), w = along(s.axis) - risen;
   const float r = std::sqrt(u * u + v * v);
   float distance[kMostOutlineEdges], least = 1e9f;
   const OutlineEdge* edges = body.edges.data() + s.first;
@@ -334,7 +336,8 @@ Turned near_edges(const ToolSweep& s, const SweptTool::Body& body, const LeafPla
 }
 
 template <bool kDome>
-void turned_rows(const ToolSweep& s, const Turned& turned, const LeafPlaces& at, bool first, const Spare& spare, float* distances) {
+void turned_rows(const ToolSweep& s, const Turned& turned, const LeafPlaces& at, bool first, const Spare& spare,
+                 float* distances) {
   if (s.kind == SweepKind::axial) {
     const auto distance = [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return axial_distance<kDome>(s, turned, x, y, z); };
     each_bar(at, first, spare, distances, distance, distance);
@@ -344,7 +347,9 @@ void turned_rows(const ToolSweep& s, const Turned& turned, const LeafPlaces& at,
   } else {
     constexpr float kFar = 1e9f;
     each_bar(at, first, spare, distances,
-             [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return oblique_distance<kDome>(s, turned, x, y, z, spare.enough, spare.band); },
+             [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA {
+               return oblique_distance<kDome>(s, turned, x, y, z, spare.enough, spare.band);
+             },
              [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return oblique_distance<kDome>(s, turned, x, y, z, kFar, kFar); });
   }
 }

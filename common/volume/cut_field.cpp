@@ -66,7 +66,8 @@ void interpolate(const CoordBox& coarse, std::span<const float> from, const Coor
   const auto fill_plane = [&](std::int32_t x, float* to) {
     for (std::size_t j = 0; j < ny; ++j) {
       const std::int32_t y = box.min.y + static_cast<std::int32_t>(j);
-      const float* a = lines.data() + (static_cast<std::size_t>(x - coarse.min.x) * cy + static_cast<std::size_t>((y >> shift) - coarse.min.y)) * nz;
+      const std::size_t line = static_cast<std::size_t>(x - coarse.min.x) * cy + static_cast<std::size_t>((y >> shift) - coarse.min.y);
+      const float* a = lines.data() + line * nz;
       lerp(a, a + nz, static_cast<float>(y & mask) * step, to + j * nz);
     }
   };
