@@ -30,7 +30,8 @@ tl::unexpected<Error> bad(const fs::path& file, const std::string& what) {
 }
 
 bool finite(const std::vector<Point>& corners) {
-  return std::ranges::all_of(corners, [](const Point& p) { return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]); });
+  return std::ranges::all_of(corners,
+                             [](const Point& p) { return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]); });
 }
 
 std::vector<Point> binary_corners(std::string_view bytes, std::size_t count) {
@@ -53,7 +54,9 @@ class Words {
     return text_.substr(from, to - from);
   }
   void skip_line() { at_ = std::min(text_.find('\n', at_), text_.size()); }
-  [[nodiscard]] std::size_t line() const { return 1 + static_cast<std::size_t>(std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at_), '\n')); }
+  [[nodiscard]] std::size_t line() const {
+    return 1 + static_cast<std::size_t>(std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at_), '\n'));
+  }
 
  private:
   std::string_view text_;
@@ -67,8 +70,10 @@ bool read_point(Words& words, Point& p) {
     if (word.starts_with('+')) word.remove_prefix(1);
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (word.empty() || end != word.data() + word.size()) return false;
-    if (error == std::errc::result_out_of_range) value = std::numeric_limits<float>::infinity();
-    else if (error != std::errc()) return false;
+    if (error == std::errc::result_out_of_range)
+      value = std::numeric_limits<float>::infinity();
+    else if (error != std::errc())
+      return false;
   }
   return true;
 }
@@ -83,7 +88,8 @@ Result<std::vector<Point>> ascii_corners(std::string_view text, const fs::path& 
   for (std::string_view word = words.next(); word != "endsolid"; word = words.next()) {
     if (word.empty()) return fault("ends without \"endsolid\"");
     Point normal;
-    if (word != "facet" || words.next() != "normal" || !read_point(words, normal)) return fault("should begin a facet with its normal");
+    if (word != "facet" || words.next() != "normal" || !read_point(words, normal))
+      return fault("should begin a facet with its normal");
     if (words.next() != "outer" || words.next() != "loop") return fault("should be \"outer loop\"");
     for (int k = 0; k < 3; ++k) {
       Point p;
@@ -101,7 +107,8 @@ TriangleMesh welded(std::vector<Point> corners) {
   std::vector<std::uint32_t> order(corners.size()), vertex(corners.size());
   std::iota(order.begin(), order.end(), 0u);
   // By place, then by first use: vertices keep the order of the file.
-  std::ranges::sort(order, [&](std::uint32_t a, std::uint32_t b) { return corners[a] != corners[b] ? corners[a] < corners[b] : a < b; });
+  std::ranges::sort(order,
+                    [&](std::uint32_t a, std::uint32_t b) { return corners[a] != corners[b] ? corners[a] < corners[b] : a < b; });
   std::vector<std::uint32_t> first(corners.size());
   for (std::size_t i = 0; i < order.size(); ++i)
     first[order[i]] = i > 0 && corners[order[i]] == corners[order[i - 1]] ? first[order[i - 1]] : order[i];
@@ -158,7 +165,8 @@ Result<void> write_whole(const fs::path& file, const std::string& bytes) {
 
 Result<TriangleMesh> read_stl(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
-  if (!stream || fs::is_directory(file)) return failure(ErrorCode::not_found, file.string() + " cannot be opened; give the path of an STL file");
+  if (!stream || fs::is_directory(file))
+    return failure(ErrorCode::not_found, file.string() + " cannot be opened; give the path of an STL file");
   const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
   if (stream.bad()) return failure(ErrorCode::unavailable, file.string() + " cannot be read; check its permissions");
   if (bytes.empty()) return bad(file, "is empty; export the mesh again");
@@ -248,7 +256,8 @@ Result<void> write_mesh(const TriangleMesh& mesh, const fs::path& file) {
   if (ending == ".stl") return write_stl(mesh, file);
   if (ending == ".ply") return write_ply(mesh, file);
   if (ending == ".obj") return write_obj(mesh, file);
-  return failure(ErrorCode::invalid_input, file.string() + " has an ending that no mesh is written in; choose .stl, .ply or .obj");
+  return failure(ErrorCode::invalid_input,
+                 file.string() + " has an ending that no mesh is written in; choose .stl, .ply or .obj");
 }
 
 }  // namespace osteon

@@ -102,7 +102,8 @@ std::vector<std::vector<Vec3>> face_polygons(const std::vector<HalfSpace>& faces
         const Vec3 p = (faces[i].offset_mm * jk + faces[j].offset_mm * faces[k].normal.cross(faces[i].normal) +
                         faces[k].offset_mm * faces[i].normal.cross(faces[j].normal)) /
                        volume;
-        if (std::ranges::any_of(faces, [&](const HalfSpace& f) { return f.normal.dot(p) > f.offset_mm + kSameCorner_mm; })) continue;
+        if (std::ranges::any_of(faces, [&](const HalfSpace& f) { return f.normal.dot(p) > f.offset_mm + kSameCorner_mm; }))
+          continue;
         for (const std::size_t face : {i, j, k}) add(polygons[face], p);
       }
   for (std::size_t i = 0; i < faces.size(); ++i) {

@@ -15,8 +15,7 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 
 // One ring of points at (r, z) whose normal into the tool is `inward` in the (radial, axial) plane.
-void add_ring(std::vector<SamplePoint>& points, double r, double z, Corner inward, double area, double spacing,
-              bool active) {
+void add_ring(std::vector<SamplePoint>& points, double r, double z, Corner inward, double area, double spacing, bool active) {
   const int count = std::max(3, static_cast<int>(std::ceil(2.0 * kPi * r / spacing)));
   // Successive rings are turned against each other, so that no straight seam is left unsampled.
   const double turn = 0.5 * static_cast<double>(points.size());
@@ -45,8 +44,7 @@ void add_sphere(std::vector<SamplePoint>& points, double radius, double shank_ra
     const double polar = kPi * (i + 0.5) / rings;  // from the tip
     const double r = radius * std::sin(polar), up = radius * std::cos(polar);
     if (up < 0.0 && r < shank_radius) continue;  // where the shank leaves the sphere
-    const double area = 2.0 * kPi * radius * radius *
-                        (std::cos(kPi * i / rings) - std::cos(kPi * (i + 1) / rings));
+    const double area = 2.0 * kPi * radius * radius * (std::cos(kPi * i / rings) - std::cos(kPi * (i + 1) / rings));
     add_ring(points, r, up - radius, {-std::sin(polar), -std::cos(polar)}, area, spacing, true);
   }
 }
@@ -111,7 +109,8 @@ std::vector<SamplePoint> sample_points(const Tool& tool, int count) {
   // Walls only block, so they are sampled more thinly than the face that cuts.
   const double spacing = std::sqrt(active_mm2 / static_cast<double>(points.size()));
   const auto passive = [&](const Vec3& p, const Vec3& outward) { return !active(p, outward); };
-  const auto walls = spread_points(solid, surface, passive, {.spacing_mm = std::max(2.0 * spacing, tool.shank_diameter_mm / 3.0)});
+  const auto walls =
+      spread_points(solid, surface, passive, {.spacing_mm = std::max(2.0 * spacing, tool.shank_diameter_mm / 3.0)});
   points.insert(points.end(), walls.begin(), walls.end());
   return points;
 }

@@ -66,7 +66,8 @@ class Neighbours {
   std::unordered_map<Coord, std::vector<std::uint32_t>, CoordHash> cells_;
 };
 
-std::vector<std::uint32_t> kept_at(const std::vector<Candidate>& candidates, const std::vector<std::uint32_t>& order, double radius_mm) {
+std::vector<std::uint32_t> kept_at(const std::vector<Candidate>& candidates, const std::vector<std::uint32_t>& order,
+                                   double radius_mm) {
   std::vector<std::uint32_t> kept;
   Neighbours near(candidates, radius_mm);
   for (const std::uint32_t index : order)
@@ -80,7 +81,8 @@ std::vector<std::uint32_t> kept_at(const std::vector<Candidate>& candidates, con
 }  // namespace
 
 std::vector<SamplePoint> spread_points(const Implicit& solid, const TriangleMesh& surface,
-                                       const std::function<bool(const Vec3& p, const Vec3& outward)>& belongs, const Spread& spread) {
+                                       const std::function<bool(const Vec3& p, const Vec3& outward)>& belongs,
+                                       const Spread& spread) {
   struct Piece {
     Vec3 a, ab, ac;
     double until_mm2;  // area of this piece and all before it
@@ -98,7 +100,8 @@ std::vector<SamplePoint> spread_points(const Implicit& solid, const TriangleMesh
   if (pieces.empty()) return {};
 
   // Of equal circles in the densest packing, each owns sqrt(3)/2 of its spacing squared.
-  const double wanted = spread.count > 0 ? spread.count : std::max(1.0, area / (0.5 * std::sqrt(3.0) * spread.spacing_mm * spread.spacing_mm));
+  const double wanted =
+      spread.count > 0 ? spread.count : std::max(1.0, area / (0.5 * std::sqrt(3.0) * spread.spacing_mm * spread.spacing_mm));
   const int number = std::min(kMostCandidates, kCandidatesPerPoint * static_cast<int>(std::ceil(std::min(wanted, 1e6))) + 64);
   std::vector<Candidate> candidates;
   std::size_t piece = 0;
@@ -111,7 +114,8 @@ std::vector<SamplePoint> spread_points(const Implicit& solid, const TriangleMesh
       u = 1.0 - u;
       v = 1.0 - v;
     }
-    if (const auto candidate = settled(solid, pieces[piece].a + u * pieces[piece].ab + v * pieces[piece].ac)) candidates.push_back(*candidate);
+    if (const auto candidate = settled(solid, pieces[piece].a + u * pieces[piece].ab + v * pieces[piece].ac))
+      candidates.push_back(*candidate);
   }
   if (candidates.empty()) return {};
 

@@ -10,9 +10,7 @@ namespace {
 
 std::int32_t quanta(double mm) { return static_cast<std::int32_t>(std::lround(mm / kQuantum_mm)); }
 
-double tip_height_mm(const Tool& tool) {
-  return 0.5 * tool.diameter_mm / std::tan(0.5 * tool.point_angle_rad);
-}
+double tip_height_mm(const Tool& tool) { return 0.5 * tool.diameter_mm / std::tan(0.5 * tool.point_angle_rad); }
 
 // A solid of revolution's outline point: distance from the axis and place along it.
 struct Outline {
@@ -102,14 +100,19 @@ CutBody Tool::cut_body() const {
   const CutOutline outline = cut_outline(*this);
   body.kind = outline.kind;
   switch (outline.kind) {
-    case CutKind::none: break;
+    case CutKind::none:
+      break;
     case CutKind::ball:
       body.radius = quanta(outline.radius_mm);
       body.lowest = {-body.radius, -body.radius, -2 * body.radius};
       body.highest = {body.radius, body.radius, 0};
       break;
-    case CutKind::turned: make_turned(body, outline); break;
-    case CutKind::hull: make_hull(body, outline.planes); break;
+    case CutKind::turned:
+      make_turned(body, outline);
+      break;
+    case CutKind::hull:
+      make_hull(body, outline.planes);
+      break;
     case CutKind::sampled: {
       body.sampled = mesh;
       const CoordBox& box = mesh->box;
@@ -126,15 +129,16 @@ Digest Tool::hash() const {
   hasher.text(name);
   hasher.text(title);
   hasher.integer(static_cast<std::uint64_t>(kind));
-  for (const double value :
-       {diameter_mm, cutting_length_mm, point_angle_rad, shank_diameter_mm, shank_length_mm, width_mm, thickness_mm, set_mm, swing_rad,
-        stroke_mm, pivot_mm, taper_rad, corner_mm, bore_mm, thread_pitch_mm, core_diameter_mm, spindle_rpm, feed_mm_per_rev})
+  for (const double value : {diameter_mm, cutting_length_mm, point_angle_rad, shank_diameter_mm, shank_length_mm, width_mm,
+                             thickness_mm, set_mm, swing_rad, stroke_mm, pivot_mm, taper_rad, corner_mm, bore_mm, thread_pitch_mm,
+                             core_diameter_mm, spindle_rpm, feed_mm_per_rev})
     hasher.number(value);
   hasher.integer(static_cast<std::uint64_t>(teeth));
   hasher.integer(static_cast<std::uint64_t>(cut_level));
   hasher.integer(mesh ? mesh->values.size() : 0);
   if (mesh) {
-    for (const std::int32_t value : {mesh->box.min.x, mesh->box.min.y, mesh->box.min.z, mesh->box.max.x, mesh->box.max.y, mesh->box.max.z, mesh->pitch})
+    for (const std::int32_t value :
+         {mesh->box.min.x, mesh->box.min.y, mesh->box.min.z, mesh->box.max.x, mesh->box.max.y, mesh->box.max.z, mesh->pitch})
       hasher.integer(static_cast<std::uint32_t>(value));
     for (const std::int16_t value : mesh->values) hasher.integer(static_cast<std::uint16_t>(value));
   }
@@ -157,9 +161,8 @@ double signed_distance_mm(const Tool& tool, const Vec3& point_tool_mm) {
   if (tool.kind != ToolKind::drill && tool.kind != ToolKind::round_burr) return tool_solid(tool)(point_tool_mm);
   const Outline p{std::hypot(point_tool_mm.x(), point_tool_mm.y()), point_tool_mm.z()};
   const double shank = cylinder_distance(0.5 * tool.shank_diameter_mm, shank_start_mm(tool), -tool.reach_mm(), p);
-  const double cutting = tool.kind == ToolKind::drill
-                             ? drill_distance(tool, p)
-                             : std::hypot(p.r, p.z + 0.5 * tool.diameter_mm) - 0.5 * tool.diameter_mm;
+  const double cutting = tool.kind == ToolKind::drill ? drill_distance(tool, p)
+                                                      : std::hypot(p.r, p.z + 0.5 * tool.diameter_mm) - 0.5 * tool.diameter_mm;
   return std::min(cutting, shank);
 }
 

@@ -51,7 +51,8 @@ std::int64_t whole(const YAML::Node& node, const std::string& field, std::int64_
   const double value = number(node, field);
   if (value != std::floor(value)) throw Fault{"\"" + field + "\" is " + shortest(value) + "; write a whole number"};
   if (value < static_cast<double>(lowest) || value > static_cast<double>(highest))
-    throw Fault{"\"" + field + "\" is " + shortest(value) + "; choose it from " + std::to_string(lowest) + " to " + std::to_string(highest)};
+    throw Fault{"\"" + field + "\" is " + shortest(value) + "; choose it from " + std::to_string(lowest) + " to " +
+                std::to_string(highest)};
   return static_cast<std::int64_t>(value);
 }
 
@@ -84,9 +85,11 @@ std::shared_ptr<const SampledDistance> read_samples(const YAML::Node& node) {
   constexpr std::int64_t kFar = 1 << 20;
   const auto corner = [&](const char* field) {
     const YAML::Node list = node[field];
-    if (!list || !list.IsSequence() || list.size() != 3) throw Fault{std::string("\"samples: ") + field + "\" must be three whole numbers"};
+    if (!list || !list.IsSequence() || list.size() != 3)
+      throw Fault{std::string("\"samples: ") + field + "\" must be three whole numbers"};
     std::int32_t at[3];
-    for (std::size_t k = 0; k < 3; ++k) at[k] = static_cast<std::int32_t>(whole(list[k], std::string("samples: ") + field, -kFar, kFar));
+    for (std::size_t k = 0; k < 3; ++k)
+      at[k] = static_cast<std::int32_t>(whole(list[k], std::string("samples: ") + field, -kFar, kFar));
     return Coord{at[0], at[1], at[2]};
   };
   made->box = {corner("low"), corner("high")};
@@ -142,17 +145,20 @@ Tool read(const YAML::Node& root, const MeshLoader& load_mesh) {
       continue;
     }
     if (tool.kind == ToolKind::mesh && (field == "mesh" || field == "mesh_pitch_mm" || field == "samples")) {
-      if (field == "mesh") mesh_file = scalar(entry.second, field);
-      else if (field == "mesh_pitch_mm") mesh_pitch_mm = number(entry.second, field);
-      else tool.mesh = read_samples(entry.second);
+      if (field == "mesh")
+        mesh_file = scalar(entry.second, field);
+      else if (field == "mesh_pitch_mm")
+        mesh_pitch_mm = number(entry.second, field);
+      else
+        tool.mesh = read_samples(entry.second);
       continue;
     }
-    const auto rule = std::ranges::find_if(rules, [&](const FieldRule& r) {
-      return r.name == field || (r.name.ends_with("_rad") && in_degrees(r.name) == field);
-    });
+    const auto rule = std::ranges::find_if(
+        rules, [&](const FieldRule& r) { return r.name == field || (r.name.ends_with("_rad") && in_degrees(r.name) == field); });
     if (rule == rules.end()) {
       std::string names;
-      for (const FieldRule& r : rules) names += (names.empty() ? "" : ", ") + (r.name.ends_with("_rad") ? in_degrees(r.name) : std::string(r.name));
+      for (const FieldRule& r : rules)
+        names += (names.empty() ? "" : ", ") + (r.name.ends_with("_rad") ? in_degrees(r.name) : std::string(r.name));
       throw Fault{"\"" + field + "\" is not a field of a " + kind + "; remove it or choose one of name, title, kind, " + names +
                   (tool.cuts() ? ", cut_level" : "")};
     }
@@ -190,7 +196,8 @@ Result<Tool> parse_tool(std::string_view text, const std::string& file_name, con
     return failure(ErrorCode::invalid_input, file_name + ": " + fault.what);
   } catch (const YAML::Exception& error) {
     const std::string line = error.mark.is_null() ? std::string() : ", line " + std::to_string(error.mark.line + 1);
-    return failure(ErrorCode::invalid_input, file_name + line + ": this is not YAML (" + error.msg + "); write lines such as diameter_mm: 3.5");
+    return failure(ErrorCode::invalid_input,
+                   file_name + line + ": this is not YAML (" + error.msg + "); write lines such as diameter_mm: 3.5");
   }
 }
 
@@ -198,7 +205,8 @@ Result<Tool> load_tool(const std::filesystem::path& file, const MeshLoader& load
   std::error_code error;
   const auto size = std::filesystem::file_size(file, error);
   if (error) return failure(ErrorCode::not_found, "there is no tool file " + file.string() + "; give the path of a YAML file");
-  if (size > kLargestFile) return failure(ErrorCode::invalid_input, file.string() + " is too large for a tool file; use a coarser mesh_pitch_mm");
+  if (size > kLargestFile)
+    return failure(ErrorCode::invalid_input, file.string() + " is too large for a tool file; use a coarser mesh_pitch_mm");
   std::ifstream stream(file, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(stream), {}};
   if (!stream) return failure(ErrorCode::unavailable, file.string() + " cannot be read; check its permissions");
@@ -216,7 +224,8 @@ std::string to_yaml(const Tool& tool) {
     const double value = get_field(tool, rule);
     const bool angle = rule.name.ends_with("_rad");
     const auto degrees = angle ? exact_degrees(value) : std::nullopt;
-    out << YAML::Key << (degrees ? in_degrees(rule.name) : std::string(rule.name)) << YAML::Value << shortest(degrees ? *degrees : value);
+    out << YAML::Key << (degrees ? in_degrees(rule.name) : std::string(rule.name)) << YAML::Value
+        << shortest(degrees ? *degrees : value);
   }
   if (tool.cuts()) out << YAML::Key << "cut_level" << YAML::Value << tool.cut_level;
   if (tool.mesh) {

@@ -40,14 +40,17 @@ constexpr std::array<KindName, 19> kKinds{{
 enum class Need { required, optional };
 enum class Edit { no, yes };
 
-FieldRule length(std::string_view name, double Tool::*member, double lowest, double highest, Edit edit = Edit::no, Need need = Need::required) {
+FieldRule length(std::string_view name, double Tool::*member, double lowest, double highest, Edit edit = Edit::no,
+                 Need need = Need::required) {
   return {name, member, nullptr, lowest, highest, need == Need::required, edit == Edit::yes};
 }
 FieldRule angle(std::string_view name, double Tool::*member, double lowest_deg, double highest_deg) {
   return {name, member, nullptr, lowest_deg * kDegree, highest_deg * kDegree, true, false};
 }
 
-FieldRule diameter(double lowest, double highest) { return length("diameter_mm", &Tool::diameter_mm, lowest, highest, Edit::yes); }
+FieldRule diameter(double lowest, double highest) {
+  return length("diameter_mm", &Tool::diameter_mm, lowest, highest, Edit::yes);
+}
 FieldRule cutting_length(double lowest, double highest) {
   return length("cutting_length_mm", &Tool::cutting_length_mm, lowest, highest, Edit::yes);
 }
@@ -77,11 +80,13 @@ std::string shown_name(const FieldRule& rule) {
 
 bool good_name(const std::string& name) {
   return !name.empty() && name.size() <= 64 && name.front() != '-' && name.front() != '.' &&
-         std::ranges::all_of(name, [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-' || c == '.'; });
+         std::ranges::all_of(name,
+                             [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-' || c == '.'; });
 }
 
 std::string at_most(const char* field, double value, const std::string& what, double limit) {
-  return std::string("\"") + field + "\" is " + written(value) + " mm, wider than " + what + " of " + written(limit) + " mm; make it narrower";
+  return std::string("\"") + field + "\" is " + written(value) + " mm, wider than " + what + " of " + written(limit) +
+         " mm; make it narrower";
 }
 
 // How the fields fit together, each of them within its own limits.
@@ -96,54 +101,65 @@ std::optional<std::string> fit_fault(const Tool& t) {
     case ToolKind::outside_reamer:
       if (shank > radius) return at_most("shank_diameter_mm", t.shank_diameter_mm, "the cutting part", t.diameter_mm);
       break;
-    default: break;
+    default:
+      break;
   }
   switch (t.kind) {
     case ToolKind::drill:
     case ToolKind::pin:
       if (point_height_mm(t) > t.cutting_length_mm)
-        return "\"point_angle_deg\" makes a point of " + written(point_height_mm(t)) + " mm, longer than cutting_length_mm; make the angle wider";
+        return "\"point_angle_deg\" makes a point of " + written(point_height_mm(t)) +
+               " mm, longer than cutting_length_mm; make the angle wider";
       break;
     case ToolKind::barrel_burr: {
       const double half = 0.5 * t.cutting_length_mm;
       if (t.corner_mm < half)
-        return "\"corner_mm\" is " + written(t.corner_mm) + ", less than half the cutting length; make the bulge's radius at least " + written(half);
+        return "\"corner_mm\" is " + written(t.corner_mm) +
+               ", less than half the cutting length; make the bulge's radius at least " + written(half);
       const double end = radius - (t.corner_mm - std::sqrt(t.corner_mm * t.corner_mm - half * half));
       if (end < std::max(shank, kThinnest_mm))
-        return "\"shank_diameter_mm\" is " + written(t.shank_diameter_mm) + ", wider than the barrel's end of " + written(2.0 * end) +
-               " mm; make it narrower or corner_mm larger";
+        return "\"shank_diameter_mm\" is " + written(t.shank_diameter_mm) + ", wider than the barrel's end of " +
+               written(2.0 * end) + " mm; make it narrower or corner_mm larger";
       break;
     }
     case ToolKind::contoured_burr:
       if (shank > radius) return at_most("shank_diameter_mm", t.shank_diameter_mm, "the cutting part", t.diameter_mm);
       if (end_radius_mm(t) < 0.5 * kThinnest_mm)
-        return "\"taper_deg\" comes to a point before the tip; make it smaller, or diameter_mm larger, or cutting_length_mm shorter";
+        return "\"taper_deg\" comes to a point before the tip; make it smaller, or diameter_mm larger, or cutting_length_mm "
+               "shorter";
       if (end_radius_mm(t) * (1.0 - std::sin(t.taper_rad)) > t.cutting_length_mm)
-        return "\"cutting_length_mm\" is " + written(t.cutting_length_mm) + ", shorter than its rounded end; make it longer or diameter_mm smaller";
+        return "\"cutting_length_mm\" is " + written(t.cutting_length_mm) +
+               ", shorter than its rounded end; make it longer or diameter_mm smaller";
       break;
     case ToolKind::cylinder_reamer:
       if (t.corner_mm > radius - kThinnest_mm || t.corner_mm > t.cutting_length_mm)
-        return "\"corner_mm\" is " + written(t.corner_mm) + ", more than the reamer's end has room for; make it smaller than half of diameter_mm and than cutting_length_mm";
+        return "\"corner_mm\" is " + written(t.corner_mm) +
+               ", more than the reamer's end has room for; make it smaller than half of diameter_mm and than cutting_length_mm";
       break;
     case ToolKind::outside_reamer:
       if (t.bore_mm > t.diameter_mm - 2.0 * kThinnest_mm)
         return "\"bore_mm\" is " + written(t.bore_mm) + ", which leaves no wall inside diameter_mm; make it smaller";
       break;
     case ToolKind::oscillating_saw: {
-      if (t.pivot_mm < t.width_mm) return "\"pivot_mm\" is " + written(t.pivot_mm) + ", nearer than the blade is wide; make it larger than width_mm";
+      if (t.pivot_mm < t.width_mm)
+        return "\"pivot_mm\" is " + written(t.pivot_mm) + ", nearer than the blade is wide; make it larger than width_mm";
       if (t.cutting_length_mm < tooth_line_drop_mm(t) + kThinnest_mm)
-        return "\"cutting_length_mm\" is " + written(t.cutting_length_mm) + ", less than the bow of its tooth line; make it at least " +
+        return "\"cutting_length_mm\" is " + written(t.cutting_length_mm) +
+               ", less than the bow of its tooth line; make it at least " +
                written(std::ceil(10.0 * (tooth_line_drop_mm(t) + kThinnest_mm)) / 10.0);
       if (t.reach_mm() > t.pivot_mm + 1e-9)
-        return "\"pivot_mm\" is " + written(t.pivot_mm) + ", so the blade would reach behind its pivot; make cutting_length_mm and shank_length_mm shorter";
+        return "\"pivot_mm\" is " + written(t.pivot_mm) +
+               ", so the blade would reach behind its pivot; make cutting_length_mm and shank_length_mm shorter";
       break;
     }
     case ToolKind::broach:
     case ToolKind::trial_stem: {
       const double narrow = std::min(t.width_mm, t.thickness_mm) - 2.0 * t.cutting_length_mm * std::tan(t.taper_rad);
       if (narrow < 2.0 * kThinnest_mm)
-        return "\"taper_deg\" comes to an edge before the tip; make it smaller, or cutting_length_mm shorter, or width_mm and thickness_mm larger";
-      if (t.corner_mm > 0.9 * narrow) return "\"corner_mm\" is " + written(t.corner_mm) + ", more than the tip is wide; make it smaller";
+        return "\"taper_deg\" comes to an edge before the tip; make it smaller, or cutting_length_mm shorter, or width_mm and "
+               "thickness_mm larger";
+      if (t.corner_mm > 0.9 * narrow)
+        return "\"corner_mm\" is " + written(t.corner_mm) + ", more than the tip is wide; make it smaller";
       if (t.shank_diameter_mm > std::min(t.width_mm, t.thickness_mm))
         return at_most("shank_diameter_mm", t.shank_diameter_mm, "its upper end", std::min(t.width_mm, t.thickness_mm));
       break;
@@ -156,17 +172,21 @@ std::optional<std::string> fit_fault(const Tool& t) {
     case ToolKind::four_in_one_block: {
       // Pin holes lie in the ends; what is between them is for the slots.
       if (t.width_mm < 8.0 * t.diameter_mm)
-        return "\"diameter_mm\" is " + written(t.diameter_mm) + ", too wide for pin holes beside the slots; make it at most an eighth of width_mm";
+        return "\"diameter_mm\" is " + written(t.diameter_mm) +
+               ", too wide for pin holes beside the slots; make it at most an eighth of width_mm";
       if (t.thickness_mm < t.diameter_mm + 2.0 * kThinnest_mm)
-        return "\"diameter_mm\" is " + written(t.diameter_mm) + ", too wide for the block; make the pin holes smaller than thickness_mm";
+        return "\"diameter_mm\" is " + written(t.diameter_mm) +
+               ", too wide for the block; make the pin holes smaller than thickness_mm";
       const double share = t.kind == ToolKind::distal_block ? 0.5 : 0.1;
       if (t.bore_mm > share * t.thickness_mm)
-        return "\"bore_mm\" is " + written(t.bore_mm) + ", too high a slot for the block; make it at most " + written(share * t.thickness_mm);
+        return "\"bore_mm\" is " + written(t.bore_mm) + ", too high a slot for the block; make it at most " +
+               written(share * t.thickness_mm);
       break;
     }
     case ToolKind::screw:
       if (t.core_diameter_mm > t.diameter_mm - kThinnest_mm)
-        return "\"core_diameter_mm\" is " + written(t.core_diameter_mm) + ", which leaves no thread on diameter_mm; make it smaller";
+        return "\"core_diameter_mm\" is " + written(t.core_diameter_mm) +
+               ", which leaves no thread on diameter_mm; make it smaller";
       if (point_height_mm(t) * t.diameter_mm / t.core_diameter_mm > t.cutting_length_mm)
         return "\"point_angle_deg\" makes a point longer than cutting_length_mm; make the angle wider";
       break;
@@ -174,7 +194,8 @@ std::optional<std::string> fit_fault(const Tool& t) {
       if (t.thickness_mm > radius - kThinnest_mm)
         return "\"thickness_mm\" is " + written(t.thickness_mm) + ", thicker than the cup; make it less than half of diameter_mm";
       break;
-    default: break;
+    default:
+      break;
   }
   return std::nullopt;
 }
@@ -187,9 +208,15 @@ std::vector<FieldRule> field_rules(ToolKind kind) {
   std::vector<FieldRule> rules;
   const auto add = [&](const FieldRule& rule) { rules.push_back(rule); };
   const FieldRule point = angle("point_angle_rad", &Tool::point_angle_rad, 15, 175);
-  const auto width = [](double lowest, double highest) { return length("width_mm", &Tool::width_mm, lowest, highest, Edit::yes); };
-  const auto thickness = [](double lowest, double highest) { return length("thickness_mm", &Tool::thickness_mm, lowest, highest, Edit::yes); };
-  const auto corner = [](double highest) { return length("corner_mm", &Tool::corner_mm, 0.0, highest, Edit::no, Need::optional); };
+  const auto width = [](double lowest, double highest) {
+    return length("width_mm", &Tool::width_mm, lowest, highest, Edit::yes);
+  };
+  const auto thickness = [](double lowest, double highest) {
+    return length("thickness_mm", &Tool::thickness_mm, lowest, highest, Edit::yes);
+  };
+  const auto corner = [](double highest) {
+    return length("corner_mm", &Tool::corner_mm, 0.0, highest, Edit::no, Need::optional);
+  };
   switch (kind) {
     case ToolKind::drill:
       for (const auto& rule : {diameter(0.5, 25), cutting_length(2, 300), point}) add(rule);
@@ -288,7 +315,9 @@ std::vector<FieldRule> field_rules(ToolKind kind) {
       add(corner(20));
       add_shank(rules, 40);
       break;
-    case ToolKind::mesh: add_drive(rules, 1, 150000, 1000); break;
+    case ToolKind::mesh:
+      add_drive(rules, 1, 150000, 1000);
+      break;
   }
   return rules;
 }
@@ -299,8 +328,10 @@ double get_field(const Tool& tool, const FieldRule& rule) {
 
 void set_field(Tool& tool, const FieldRule& rule, double value) {
   // What does not fit into a count is found as a fault of its value: it becomes one below every limit.
-  if (rule.count != nullptr) tool.*rule.count = value == std::floor(value) && std::abs(value) < 1e6 ? static_cast<int>(value) : -1;
-  else tool.*rule.number = value + 0.0;  // no −0
+  if (rule.count != nullptr)
+    tool.*rule.count = value == std::floor(value) && std::abs(value) < 1e6 ? static_cast<int>(value) : -1;
+  else
+    tool.*rule.number = value + 0.0;  // no −0
 }
 
 void derive_fields(Tool& tool) {
@@ -310,7 +341,8 @@ void derive_fields(Tool& tool) {
     // The lattice holds the solid: its size is a bound of the solid's.
     const CoordBox& box = tool.mesh->box;
     const double pitch_mm = tool.mesh->pitch * kQuantum_mm;
-    tool.diameter_mm = 2.0 * pitch_mm * std::max({std::abs(box.min.x), std::abs(box.max.x), std::abs(box.min.y), std::abs(box.max.y)});
+    tool.diameter_mm =
+        2.0 * pitch_mm * std::max({std::abs(box.min.x), std::abs(box.max.x), std::abs(box.min.y), std::abs(box.max.y)});
     tool.cutting_length_mm = pitch_mm * std::max(0, -box.min.z);
   }
 }
@@ -323,20 +355,24 @@ std::string limits_sentence(const FieldRule& rule) {
 std::optional<std::string> value_fault(const FieldRule& rule, double value) {
   const double unit = is_angle(rule) ? kDegree : 1.0;
   if (!std::isfinite(value)) return "\"" + shown_name(rule) + "\" is not a number; choose it " + limits_sentence(rule);
-  if (rule.whole() && value != std::floor(value)) return "\"" + shown_name(rule) + "\" is " + written(value) + "; write a whole number";
+  if (rule.whole() && value != std::floor(value))
+    return "\"" + shown_name(rule) + "\" is " + written(value) + "; write a whole number";
   if (value < rule.lowest || value > rule.highest)
     return "\"" + shown_name(rule) + "\" is " + written(value / unit) + "; choose it " + limits_sentence(rule);
   return std::nullopt;
 }
 
 std::optional<std::string> tool_fault(const Tool& tool) {
-  if (std::ranges::find(kKinds, tool.kind, &KindName::kind) == kKinds.end()) return "its kind is unknown; use a newer version of this program";
+  if (std::ranges::find(kKinds, tool.kind, &KindName::kind) == kKinds.end())
+    return "its kind is unknown; use a newer version of this program";
   if (!good_name(tool.name))
     return "\"name\" is \"" + tool.name + "\"; use up to 64 lower-case letters, digits, '-' and '.', a letter or digit first";
-  if (tool.title.empty() || tool.title.size() > 200) return "\"title\" must have from 1 to 200 letters; write what people shall read";
+  if (tool.title.empty() || tool.title.size() > 200)
+    return "\"title\" must have from 1 to 200 letters; write what people shall read";
   for (const FieldRule& rule : field_rules(tool.kind))
     if (auto fault = value_fault(rule, get_field(tool, rule))) return fault;
-  if (tool.cut_level < 0 || tool.cut_level >= kLevels) return "\"cut_level\" is " + std::to_string(tool.cut_level) + "; choose 0, 1 or 2";
+  if (tool.cut_level < 0 || tool.cut_level >= kLevels)
+    return "\"cut_level\" is " + std::to_string(tool.cut_level) + "; choose 0, 1 or 2";
   if (tool.kind == ToolKind::mesh && !tool.mesh) return "\"mesh\" is missing; name the STL file of its solid";
   return fit_fault(tool);
 }

@@ -21,7 +21,8 @@ constexpr double kOver_mm = 1.0;
 double in_quanta(double mm) { return static_cast<double>(std::lround(mm / kQuantum_mm)) * kQuantum_mm; }
 
 bool bores(const Tool& tool) {
-  return tool.kind == ToolKind::drill || tool.kind == ToolKind::end_drill || tool.kind == ToolKind::pin || tool.kind == ToolKind::screw;
+  return tool.kind == ToolKind::drill || tool.kind == ToolKind::end_drill || tool.kind == ToolKind::pin ||
+         tool.kind == ToolKind::screw;
 }
 
 // What of a drill, pin or screw goes into bone: the thread of a screw runs round its core.
@@ -178,8 +179,10 @@ Implicit sampled_solid(std::shared_ptr<const SampledDistance> mesh) {
     double value = 0.0;
     for (int corner = 0; corner < 8; ++corner) {
       const int i = corner >> 2, j = (corner >> 1) & 1, k = corner & 1;
-      const auto index = (static_cast<std::size_t>(base[0] + i) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(base[1] + j)) *
-                             static_cast<std::size_t>(size[2]) + static_cast<std::size_t>(base[2] + k);
+      const auto index =
+          (static_cast<std::size_t>(base[0] + i) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(base[1] + j)) *
+              static_cast<std::size_t>(size[2]) +
+          static_cast<std::size_t>(base[2] + k);
       value += mesh->values[index] * kQuantum_mm * (i ? t[0] : 1.0 - t[0]) * (j ? t[1] : 1.0 - t[1]) * (k ? t[2] : 1.0 - t[2]);
     }
     return value + (p - nearest).norm();
@@ -232,13 +235,19 @@ CutOutline cut_outline(const Tool& tool) {
       outline.kind = CutKind::ball;
       outline.radius_mm = 0.5 * tool.diameter_mm;
       break;
-    case ToolKind::barrel_burr: outline.profile = barrel_outline(tool); break;
-    case ToolKind::contoured_burr: outline.profile = contoured_outline(tool); break;
+    case ToolKind::barrel_burr:
+      outline.profile = barrel_outline(tool);
+      break;
+    case ToolKind::contoured_burr:
+      outline.profile = contoured_outline(tool);
+      break;
     case ToolKind::sphere_reamer:
       outline.dome_mm = 0.5 * tool.diameter_mm;
       outline.profile = pointed(outline.dome_mm, 0.0, tool.cutting_length_mm);
       break;
-    case ToolKind::cylinder_reamer: outline.profile = canal_reamer_outline(tool); break;
+    case ToolKind::cylinder_reamer:
+      outline.profile = canal_reamer_outline(tool);
+      break;
     case ToolKind::outside_reamer: {
       const double inner = 0.5 * tool.bore_mm, outer = 0.5 * tool.diameter_mm, length = tool.cutting_length_mm;
       outline.profile = {{inner, 0}, {inner, -length}, {outer, -length}, {outer, 0}};
@@ -256,8 +265,12 @@ CutOutline cut_outline(const Tool& tool) {
       outline.kind = CutKind::hull;
       outline.planes = tapered_stem(tool);
       break;
-    case ToolKind::mesh: outline.kind = CutKind::sampled; break;
-    default: outline.kind = CutKind::none; break;
+    case ToolKind::mesh:
+      outline.kind = CutKind::sampled;
+      break;
+    default:
+      outline.kind = CutKind::none;
+      break;
   }
   return outline;
 }
@@ -272,12 +285,16 @@ Implicit cutting_part(const Tool& tool) {
   switch (tool.kind) {
     case ToolKind::drill:
     case ToolKind::end_drill:
-    case ToolKind::pin: return turned(pointed(half, point_height_mm(tool), length));
+    case ToolKind::pin:
+      return turned(pointed(half, point_height_mm(tool), length));
     case ToolKind::screw:
       return unite(turned(pointed(0.5 * tool.core_diameter_mm, point_height_mm(tool), length)), thread(tool));
-    case ToolKind::oscillating_saw: return convex(swung_blade(tool, 0.0, kerf_mm(tool)));
-    case ToolKind::reciprocating_saw: return convex(straight_blade(tool, 0.0, kerf_mm(tool)));
-    case ToolKind::drill_sleeve: return without_openings(tool, cylinder(half, -length, 0));
+    case ToolKind::oscillating_saw:
+      return convex(swung_blade(tool, 0.0, kerf_mm(tool)));
+    case ToolKind::reciprocating_saw:
+      return convex(straight_blade(tool, 0.0, kerf_mm(tool)));
+    case ToolKind::drill_sleeve:
+      return without_openings(tool, cylinder(half, -length, 0));
     case ToolKind::distal_block:
     case ToolKind::four_in_one_block: {
       const double x = 0.5 * tool.width_mm, y = 0.5 * tool.thickness_mm;
@@ -288,8 +305,10 @@ Implicit cutting_part(const Tool& tool) {
       const Implicit outside = intersect(ball(centre, half), cuboid({Vec3(-half, -half, -length), Vec3(half, half, 0)}));
       return subtract(outside, ball(centre, half - tool.thickness_mm));
     }
-    case ToolKind::trial_stem: return convex(tapered_stem(tool));
-    default: return cut_solid(tool);
+    case ToolKind::trial_stem:
+      return convex(tapered_stem(tool));
+    default:
+      return cut_solid(tool);
   }
 }
 
@@ -309,7 +328,8 @@ Implicit tool_solid(const Tool& tool) {
       Implicit plate = cylinder(0.5 * tool.diameter_mm, -length - tool.thickness_mm, -length);
       return unite(unite(std::move(part), std::move(plate)), shank(tool));
     }
-    default: return unite(std::move(part), shank(tool));
+    default:
+      return unite(std::move(part), shank(tool));
   }
 }
 

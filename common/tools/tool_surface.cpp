@@ -150,7 +150,8 @@ TriangleMesh surface_of(const Implicit& solid, double cell_mm) {
     const Vec3 low = grid.place(cell), high = grid.place(cell + Coord{1, 1, 1});
     Vec3 p = feature(points, normals).cwiseMax(low).cwiseMin(high);
     // On a curved face the planes meet beside the surface: once more onto it.
-    if (const double off = solid(p); std::abs(off) > 1e-4 * cell_mm) p = (p - off * gradient(solid, p)).cwiseMax(low).cwiseMin(high);
+    if (const double off = solid(p); std::abs(off) > 1e-4 * cell_mm)
+      p = (p - off * gradient(solid, p)).cwiseMax(low).cwiseMin(high);
     vertex_of.emplace(cell, static_cast<std::uint32_t>(mesh.positions_mm.size()));
     mesh.positions_mm.push_back({static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())});
   }
@@ -168,7 +169,9 @@ TriangleMesh surface_of(const Implicit& solid, double cell_mm) {
       }
       if (!grid.inside(cell)) std::swap(corner[1], corner[3]);
       // Along the shorter diagonal.
-      const auto length2 = [&](std::size_t a, std::size_t b) { return (position(mesh, corner[a]) - position(mesh, corner[b])).squaredNorm(); };
+      const auto length2 = [&](std::size_t a, std::size_t b) {
+        return (position(mesh, corner[a]) - position(mesh, corner[b])).squaredNorm();
+      };
       if (length2(0, 2) <= length2(1, 3)) {
         mesh.triangles.push_back({corner[0], corner[1], corner[2]});
         mesh.triangles.push_back({corner[0], corner[2], corner[3]});
@@ -191,12 +194,16 @@ double thinnest_cell_mm(const Tool& tool) {
   switch (tool.kind) {
     case ToolKind::oscillating_saw:
     case ToolKind::reciprocating_saw:
-    case ToolKind::trial_cup: at_least(tool.thickness_mm); break;
+    case ToolKind::trial_cup:
+      at_least(tool.thickness_mm);
+      break;
     case ToolKind::outside_reamer:
       at_least(0.5 * (tool.diameter_mm - tool.bore_mm));
       at_least(tool.thickness_mm);
       break;
-    case ToolKind::drill_sleeve: at_least(0.5 * (tool.diameter_mm - tool.bore_mm)); break;
+    case ToolKind::drill_sleeve:
+      at_least(0.5 * (tool.diameter_mm - tool.bore_mm));
+      break;
     case ToolKind::distal_block:
     case ToolKind::four_in_one_block:
       at_least(tool.bore_mm);
@@ -211,9 +218,14 @@ double thinnest_cell_mm(const Tool& tool) {
     case ToolKind::trial_stem:
       at_least(std::min(tool.width_mm, tool.thickness_mm) - 2.0 * tool.cutting_length_mm * std::tan(tool.taper_rad));
       break;
-    case ToolKind::contoured_burr: at_least(2.0 * end_radius_mm(tool)); break;
-    case ToolKind::mesh: at_least(2.0 * tool.mesh->pitch * kQuantum_mm); break;
-    default: break;
+    case ToolKind::contoured_burr:
+      at_least(2.0 * end_radius_mm(tool));
+      break;
+    case ToolKind::mesh:
+      at_least(2.0 * tool.mesh->pitch * kQuantum_mm);
+      break;
+    default:
+      break;
   }
   return 0.5 * thinnest;
 }

@@ -40,7 +40,8 @@ bool in_body(const CutBody& body, const Vec3& p) {
         if (n.dot(p) > plane.offset * kQuantum_mm) return false;
       }
       return true;
-    default: return false;
+    default:
+      return false;
   }
 }
 
@@ -127,7 +128,8 @@ TEST_P(EveryCutter, BodyKeepsTheRulesOfItsKind) {
   EXPECT_LE(body.profile.size(), kMostProfileCorners);
   EXPECT_LE(body.planes.size(), kMostHullPlanes);
   for (std::size_t i = 0; i < body.profile.size(); ++i) {
-    const ProfileCorner a = body.profile[i], b = body.profile[(i + 1) % body.profile.size()], c = body.profile[(i + 2) % body.profile.size()];
+    const ProfileCorner a = body.profile[i], b = body.profile[(i + 1) % body.profile.size()],
+                        c = body.profile[(i + 2) % body.profile.size()];
     EXPECT_GE(a.r, 0);
     // Turns to the left at every corner: convex and counter-clockwise.
     EXPECT_GT(static_cast<std::int64_t>(b.r - a.r) * (c.z - b.z) - static_cast<std::int64_t>(b.z - a.z) * (c.r - b.r), 0);
@@ -137,7 +139,8 @@ TEST_P(EveryCutter, BodyKeepsTheRulesOfItsKind) {
 
 INSTANTIATE_TEST_SUITE_P(Builtin, EveryCutter, testing::ValuesIn(cutters()), [](const auto& param) {
   std::string name = param.param.name;
-  std::ranges::replace_if(name, [](char c) { return !std::isalnum(c); }, '_');
+  std::ranges::replace_if(
+      name, [](char c) { return !std::isalnum(c); }, '_');
   return name;
 });
 
@@ -151,7 +154,8 @@ TEST(CutBody, AnOscillatingSawsBodyIsTheUnionOfItsStroke) {
       // Into the blade's own frame, about the pivot.
       const double x = std::cos(angle) * p.x() - std::sin(angle) * (p.z() + pivot);
       const double up = std::sin(angle) * p.x() + std::cos(angle) * (p.z() + pivot);
-      return std::abs(x) <= 0.5 * saw.width_mm + grown && std::hypot(x, up) <= pivot + grown && std::abs(p.y()) <= 0.5 * kerf + grown;
+      return std::abs(x) <= 0.5 * saw.width_mm + grown && std::hypot(x, up) <= pivot + grown &&
+             std::abs(p.y()) <= 0.5 * kerf + grown;
     };
     const auto in_stroke = [&](const Vec3& p, double grown) {
       constexpr int kAngles = 200;
@@ -166,7 +170,8 @@ TEST(CutBody, AnOscillatingSawsBodyIsTheUnionOfItsStroke) {
     const double tolerance = 0.010 + 2.0 * kQuantum_mm;
     int inside = 0;
     for (int i = 0; i < 20000; ++i) {
-      const Vec3 p(1.05 * reach * share(random), 0.55 * kerf * share(random), saw.cutting_length_mm * (0.53 * share(random) - 0.47));
+      const Vec3 p(1.05 * reach * share(random), 0.55 * kerf * share(random),
+                   saw.cutting_length_mm * (0.53 * share(random) - 0.47));
       if (p.z() < -saw.cutting_length_mm + tolerance) continue;
       if (in_stroke(p, -tolerance)) {
         ++inside;

@@ -136,11 +136,13 @@ TEST_P(EveryTool, BoxesHoldTheToolTightly) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Builtin, EveryTool, testing::ValuesIn(builtin_tools().begin(), builtin_tools().end()), [](const auto& param) {
-  std::string name = param.param.name;
-  std::ranges::replace_if(name, [](char c) { return !std::isalnum(c); }, '_');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(Builtin, EveryTool, testing::ValuesIn(builtin_tools().begin(), builtin_tools().end()),
+                         [](const auto& param) {
+                           std::string name = param.param.name;
+                           std::ranges::replace_if(
+                               name, [](char c) { return !std::isalnum(c); }, '_');
+                           return name;
+                         });
 
 }  // namespace
 }  // namespace osteon

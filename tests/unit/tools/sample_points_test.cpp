@@ -86,7 +86,8 @@ TEST(SamplePoints, StandForTheWholeCuttingFace) {
 
   const Tool burr = *find_tool("burr-round-5");
   double forward = 0.0;
-  for (const SamplePoint& point : sample_points(burr, 200)) forward += point.active ? point.area_mm2 * std::max(0.0, -point.inward.z()) : 0.0;
+  for (const SamplePoint& point : sample_points(burr, 200))
+    forward += point.active ? point.area_mm2 * std::max(0.0, -point.inward.z()) : 0.0;
   // Seen along the axis a sphere is a disc.
   EXPECT_NEAR(forward, kPi * 2.5 * 2.5, 0.02 * kPi * 2.5 * 2.5);
 

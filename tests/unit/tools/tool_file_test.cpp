@@ -20,8 +20,10 @@ std::string with(const std::string& text, const std::string& field, const std::s
   for (std::string old; std::getline(lines, old);) {
     const bool here = old.starts_with(field + ":");
     found = found || here;
-    if (!here) changed += old + "\n";
-    else if (!line.empty()) changed += line + "\n";
+    if (!here)
+      changed += old + "\n";
+    else if (!line.empty())
+      changed += line + "\n";
   }
   return found ? changed : changed + line + "\n";
 }
@@ -57,7 +59,9 @@ TEST(ToolFile, AMeshGoesAlongAsItsSamples) {
     EXPECT_EQ(pitch_mm, 0.5);
     return samples;
   };
-  const std::string text = "name: rasp\nkind: mesh\nmesh: rasp.stl\nmesh_pitch_mm: 0.5\nspindle_rpm: 60\nteeth: 10\nfeed_mm_per_rev: 1\ncut_level: 1\n";
+  const std::string text =
+      "name: rasp\nkind: mesh\nmesh: rasp.stl\nmesh_pitch_mm: 0.5\nspindle_rpm: 60\nteeth: 10\nfeed_mm_per_rev: 1\ncut_level: "
+      "1\n";
   const auto tool = parse_tool(text, "rasp.yaml", loader);
   ASSERT_TRUE(tool) << tool.error().message;
   EXPECT_EQ(tool->mesh, samples);
@@ -72,9 +76,12 @@ TEST(ToolFile, AMeshGoesAlongAsItsSamples) {
   EXPECT_EQ(*back->mesh, *samples);
 
   EXPECT_NE(parse_tool(text, "rasp.yaml").error().message.find("this program reads none"), std::string::npos);
-  EXPECT_NE(parse_tool(with(text, "mesh", "mesh: other.stl"), "rasp.yaml", loader).error().message.find("other.stl is not there"), std::string::npos);
+  EXPECT_NE(parse_tool(with(text, "mesh", "mesh: other.stl"), "rasp.yaml", loader).error().message.find("other.stl is not there"),
+            std::string::npos);
   EXPECT_NE(parse_tool(with(text, "mesh", ""), "rasp.yaml", loader).error().message.find("name the STL file"), std::string::npos);
-  EXPECT_NE(parse_tool(with(text, "mesh_pitch_mm", "mesh_pitch_mm: 50"), "rasp.yaml", loader).error().message.find("from 0.05 to 5"), std::string::npos);
+  EXPECT_NE(
+      parse_tool(with(text, "mesh_pitch_mm", "mesh_pitch_mm: 50"), "rasp.yaml", loader).error().message.find("from 0.05 to 5"),
+      std::string::npos);
 }
 
 TEST(ToolFile, EveryBadInputIsNamedWithFileFieldAndRemedy) {
@@ -107,14 +114,16 @@ TEST(ToolFile, EveryBadInputIsNamedWithFileFieldAndRemedy) {
       {with(drill, "swing_deg", "swing_deg: 5"), {"\"swing_deg\" is not a field of a drill"}},
       {with(drill, "point_angle_deg", "point_angle_deg: 5"), {"\"point_angle_deg\" is 5", "from 15 to 175"}},
       {with(drill, "point_angle_deg", "point_angle_deg: 118\npoint_angle_rad: 2"), {"there twice"}},
-      {with(drill, "shank_diameter_mm", "shank_diameter_mm: 8"), {"\"shank_diameter_mm\" is 8", "wider than the cutting part", "narrower"}},
+      {with(drill, "shank_diameter_mm", "shank_diameter_mm: 8"),
+       {"\"shank_diameter_mm\" is 8", "wider than the cutting part", "narrower"}},
       {with(drill, "teeth", "teeth: 2.5"), {"\"teeth\"", "from 1 to 8"}},
       {with(drill, "teeth", "teeth: 99999999999999"), {"\"teeth\""}},
       {with(drill, "spindle_rpm", "spindle_rpm: 1e9"), {"\"spindle_rpm\"", "from 1 to"}},
       {with(drill, "cut_level", ""), {"\"cut_level\" is missing", "choose 0"}},
       {with(drill, "cut_level", "cut_level: 3"), {"\"cut_level\" is 3", "from 0 to 2"}},
       {with(drill, "cut_level", "cut_level: 1.5"), {"\"cut_level\" is 1.5", "whole number"}},
-      {with(with(drill, "cutting_length_mm", "cutting_length_mm: 2"), "point_angle_deg", "point_angle_deg: 20"), {"\"point_angle_deg\"", "wider"}},
+      {with(with(drill, "cutting_length_mm", "cutting_length_mm: 2"), "point_angle_deg", "point_angle_deg: 20"),
+       {"\"point_angle_deg\"", "wider"}},
       {with(burr, "cutting_length_mm", "cutting_length_mm: 5"), {"\"cutting_length_mm\" is not a field of a round-burr"}},
       {with(burr, "mesh", "mesh: a.stl"), {"\"mesh\" is not a field of a round-burr"}},
       {with(burr, "shank_diameter_mm", "shank_diameter_mm: 5.1"), {"wider than the cutting part"}},
@@ -144,15 +153,17 @@ TEST(ToolFile, EveryBadInputIsNamedWithFileFieldAndRemedy) {
     ASSERT_FALSE(tool) << bad.text;
     EXPECT_EQ(tool.error().code, ErrorCode::invalid_input);
     EXPECT_TRUE(tool.error().message.starts_with("mine.yaml")) << tool.error().message;
-    for (const std::string& part : bad.says) EXPECT_NE(tool.error().message.find(part), std::string::npos) << tool.error().message;
+    for (const std::string& part : bad.says)
+      EXPECT_NE(tool.error().message.find(part), std::string::npos) << tool.error().message;
     EXPECT_EQ(tool.error().message.find('\n'), std::string::npos);
   }
 }
 
 TEST(ToolFile, AFileAddsAToolWithoutCode) {
   const test::TempDir folder;
-  std::ofstream(folder / "mine.yaml") << "name: drill-4.2\nkind: drill\ndiameter_mm: 4.2\ncutting_length_mm: 50\npoint_angle_deg: 90\n"
-                                         "shank_diameter_mm: 4\nshank_length_mm: 30\nspindle_rpm: 900\nteeth: 2\nfeed_mm_per_rev: 0.08\ncut_level: 1\n";
+  std::ofstream(folder / "mine.yaml")
+      << "name: drill-4.2\nkind: drill\ndiameter_mm: 4.2\ncutting_length_mm: 50\npoint_angle_deg: 90\n"
+         "shank_diameter_mm: 4\nshank_length_mm: 30\nspindle_rpm: 900\nteeth: 2\nfeed_mm_per_rev: 0.08\ncut_level: 1\n";
   const auto tool = load_tool(folder / "mine.yaml");
   ASSERT_TRUE(tool) << tool.error().message;
   EXPECT_EQ(tool->diameter_mm, 4.2);
@@ -188,7 +199,8 @@ TEST(Edited, ChangesWhatMayBeChangedAndChecksIt) {
   EXPECT_FALSE(edited(*find_tool("drill-3.2"), "diameter_mm", 2.0)) << "its shank would be wider";
   const auto unknown = edited(reamer, "colour", 1);
   ASSERT_FALSE(unknown);
-  EXPECT_NE(unknown.error().message.find("diameter_mm, spindle_rpm, teeth, feed_mm_per_rev"), std::string::npos) << unknown.error().message;
+  EXPECT_NE(unknown.error().message.find("diameter_mm, spindle_rpm, teeth, feed_mm_per_rev"), std::string::npos)
+      << unknown.error().message;
   EXPECT_FALSE(edited(reamer, "shank_length_mm", 100));
 }
 

@@ -68,11 +68,13 @@ TEST_P(ToolSurfaces, IsClosedTurnsOutwardsAndLiesOnTheTool) {
   EXPECT_LT((drawn.max_mm - box.max_mm).cwiseAbs().maxCoeff(), 0.71 * cell / std::min(1.0, slope));
 }
 
-INSTANTIATE_TEST_SUITE_P(Builtin, ToolSurfaces, testing::ValuesIn(builtin_tools().begin(), builtin_tools().end()), [](const auto& param) {
-  std::string name = param.param.name;
-  std::ranges::replace_if(name, [](char c) { return !std::isalnum(c); }, '_');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(Builtin, ToolSurfaces, testing::ValuesIn(builtin_tools().begin(), builtin_tools().end()),
+                         [](const auto& param) {
+                           std::string name = param.param.name;
+                           std::ranges::replace_if(
+                               name, [](char c) { return !std::isalnum(c); }, '_');
+                           return name;
+                         });
 
 TEST(ToolSurface, GoesOutAsStlAndComesBackClosed) {
   const test::TempDir folder;
