@@ -211,8 +211,10 @@ void Proxy::advance(const ToolModel& model, const Patch& patch, const Vec3& dire
       report.density_g_cm3 = now.density;
       if (!may_cut) break;
       const RevolutionsPerMinute speed{spindle_rpm};
-      const FeedLaw law = model.axial ? drilling_law(model.drilling, speed, GramsPerCm3{now.density}, report.engaged)
+      FeedLaw law = model.axial ? drilling_law(model.drilling, speed, GramsPerCm3{now.density}, report.engaged)
                                 : milling_law(model.milling, speed, now.milling, GramsPerCm3{now.density}, report.engaged);
+      // A screw's thread lets it advance by its pitch in a turn, no less for its heel and no more.
+      if (model.tool.kind == ToolKind::screw) law.max_feed_mm_per_s = model.tool.thread_pitch_mm * spindle_rpm / 60.0;
       const FeedSolution solution = solve_feed(law, stiffness_n_per_mm, extension_mm, left_s);
       if (!(solution.feed_mm_per_s > 0.0)) break;
       report.cutting = true;

@@ -94,6 +94,49 @@ TEST(SweptOutline, HasTheSignOfTheCut) {
   }
 }
 
+// A screw goes in by its pitch a turn, until its head is on the bone, and stays; so does a pin that is left.
+TEST(ScrewStep, FollowsItsThreadAndStays) {
+  PlanStep step;
+  step.action = Action::screw;
+  step.tool = "screw-1";
+  step.spindle_rpm = 240;
+  step.entry.point_mm = Vec3(0.1, -0.2, 0);
+  step.entry.axis = Vec3(0, 0, 1);
+  PlanStep pin;
+  pin.action = Action::drill;
+  pin.tool = "pin-1";
+  pin.leave = true;
+  pin.to_mm = 6;
+  pin.hand = HandKind::rig;
+  pin.feed_mm_per_s = 2;
+  pin.entry.point_mm = Vec3(6, 5, 0);
+  pin.entry.axis = Vec3(0, 0, 1);
+  const Tool screw = *find_tool("screw-1");
+  Bench bench(block_case(24.0), {step, pin});
+  double first_s = -1, last_s = -1, first_mm = 0, last_mm = 0, time_s = 0;
+  bench.run([&](const SessionTick& tick) {
+    time_s += 1e-3;
+    const double z = tick.report.pose_bone_proxy.position_mm.z();
+    if (tick.order.step != 0 || tick.order.phase != SurgeonPhase::feed || z < 10.0 || z > 20.0) return;
+    if (first_s < 0) first_s = time_s, first_mm = z;
+    last_s = time_s, last_mm = z;
+  });
+  ASSERT_TRUE(bench.session().done());
+  const std::vector<LeftItem>& left = bench.session().surgeon().left();
+  ASSERT_EQ(left.size(), 2u);
+  // 240 turns a minute of 1.25 mm each are 5 mm/s: never more, and a little less where the driver droops under its torque.
+  const double advance_mm_per_s = (last_mm - first_mm) / (last_s - first_s), thread_mm_per_s = screw.thread_pitch_mm * 4.0;
+  EXPECT_LE(advance_mm_per_s, thread_mm_per_s);
+  EXPECT_GT(advance_mm_per_s, 0.95 * thread_mm_per_s);
+  EXPECT_NEAR(left[0].pose_bone_item.position_mm.z(), screw.cutting_length_mm, 0.3);
+  EXPECT_NEAR(left[0].turns, left[0].pose_bone_item.position_mm.z() / screw.thread_pitch_mm, 1e-9);
+  EXPECT_NEAR((left[0].pose_bone_item.position_mm - Vec3(0.1, -0.2, 0)).head<2>().norm(), 0.0, 0.01);
+  EXPECT_EQ(left[1].step, 1u);
+  EXPECT_GE(left[1].pose_bone_item.position_mm.z(), 6.0);
+  std::printf("  screw: %.2f mm deep after %.2f turns; pin %.2f mm deep\n", left[0].pose_bone_item.position_mm.z(), left[0].turns,
+              left[1].pose_bone_item.position_mm.z());
+}
+
 TEST(Plan, RefusesWhatTheHandCannotGuideYet) {
   const Case bone = block_case();
   for (const char* name : {"saw-oscillating-1", "broach-1", "burr-barrel"}) {
