@@ -52,6 +52,7 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
   Stage stage(kWidth_mm, {"--tools", tools / "", "--save", kept / "bone.vdb"});
   ScriptedViewer viewer(stage.address(), *screen);
   ASSERT_TRUE(viewer.tell("wait surface"));
+  ASSERT_TRUE(viewer.tell("look at 0 0 0 from 60 -80 60 up 0 0 1"));
   const auto picture = [&](const std::string& name) {
     EXPECT_TRUE(viewer.tell("screenshot " + (stage / name).string()));
     return bytes_of(stage / name);
