@@ -28,6 +28,63 @@ def spread(counters, name="ratio", threads=None):
     return Measured(counters.get(name), None, counters.get(f"{name}_min"), counters.get(f"{name}_max"), threads)
 
 
+def repeated(run, pattern, repetitions):
+    """{name: [counters of each repetition]}, the benchmarks in random turns, so that what disturbs the machine for a while
+    disturbs all."""
+    out = json.loads(run.output("osteon-bench", "--benchmark_format=json", f"--benchmark_filter={pattern}",
+                                "--benchmark_min_time=0.1", f"--benchmark_repetitions={repetitions}",
+                                "--benchmark_enable_random_interleaving=true"))
+    runs = {}
+    for b in out["benchmarks"]:
+        if b.get("run_type") != "aggregate":
+            runs.setdefault(plain_name(b), []).append(b)
+    return runs
+
+
+def over(values, baseline=None, threads=None):
+    """The median of several, with the smallest and the largest."""
+    return Measured(float(np.median(values)), baseline, float(min(values)), float(max(values)), threads)
+
+
+def cutting(run):
+    run.say("cutting")
+    runs = repeated(run, "^cut_(burr|drill)/", 15 if run.soak else 7)
+    values = {}
+    for tool in ("burr", "drill"):
+        def times(name, key="real_time", tool=tool):
+            return np.array([b[key] for b in runs[f"cut_{tool}/{name}"]])
+        plain, near = times("world_box"), times("near_leaves")
+        values[f"cut_{tool}"] = over(times("hot/threads:1"), float(np.median(plain)), 1)
+        for suffix, threads in (("", 1), ("_2", 2)):
+            hot = times(f"hot/threads:{threads}")
+            values[f"cut_{tool}_speedup{suffix}"] = over(plain / hot, None, threads)
+            cold = times(f"cold/threads:{threads}", "p99_us")
+            values[f"cut_{tool}_cold_p99{suffix}"] = over(cold / CUT_BUDGET_US, None, threads)
+        values[f"cut_{tool}_speedup_near"] = over(near / times("hot/threads:1"), None, 1)
+
+    run.say("cutting with every tool")
+    tools = {}
+    for name, counters in repeated(run, "^cut_tool/", 1).items():
+        _, tool, threads = name.split("/")
+        tools.setdefault(tool, {})[int(threads.removeprefix("threads:"))] = counters[0]
+    one = {tool: by_threads[1] for tool, by_threads in tools.items()}
+    slowest = max(one, key=lambda tool: one[tool]["median_us"])
+    rows = [("tool", "pitch mm", "us p50, 1 thread", "max", "us p50, 2 threads", "max", "visited", "computed", "modified",
+             "cuts", "memory kB")]
+    for tool, c in sorted(one.items()):
+        two = tools[tool].get(2, {})
+        rows.append((tool, f"{c['pitch_mm']:g}", f"{c['median_us']:.0f}", f"{c['max_us']:.0f}",
+                     f"{two.get('median_us', math.nan):.0f}", f"{two.get('max_us', math.nan):.0f}",
+                     *(f"{c[key]:.0f}" for key in ("visited", "computed", "modified", "cuts")), f"{c['memory_bytes'] / 1e3:.0f}"))
+    run.tables.append((f"a cut of 8 ms by every tool that cuts, at its own level; the slowest is {slowest}", rows))
+    medians = [c["median_us"] / TOOL_BUDGET_US for c in one.values()]
+    values["tools_slowest_cut"] = Measured(max(medians), None, min(medians), max(medians), 1)
+    two = [by_threads[2]["median_us"] / TOOL_BUDGET_US for by_threads in tools.values() if 2 in by_threads]
+    values["tools_slowest_cut_2"] = Measured(max(two), None, min(two), max(two), 2) if two else Measured(None)
+    values["tools_measured"] = Measured(len(one))
+    return values
+
+
 def surface(run):
     run.say("surface")
     b = benchmarks(run, "^mesh_")
