@@ -25,7 +25,7 @@ void gather_level(const Gather& gather, int level, const CoordBox& box, std::vec
   }
 }
 
-// Fills `out`, using again what it has room for.
+// Fills `out`, using again what it has room for. kWhollyCovered where it sees that there is no surface.
 template <class Field>
 void gather_block(const Field& field, const SurfaceBlocks& blocks, const BlockKey& key, double pitch_mm, BlockSamples& out) {
   out.key = key;
@@ -37,8 +37,18 @@ void gather_block(const Field& field, const SurfaceBlocks& blocks, const BlockKe
   const auto solid = [&](int level, const CoordBox& box, std::span<float> to) { field.gather_solid(level, box, to); };
   const auto surface = [&](int level, const CoordBox& box, std::span<float> to) { field.gather_surface(level, box, to); };
   const CoordBox box = block_samples(key);
-  gather_level(solid, key.level, box, out.solid_mm);
-  gather_level(surface, key.level, box, out.surface_mm);
+  if (key.level >= 0) {
+    constexpr std::size_t kSamples = static_cast<std::size_t>(kBlockApron) * kBlockApron * kBlockApron;
+    out.solid_mm.resize(kSamples);
+    out.surface_mm.resize(kSamples);
+    if (!field.gather_both(key.level, box, out.solid_mm, out.surface_mm)) {
+      out.covered = kWhollyCovered;
+      return;
+    }
+  } else {
+    gather_level(solid, key.level, box, out.solid_mm);
+    gather_level(surface, key.level, box, out.surface_mm);
+  }
   std::array<bool, kSeamSteps + 1> meets{};
   for (const std::uint8_t steps : out.seams.coarser) meets[steps] = true;
   for (int steps = 1; steps <= kSeamSteps; ++steps)

@@ -1,7 +1,6 @@
 #include "common/surface/surface_blocks.hpp"
 
 #include <algorithm>
-#include <map>
 #include <set>
 
 #include "common/core/check.hpp"
@@ -106,7 +105,6 @@ Seams SurfaceBlocks::seams(const BlockKey& key) const {
 
 std::vector<BlockKey> SurfaceBlocks::touch(int level, const std::vector<Coord>& changed_leaves) {
   std::set<BlockKey> stale;
-  std::map<BlockKey, int> readers_over_seams;  // and the least reach with which they read a change
   std::vector<Coord> fresh;
   const bool any_coarse = std::ranges::any_of(coarse_, [](const Indices& drawn) { return !drawn.empty(); });
   const auto box_of = [](Coord origin) { return CoordBox{origin, origin + Coord{kLeafSize - 1, kLeafSize - 1, kLeafSize - 1}}; };
@@ -116,21 +114,27 @@ std::vector<BlockKey> SurfaceBlocks::touch(int level, const std::vector<Coord>& 
         if (fine_[static_cast<std::size_t>(level - 1)].insert(index).second) fresh.push_back(index);
       });
 
-  for (const Coord origin : changed_leaves)
-    for (int l = any_coarse ? kCoarsestLevel : 0; l < kLevels; ++l) {
-      const CoordBox samples = at_level(box_of(origin), level, l);
-      const CoordBox near = readers(samples, 1);
-      for_each(near, [&](Coord index) {
-        if (const BlockKey key{body_, l, index}; drawn(key)) stale.insert(key);
-      });
-      // The normals on a seam come from the coarser level's samples, which reach further.
-      for (int steps = 1; steps <= (any_coarse ? l - kCoarsestLevel : l); ++steps)
-        for_each(readers(samples, 1 << steps), [&](Coord index) {
-          if (const BlockKey key{body_, l, index}; !near.contains(index) && drawn(key)) readers_over_seams.try_emplace(key, steps);
-        });
+  const auto distinct = [](std::vector<Coord>& indices) {
+    std::ranges::sort(indices);
+    indices.erase(std::unique(indices.begin(), indices.end()), indices.end());
+  };
+  std::vector<Coord> near, far;
+  for (int l = any_coarse ? kCoarsestLevel : 0; l < kLevels; ++l) {
+    // The normals on a seam come from the coarser level's samples, which reach further: 2, 4, … samples.
+    const int most_steps = any_coarse ? l - kCoarsestLevel : l;
+    for (int steps = 0; steps <= most_steps; ++steps) {
+      std::vector<Coord>& indices = steps == 0 ? near : far;
+      indices.clear();
+      for (const Coord origin : changed_leaves)
+        for_each(readers(at_level(box_of(origin), level, l), 1 << steps), [&](Coord index) { indices.push_back(index); });
+      distinct(indices);
+      for (const Coord index : indices) {
+        const BlockKey key{body_, l, index};
+        if (steps > 0 && std::ranges::binary_search(near, index)) continue;
+        if (drawn(key) && (steps == 0 || seams(key).most() >= steps)) stale.insert(key);
+      }
     }
-  for (const auto& [key, steps] : readers_over_seams)
-    if (!stale.contains(key) && seams(key).most() >= steps) stale.insert(key);
+  }
 
   // Where a block is drawn for the first time, the coarser ones give up their cells and the others change their seams.
   for (const Coord index : fresh) {

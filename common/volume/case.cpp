@@ -397,6 +397,15 @@ double Case::clearance_mm(const Vec3& point_mm) const {
 
 Tissue Case::tissue(Coord sample) const { return static_cast<Tissue>(static_cast<int>(grids_->tissue.value(sample))); }
 
+bool Case::has_surface(const CoordBox& box) const {
+  const Coord first = floor_to(box.min, kLeafSize);
+  for (std::int32_t x = first.x; x <= box.max.x; x += kLeafSize)
+    for (std::int32_t y = first.y; y <= box.max.y; y += kLeafSize)
+      for (std::int32_t z = first.z; z <= box.max.z; z += kLeafSize)
+        if (grids_->surface.leaf({x, y, z})) return true;
+  return false;
+}
+
 bool Case::has_bone(const CoordBox& box) const {
   const Coord first = floor_to(box.min, kLeafSize);
   for (std::int32_t x = first.x; x <= box.max.x; x += kLeafSize)

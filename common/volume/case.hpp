@@ -78,6 +78,8 @@ class Case {
   // A lower bound of the distance to the bone, mm, zero in and near it.
   [[nodiscard]] double clearance_mm(const Vec3& point_mm) const;
   [[nodiscard]] Tissue tissue(Coord sample) const;
+  // Whether any sample of level 0 in the box is within the band of the surface; if none is, all are on one side of it.
+  [[nodiscard]] bool has_surface(const CoordBox& box) const;
   // Whether any sample of level 0 in the box is bone or in the band around it.
   [[nodiscard]] bool has_bone(const CoordBox& box) const;
 

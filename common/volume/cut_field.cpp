@@ -345,6 +345,25 @@ void CutField::gather_solid(int level, const CoordBox& box, std::span<float> out
 
 void CutField::gather_solid(int level, const CoordBox& box, std::span<float> out, GatherScratch& scratch) const {
   gather_surface(level, box, out, scratch);
+  take_cuts(level, box, out, scratch);
+}
+
+bool CutField::gather_both(int level, const CoordBox& box, std::span<float> solid, std::span<float> surface) const {
+  static thread_local GatherScratch scratch;  // blocks are made many at a time, on any thread
+  bool any = grids_->bone.has_surface(coarse_box(box, level));
+  for (int from = 0; from < kLevels && !any; ++from) {
+    const std::int32_t fine = 1 << std::max(0, from - level);
+    any = grids_->cuts[static_cast<std::size_t>(from)].any_stored(
+        from <= level ? coarse_box(box, level - from) : CoordBox{fine * box.min, fine * box.max});
+  }
+  if (!any) return false;
+  gather_surface(level, box, surface, scratch);
+  std::ranges::copy(surface, solid.begin());
+  take_cuts(level, box, solid, scratch);
+  return true;
+}
+
+void CutField::take_cuts(int level, const CoordBox& box, std::span<float> out, GatherScratch& scratch) const {
   for (int from = 0; from < kLevels; ++from) {
     const SparseVolume& cuts = grids_->cuts[static_cast<std::size_t>(from)];
     const CoordBox there = from <= level ? coarse_box(box, level - from)

@@ -65,7 +65,12 @@ void SparseVolume::gather(const CoordBox& box, std::span<float> out) const {
                                        static_cast<std::size_t>(y - box.min.y)) * static_cast<std::size_t>(dims.z) +
                          (z0 - box.min.z);
             if (data) {
-              std::memcpy(row, data + (x - lx) * 64 + (y - ly) * 8 + (z0 - lz), sizeof(float) * static_cast<std::size_t>(z1 - z0 + 1));
+              // A whole row of a leaf is two registers; the few samples at a box's ends are not worth a call.
+              const float* from = data + (x - lx) * 64 + (y - ly) * 8 + (z0 - lz);
+              if (z1 - z0 + 1 == kLeafSize)
+                std::memcpy(row, from, sizeof(float) * kLeafSize);
+              else
+                for (std::int32_t z = 0; z <= z1 - z0; ++z) row[z] = from[z];
             } else {
               std::fill_n(row, z1 - z0 + 1, constant);
             }
