@@ -253,25 +253,38 @@ std::vector<Coord> CutField::reach(const Cut& cut) const {
 }
 
 void CutField::restore(const FieldLeaf& leaf) {
-  OSTEON_CHECK(leaf.level >= 0 && leaf.level < kLevels && leaf.values.size() == kLeafVoxels);
+  OSTEON_CHECK(leaf.level >= 0 && leaf.level < kLevels && leaf.holds_values());
   SparseVolume& cuts = grids_->cuts[static_cast<std::size_t>(leaf.level)];
   const std::int16_t removed = to_quanta(-cuts.background());
   if (std::ranges::all_of(leaf.values, [&](std::int16_t v) { return v == removed; })) {
     cuts.set_constant(leaf.origin, -cuts.background());
     return;
   }
-  std::ranges::transform(leaf.values, cuts.edit_leaf(leaf.origin),
-                         [](std::int16_t v) { return static_cast<float>(v) * static_cast<float>(kQuantum_mm); });
+  const auto mm = [](std::int16_t v) { return static_cast<float>(v) * static_cast<float>(kQuantum_mm); };
+  if (leaf.is_constant()) {
+    const float value = mm(leaf.values.front());
+    // Nothing but what is gone throughout, or was never cut, is kept without samples.
+    if (value == cuts.background()) cuts.set_constant(leaf.origin, value);
+    else std::fill_n(cuts.edit_leaf(leaf.origin), kLeafVoxels, value);
+    return;
+  }
+  std::ranges::transform(leaf.values, cuts.edit_leaf(leaf.origin), mm);
 }
 
 bool CutField::merge(const FieldLeaf& mask) {
-  OSTEON_CHECK(mask.level >= 0 && mask.level < kLevels && mask.values.size() == kLeafVoxels);
+  OSTEON_CHECK(mask.level >= 0 && mask.level < kLevels && mask.holds_values());
   FieldLeaf merged{mask.body, mask.level, mask.origin, {}};
   read(merged);
   bool changed = false;
-  for (std::size_t i = 0; i < mask.values.size(); ++i) {
-    changed |= mask.values[i] < merged.values[i];
-    merged.values[i] = std::min(merged.values[i], mask.values[i]);
+  if (mask.is_constant() && merged.is_constant()) {
+    changed = mask.values.front() < merged.values.front();
+    merged.values.front() = std::min(merged.values.front(), mask.values.front());
+  } else {
+    merged.expand();
+    for (std::size_t i = 0; i < kLeafVoxels; ++i) {
+      changed |= mask.value(i) < merged.values[i];
+      merged.values[i] = std::min(merged.values[i], mask.value(i));
+    }
   }
   if (changed) restore(merged);
   return changed;
@@ -298,11 +311,13 @@ std::vector<FieldLeaf> CutField::leaf_places() const {
 
 void CutField::read(FieldLeaf& leaf) const {
   const SparseVolume& cuts = grids_->cuts[static_cast<std::size_t>(leaf.level)];
+  const float* values = cuts.leaf(leaf.origin);
+  if (!values) {
+    leaf.values = std::vector<std::int16_t>{to_quanta(cuts.value(leaf.origin))};
+    return;
+  }
   leaf.values.resize(kLeafVoxels);
-  if (const float* values = cuts.leaf(leaf.origin))
-    std::ranges::transform(std::span(values, kLeafVoxels), leaf.values.begin(), to_quanta);
-  else
-    std::ranges::fill(leaf.values, to_quanta(cuts.value(leaf.origin)));
+  std::ranges::transform(std::span(values, kLeafVoxels), leaf.values.begin(), to_quanta);
 }
 
 Digest CutField::hash() const { return field_hash(leaves(), grids_->bone.pitch_mm()); }
@@ -394,22 +409,26 @@ double CutField::solid_mm(const Vec3& point_mm) const {
 }
 
 double CutField::removed_mm3() const {
-  // Every leaf of level 0 that any level cut into, at the finest level that did.
+  // Every cell of 8³ voxels of level 0 that any level cut into, at the finest level that did. A cell ends where the next
+  // one begins, at that one's first samples: so those before a cut leaf lose bone too.
   std::set<Coord> touched;
   for (int level = 0; level < kLevels; ++level)
     for (const auto& origins : {grids_->cuts[static_cast<std::size_t>(level)].leaves(), grids_->cuts[static_cast<std::size_t>(level)].constants()})
-      for (const Coord origin : origins) touched.insert(floor_to(shift_down(origin, level), kLeafSize));
+      for (const Coord origin : origins)
+        for (int before = 0; before < 8; ++before)
+          touched.insert(floor_to(shift_down(origin - Coord{before & 1, before >> 1 & 1, before >> 2}, level), kLeafSize));
 
   double removed = 0.0;
   std::vector<float> before, after;
   GatherScratch scratch;
   for (const Coord origin : touched) {
-    int level = kLevels - 1;
     const auto box_at = [&](int l) {
       const std::int32_t n = kLeafSize << l;
       const Coord first{origin.x << l, origin.y << l, origin.z << l};
-      return CoordBox{first, first + Coord{n - 1, n - 1, n - 1}};
+      return CoordBox{first, first + Coord{n, n, n}};
     };
+    if (!grids_->bone.has_bone(box_at(0))) continue;
+    int level = kLevels - 1;
     while (level > 0 && !has_cuts(level, box_at(level))) --level;
     const CoordBox box = box_at(level);
     before.resize(count(box));
@@ -417,10 +436,19 @@ double CutField::removed_mm3() const {
     gather_surface(level, box, before, scratch);
     gather_solid(level, box, after, scratch);
     const double pitch = level_pitch_mm(grids_->bone.pitch_mm(), level);
-    // A sample within half a pitch of a surface is bone in part.
+    // A sample within half a pitch of a surface is bone in part. Those on both ends count half, so that cells of any
+    // levels fill space without overlap.
     const auto bone_part = [&](float f) { return std::clamp(0.5 - static_cast<double>(f) / pitch, 0.0, 1.0); };
+    const std::int32_t n = kLeafSize << level;
+    const auto weight = [n](std::int32_t i) { return i == 0 || i == n ? 0.5 : 1.0; };
     double samples = 0.0;
-    for (std::size_t i = 0; i < before.size(); ++i) samples += bone_part(before[i]) - bone_part(after[i]);
+    std::size_t i = 0;
+    for (std::int32_t x = 0; x <= n; ++x)
+      for (std::int32_t y = 0; y <= n; ++y) {
+        double line = 0.0;
+        for (std::int32_t z = 0; z <= n; ++z, ++i) line += weight(z) * (bone_part(before[i]) - bone_part(after[i]));
+        samples += weight(x) * weight(y) * line;
+      }
     removed += samples * pitch * pitch * pitch;
   }
   return removed;

@@ -54,7 +54,7 @@ class CutField {
   [[nodiscard]] const std::shared_ptr<const ToolBox>& tools() const;
   [[nodiscard]] std::vector<FieldLeaf> leaves() const;  // sorted by (level, origin)
   // The same in two steps, for a reader that cannot hold the field still while it copies: the leaves without values,
-  // then the present values of one of them. A leaf stays in its place for ever.
+  // then the present values of one of them: one value where all are gone. A leaf stays in its place for ever.
   [[nodiscard]] std::vector<FieldLeaf> leaf_places() const;
   void read(FieldLeaf& leaf) const;
   [[nodiscard]] Digest hash() const;                    // field_hash of leaves()

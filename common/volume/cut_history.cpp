@@ -21,25 +21,40 @@ auto place_of(const FieldLeaf& leaf) { return std::tuple(leaf.level, leaf.origin
 }  // namespace
 
 void CutHistory::add(RoomSeq place, const Cut& cut, const std::vector<Coord>& leaves) {
-  OSTEON_CHECK(!cut.path.empty() && cut.level >= 0 && cut.level < kLevels);
-  const bool added = events_.emplace(place, Event{cut, {}, false}).second;
-  OSTEON_CHECK(added);
-  for (const Coord origin : leaves) reach_[at(cut.level)][origin].push_back(place);
+  OSTEON_CHECK(!cut.path.empty() && cut.level >= 0 && cut.level < kLevels && !contains(place));
+  own_.events.emplace(place, Event{cut, {}});
+  for (const Coord origin : leaves) own_.reach[at(cut.level)][origin].push_back(place);
 }
 
-void CutHistory::add_mask(RoomSeq place, const std::vector<FieldLeaf>& mask) {
-  Event event{{}, mask, false};
-  std::ranges::sort(event.mask, {}, place_of);
-  for (const FieldLeaf& leaf : mask) reach_[at(leaf.level)][leaf.origin].push_back(place);
-  const bool added = events_.emplace(place, std::move(event)).second;
-  OSTEON_CHECK(added);
+void CutHistory::add_mask(RoomSeq place, Mask mask) {
+  OSTEON_CHECK(mask && !contains(place));
+  own_.events.emplace(place, Event{{}, std::move(mask)});
 }
 
-bool CutHistory::contains(RoomSeq place) const { return events_.contains(place); }
+void CutHistory::add_mask(RoomSeq place, std::vector<FieldLeaf> mask) {
+  std::ranges::sort(mask, {}, place_of);
+  add_mask(place, std::make_shared<const std::vector<FieldLeaf>>(std::move(mask)));
+}
 
-bool CutHistory::undone(RoomSeq place) const {
-  const auto event = events_.find(place);
-  return event != events_.end() && event->second.undone;
+CutHistory CutHistory::fork() {
+  if (!own_.events.empty()) shared_.push_back(std::make_shared<const Part>(std::exchange(own_, {})));
+  return *this;
+}
+
+const CutHistory::Part* CutHistory::part_of(RoomSeq place) const {
+  if (own_.events.contains(place)) return &own_;
+  for (const auto& part : shared_)
+    if (part->events.contains(place)) return part.get();
+  return nullptr;
+}
+
+bool CutHistory::contains(RoomSeq place) const { return part_of(place) != nullptr; }
+bool CutHistory::undone(RoomSeq place) const { return undone_.contains(place); }
+
+std::size_t CutHistory::size() const {
+  std::size_t events = own_.events.size();
+  for (const auto& part : shared_) events += part->events.size();
+  return events;
 }
 
 std::vector<LevelLeaves> CutHistory::undo(CutField& field, std::span<const RoomSeq> places) {
@@ -50,14 +65,15 @@ std::vector<LevelLeaves> CutHistory::redo(CutField& field, std::span<const RoomS
   return rebuild(field, places, false);
 }
 
-// The leaves of an event are not kept beside it: a leaf lists its events already, and a cut's own follow from its path.
-CutHistory::Leaves CutHistory::reached(const CutField& field, const Event& event, RoomSeq place) const {
+// The leaves of a cut are not kept beside it: a leaf lists its cuts already, and a cut's own follow from its path.
+CutHistory::Leaves CutHistory::reached(const CutField& field, const Part& part, RoomSeq place) {
+  const Event& event = part.events.at(place);
   Leaves leaves;
   if (event.cut.path.empty()) {
-    for (const FieldLeaf& leaf : event.mask) leaves[at(leaf.level)].push_back(leaf.origin);
+    for (const FieldLeaf& leaf : *event.mask) leaves[at(leaf.level)].push_back(leaf.origin);
     return leaves;
   }
-  const auto& reach = reach_[at(event.cut.level)];
+  const auto& reach = part.reach[at(event.cut.level)];
   for (const Coord origin : field.reach(event.cut)) {
     const auto listed = reach.find(origin);
     if (listed != reach.end() && std::ranges::find(listed->second, place) != listed->second.end())
@@ -70,10 +86,11 @@ std::vector<LevelLeaves> CutHistory::rebuild(CutField& field, std::span<const Ro
   cost_ = {};
   Leaves touched;
   for (const RoomSeq place : places) {
-    const auto found = events_.find(place);
-    if (found == events_.end() || found->second.undone == undone) continue;
-    found->second.undone = undone;
-    const Leaves leaves = reached(field, found->second, place);
+    const Part* part = part_of(place);
+    if (!part || this->undone(place) == undone) continue;
+    if (undone) undone_.insert(place);
+    else undone_.erase(place);
+    const Leaves leaves = reached(field, *part, place);
     for (int level = 0; level < kLevels; ++level)
       touched[at(level)].insert(touched[at(level)].end(), leaves[at(level)].begin(), leaves[at(level)].end());
   }
@@ -91,11 +108,12 @@ std::vector<LevelLeaves> CutHistory::rebuild(CutField& field, std::span<const Ro
 
   std::vector<LevelLeaves> changed;
   FieldLeaf after;
+  after.body = field.body();
   for (const FieldLeaf& leaf : before) {
     after.level = leaf.level;
     after.origin = leaf.origin;
     field.read(after);
-    if (after.values == leaf.values) continue;
+    if (after == leaf) continue;
     if (changed.empty() || changed.back().level != leaf.level) changed.push_back({leaf.level, {}});
     changed.back().origins.push_back(leaf.origin);
   }
@@ -104,28 +122,44 @@ std::vector<LevelLeaves> CutHistory::rebuild(CutField& field, std::span<const Ro
 
 void CutHistory::apply_again(CutField& field, const Leaves& leaves) {
   // By event, so that each path is prepared once.
-  std::map<RoomSeq, Leaves> work;
-  for (int level = 0; level < kLevels; ++level)
-    for (const Coord origin : leaves[at(level)])
-      for (const RoomSeq place : reach_[at(level)].at(origin))
-        if (!events_.at(place).undone) work[place][at(level)].push_back(origin);
-  for (const auto& [place, parts] : work) {
-    const Event& event = events_.at(place);
-    if (!event.cut.path.empty()) {
-      const std::vector<Coord>& part = parts[at(event.cut.level)];
-      field.apply_to(event.cut, part);
-      ++cost_.cuts;
-      cost_.leaf_cuts += part.size();
-      continue;
-    }
+  std::map<RoomSeq, std::pair<const Event*, Leaves>> work;
+  std::vector<const Event*> masks;
+  const auto add_part = [&](const Part& part) {
     for (int level = 0; level < kLevels; ++level)
-      for (const Coord origin : parts[at(level)]) {
-        const auto mask = std::ranges::lower_bound(event.mask, std::tuple(level, origin), {}, place_of);
-        OSTEON_CHECK(mask != event.mask.end() && mask->origin == origin && mask->level == level);
+      for (const Coord origin : leaves[at(level)]) {
+        const auto listed = part.reach[at(level)].find(origin);
+        if (listed == part.reach[at(level)].end()) continue;
+        for (const RoomSeq place : listed->second) {
+          if (undone(place)) continue;
+          auto& [event, of_event] = work[place];
+          event = &part.events.at(place);
+          of_event[at(level)].push_back(origin);
+        }
+      }
+    for (const auto& [place, event] : part.events)
+      if (event.mask && !undone(place)) masks.push_back(&event);
+  };
+  for (const auto& part : shared_) add_part(*part);
+  add_part(own_);
+  for (const auto& [place, one] : work) {
+    const std::vector<Coord>& part = one.second[at(one.first->cut.level)];
+    field.apply_to(one.first->cut, part);
+    ++cost_.cuts;
+    cost_.leaf_cuts += part.size();
+  }
+  for (const Event* event : masks)
+    for (int level = 0; level < kLevels; ++level) {
+      // Both are sorted: one walk through the mask.
+      auto mask = event->mask->begin();
+      for (const Coord origin : leaves[at(level)]) {
+        mask = std::lower_bound(mask, event->mask->end(), std::tuple(level, origin),
+                                [](const FieldLeaf& leaf, const auto& place) { return place_of(leaf) < place; });
+        if (mask == event->mask->end()) break;
+        if (place_of(*mask) != std::tuple(level, origin)) continue;
         field.merge(*mask);
         ++cost_.masks;
       }
-  }
+    }
 }
 
 }  // namespace osteon

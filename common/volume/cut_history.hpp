@@ -3,6 +3,8 @@
 #pragma once
 #include <array>
 #include <map>
+#include <memory>
+#include <set>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -26,6 +28,9 @@ struct RebuildCost {
   std::size_t masks = 0;          // leaves of masks merged again
 };
 
+// Owners: the split that made a piece and the histories that hold it; never changed.
+using Mask = std::shared_ptr<const std::vector<FieldLeaf>>;
+
 // A field whose every change is in the history, and whose others came as a mask (a piece's first state), is after any
 // undo and redo what a fresh field with only the remaining events would be. Not synchronised: one thread writes, or
 // several read.
@@ -35,11 +40,15 @@ class CutHistory {
   // `leaves`: all that the cut can change, CutReport::reached_leaves or CutField::reach(); those that it did change are
   // not enough, because another cut that is taken back may have hidden the rest.
   void add(RoomSeq place, const Cut& cut, const std::vector<Coord>& leaves);
-  void add_mask(RoomSeq place, const std::vector<FieldLeaf>& mask);  // R = min(R, mask)
+  void add_mask(RoomSeq place, Mask mask);  // R = min(R, mask); sorted by (level, origin)
+  void add_mask(RoomSeq place, std::vector<FieldLeaf> mask);
+  // Another history with the same events, that goes its own way from here. What was added before is shared, so this costs
+  // the same for any number of events.
+  [[nodiscard]] CutHistory fork();
 
   [[nodiscard]] bool contains(RoomSeq place) const;
   [[nodiscard]] bool undone(RoomSeq place) const;
-  [[nodiscard]] std::size_t size() const { return events_.size(); }
+  [[nodiscard]] std::size_t size() const;
 
   // Takes events back, or applies them again, and returns the leaves that changed, by level. Places that are unknown, or
   // in that state already, are passed over. The field must be the one that the events were applied to.
@@ -49,19 +58,24 @@ class CutHistory {
 
  private:
   struct Event {
-    Cut cut;                      // without path: a mask
-    std::vector<FieldLeaf> mask;  // sorted by (level, origin)
-    bool undone = false;
+    Cut cut;    // without path: a mask
+    Mask mask;
+  };
+  // Events in a row, and which of their cuts reach a leaf, in the order in which they were added. Masks name their leaves.
+  struct Part {
+    std::map<RoomSeq, Event> events;
+    std::array<std::unordered_map<Coord, std::vector<RoomSeq>, CoordHash>, kLevels> reach;
   };
   using Leaves = std::array<std::vector<Coord>, kLevels>;
 
+  [[nodiscard]] const Part* part_of(RoomSeq place) const;  // null: unknown
   std::vector<LevelLeaves> rebuild(CutField& field, std::span<const RoomSeq> places, bool undone);
-  Leaves reached(const CutField& field, const Event& event, RoomSeq place) const;
+  [[nodiscard]] static Leaves reached(const CutField& field, const Part& part, RoomSeq place);
   void apply_again(CutField& field, const Leaves& leaves);
 
-  std::map<RoomSeq, Event> events_;
-  // Which events reach a leaf, in the order in which they were added.
-  std::array<std::unordered_map<Coord, std::vector<RoomSeq>, CoordHash>, kLevels> reach_;
+  std::vector<std::shared_ptr<const Part>> shared_;  // with forks; never changed
+  Part own_;
+  std::set<RoomSeq> undone_;
   RebuildCost cost_;
 };
 

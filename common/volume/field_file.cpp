@@ -13,11 +13,13 @@
 #include <mutex>
 #include <optional>
 #include <span>
+#include <sstream>
 #include <string_view>
 #include <tuple>
 
 #include "common/core/check.hpp"
 #include "common/field/kernel.hpp"
+#include "common/tools/tool_file.hpp"
 
 namespace osteon {
 namespace {
@@ -38,6 +40,9 @@ constexpr const char* kKernelKey = "osteon_kernel_version";
 constexpr const char* kSeqKey = "osteon_room_seq";
 constexpr const char* kPitchKey = "osteon_pitch_mm";
 constexpr const char* kBodiesKey = "osteon_bodies";
+constexpr const char* kItemsKey = "osteon_items";
+constexpr const char* kToolsKey = "osteon_tools";  // how many; each under this and its number
+constexpr std::size_t kMostItems = 4096, kMostTools = 1024;
 
 void initialize_once() {
   static std::once_flag once;
@@ -128,6 +133,68 @@ Result<void> sync(const fs::path& path) {
   return {};
 }
 
+// A line for each item: its number, body, tool, place, rotation (x y z w), turns, whether it is seated, when it was set.
+std::string text_of(const std::vector<SceneItem>& items) {
+  std::string text;
+  for (const SceneItem& item : items) {
+    const Vec3& p = item.pose_bone_item.position_mm;
+    const Eigen::Quaterniond& q = item.pose_bone_item.rotation;
+    std::array<char, 400> line{};
+    std::snprintf(line.data(), line.size(), "%u %u %s %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %d %llu\n", item.id, item.body.value,
+                  to_hex(item.tool).c_str(), p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w(), item.turns, item.seated ? 1 : 0,
+                  static_cast<unsigned long long>(item.set_at));
+    text += line.data();
+  }
+  return text;
+}
+
+std::optional<std::vector<SceneItem>> items_of(const std::string& text) {
+  std::vector<SceneItem> items;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream in(line);
+    SceneItem item;
+    std::string tool, rest;
+    std::array<double, 8> number{};
+    int seated = 0;
+    in >> item.id >> item.body.value >> tool;
+    for (double& value : number) in >> value;
+    in >> seated >> item.set_at;
+    const auto hash = digest_from_hex(tool);
+    if (!in || in >> rest || !hash || item.id == 0 || seated < 0 || seated > 1 || items.size() >= kMostItems) return std::nullopt;
+    if (!std::ranges::all_of(number, [](double v) { return std::isfinite(v) && std::abs(v) < 1e6; })) return std::nullopt;
+    item.tool = *hash;
+    item.pose_bone_item.position_mm = {number[0], number[1], number[2]};
+    item.pose_bone_item.rotation = Eigen::Quaterniond(number[6], number[3], number[4], number[5]);
+    if (!(std::abs(item.pose_bone_item.rotation.norm() - 1.0) < 1e-3)) return std::nullopt;
+    item.turns = number[7];
+    item.seated = seated == 1;
+    if (!items.empty() && items.back().id >= item.id) return std::nullopt;
+    items.push_back(item);
+  }
+  return items;
+}
+
+// Files of before the scene was saved have none.
+Result<void> read_scene(const fs::path& file, const openvdb::MetaMap& meta, SavedFields& fields) {
+  if (const auto text = meta.getMetadata<openvdb::StringMetadata>(kItemsKey)) {
+    auto items = items_of(text->value());
+    if (!items) return failure(ErrorCode::invalid_input, file.string() + ": its list of items is broken");
+    fields.items = std::move(*items);
+  }
+  const auto count = meta.getMetadata<openvdb::Int64Metadata>(kToolsKey);
+  if (count && (count->value() < 0 || count->value() > static_cast<std::int64_t>(kMostTools)))
+    return failure(ErrorCode::invalid_input, file.string() + ": its list of tools is broken");
+  for (std::int64_t i = 0; count && i < count->value(); ++i) {
+    const auto text = meta.getMetadata<openvdb::StringMetadata>(kToolsKey + std::to_string(i));
+    if (!text) return failure(ErrorCode::invalid_input, file.string() + ": its list of tools is broken");
+    Result<Tool> tool = parse_tool(text->value(), file.filename().string() + ", tool " + std::to_string(i));
+    if (!tool) return tl::unexpected(tool.error());
+    fields.tools.push_back(std::move(*tool));
+  }
+  return {};
+}
+
 Result<void> write_grids(const fs::path& file, const SavedFields& fields) {
   try {
     initialize_once();
@@ -155,6 +222,10 @@ Result<void> write_grids(const fs::path& file, const SavedFields& fields) {
     std::string bodies;
     for (const BodyId body : fields.bodies) bodies += (bodies.empty() ? "" : " ") + std::to_string(body.value);
     meta.insertMeta(kBodiesKey, openvdb::StringMetadata(bodies));
+    meta.insertMeta(kItemsKey, openvdb::StringMetadata(text_of(fields.items)));
+    meta.insertMeta(kToolsKey, openvdb::Int64Metadata(static_cast<std::int64_t>(fields.tools.size())));
+    for (std::size_t i = 0; i < fields.tools.size(); ++i)
+      meta.insertMeta(kToolsKey + std::to_string(i), openvdb::StringMetadata(to_yaml(fields.tools[i])));
     openvdb::io::File out(file.string());
     out.write(grids, meta);
     out.close();
@@ -214,13 +285,14 @@ std::optional<std::string> read_grid(const Grid& grid, BodyId body, int level, d
   const std::int32_t band = band_quanta(level_pitch_mm(pitch_mm, level));
   if (grid.background() != band_mm(level_pitch_mm(pitch_mm, level))) return "its background is not the band of its level";
   const auto add = [&](const openvdb::Coord& at, const float* values, bool constant) -> std::optional<std::string> {
-    FieldLeaf leaf{body, level, {at.x(), at.y(), at.z()}, std::vector<std::int16_t>(kLeafVoxels)};
+    FieldLeaf leaf{body, level, {at.x(), at.y(), at.z()}, {}};
     for (const std::int32_t c : {at.x(), at.y(), at.z()})
       if (c < -kFarthestSample || c > kFarthestSample) return "it has samples farther off than any bone";
     if (out.size() >= kMostLeaves) return "it has more leaves than a bone can";
     bool cut = false;
-    for (std::size_t i = 0; i < kLeafVoxels; ++i) {
-      const float quanta = values[constant ? 0 : i] * 1024.0f;
+    leaf.values.resize(constant ? 1 : kLeafVoxels);
+    for (std::size_t i = 0; i < leaf.values.size(); ++i) {
+      const float quanta = values[i] * 1024.0f;
       if (!(quanta >= static_cast<float>(-band) && quanta <= static_cast<float>(band)) || quanta != std::floor(quanta))
         return "it has values that no cut leaves";
       leaf.values[i] = static_cast<std::int16_t>(quanta);
@@ -253,7 +325,7 @@ std::optional<std::string> read_grid(const Grid& grid, BodyId body, int level, d
 Result<void> save_fields(const fs::path& file, const SavedFields& fields) {
   SavedFields sorted = fields;
   std::erase_if(sorted.leaves, [&](const FieldLeaf& leaf) {
-    OSTEON_CHECK(leaf.level >= 0 && leaf.level < kLevels && leaf.values.size() == kLeafVoxels);
+    OSTEON_CHECK(leaf.level >= 0 && leaf.level < kLevels && leaf.holds_values());
     const std::int32_t band = band_quanta(level_pitch_mm(fields.pitch_mm, leaf.level));
     return std::ranges::all_of(leaf.values, [&](std::int16_t v) { return v == band; });
   });
@@ -286,6 +358,7 @@ Result<SavedFields> load_fields(const fs::path& file) {
     in.open(false);
     auto fields = read_head(file, *in.getMetadata());
     if (!fields) return fields;
+    if (auto scene = read_scene(file, *in.getMetadata(), *fields); !scene) return tl::unexpected(scene.error());
     for (auto name = in.beginName(); name != in.endName(); ++name) {
       const std::string& text = name.gridName();
       const auto key = parse_name(text);

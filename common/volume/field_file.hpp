@@ -1,9 +1,10 @@
 // Cut fields in a .vdb file that other OpenVDB programs can read: one grid per body and level, with the case's hash and
-// the room's place.
+// the room's place; and as text beside them the scene and the tools.
 #pragma once
 #include <filesystem>
 #include <vector>
 
+#include "common/tools/scene_item.hpp"
 #include "common/volume/cut_field.hpp"
 
 namespace osteon {
@@ -15,6 +16,8 @@ struct SavedFields {
   double pitch_mm = 0;            // h of the case
   std::vector<FieldLeaf> leaves;  // of all bodies, sorted by (body, level, origin); none at full band everywhere
   std::vector<BodyId> bodies;     // those that exist, also without leaves; sorted
+  std::vector<SceneItem> items = {};  // what stands on the bone
+  std::vector<Tool> tools = {};       // that are not built in
 };
 
 // A .vdb file, and after it a seal: "osteon-fields-1\\n" and the SHA-256 of the rest. Other programs do not look there.

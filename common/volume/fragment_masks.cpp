@@ -179,7 +179,9 @@ void add_leaves(BodyId body, int level, Coord cell, const std::vector<std::int16
               leaf.values[at(x * 64 + y * 8 + z)] = v;
               cuts |= v != band;
             }
-        if (cuts) out.push_back(std::move(leaf));
+        if (!cuts) continue;
+        leaf.compact();
+        out.push_back(std::move(leaf));
       }
 }
 
@@ -213,7 +215,7 @@ void add_constants(const CutField& field, const CellMap& map, std::span<const Pi
   std::map<Coord, std::vector<std::int16_t>> beyond;
   for (std::size_t i = 0; i < cells.size(); ++i) {
     if (!whole[i]) continue;
-    out.push_back({field.body(), 0, cells[i].origin, std::vector<std::int16_t>(kLeafVoxels, none)});
+    out.push_back({field.body(), 0, cells[i].origin, {none}});
     for (int around = 0; around < 27; ++around) {
       const Coord step{around / 9 - 1, around / 3 % 3 - 1, around % 3 - 1};
       const Coord next = cells[i].origin + kLeafSize * step;
@@ -230,14 +232,19 @@ void add_constants(const CutField& field, const CellMap& map, std::span<const Pi
   for (auto& [origin, values] : beyond) out.push_back({field.body(), 0, origin, std::move(values)});
 }
 
+void lower(FieldLeaf& leaf, const FieldLeaf& by) {
+  if (!by.is_constant()) leaf.expand();
+  for (std::size_t i = 0; i < leaf.values.size(); ++i) leaf.values[i] = std::min(leaf.values[i], by.value(i));
+  leaf.compact();
+}
+
 // Where a constant's seam lies in a cell that has leaves of the same level, the two are one leaf.
 void sort_and_unite(std::vector<FieldLeaf>& leaves) {
   std::ranges::sort(leaves, {}, [](const FieldLeaf& leaf) { return std::pair(leaf.level, leaf.origin); });
   std::size_t last = 0;
   for (std::size_t i = 1; i < leaves.size(); ++i) {
     if (leaves[i].level == leaves[last].level && leaves[i].origin == leaves[last].origin) {
-      std::ranges::transform(leaves[i].values, leaves[last].values, leaves[last].values.begin(),
-                             [](std::int16_t a, std::int16_t b) { return std::min(a, b); });
+      lower(leaves[last], leaves[i]);
     } else if (++last != i) {
       leaves[last] = std::move(leaves[i]);
     }

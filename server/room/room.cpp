@@ -150,20 +150,34 @@ std::vector<BlockKey> Room::take_stale_blocks() {
 
 std::vector<BlockKey> Room::bone_blocks() const {
   std::vector<BlockKey> keys;
-  for (const auto& [id, body] : bodies_) {
-    const CoordBox& samples = body.reach;
-    if (!body.present || samples.empty()) continue;
-    // Cells reach one sample beyond the block, so a surface may lie in the block below the first sample.
-    const Coord first = shift_down(samples.min - Coord{1, 1, 1}, 4), last = shift_down(samples.max, 4);
-    static_assert(kBlockCells == 1 << 4);
-    for (int x = first.x; x <= last.x; ++x)
-      for (int y = first.y; y <= last.y; ++y)
-        for (int z = first.z; z <= last.z; ++z) {
-          const BlockKey key{id, 0, {x, y, z}};
-          if (bone().has_bone(block_samples(key))) keys.push_back(key);
-        }
-  }
+  for (const auto& [id, body] : bodies_)
+    if (body.present) list_blocks(id, body, keys);
   return keys;
+}
+
+void Room::list_blocks(BodyId id, const Body& body, std::vector<BlockKey>& keys) const {
+  const CoordBox& samples = body.reach;
+  if (samples.empty()) return;
+  // Cells reach one sample beyond the block, so a surface may lie in the block below the first sample.
+  const Coord first = shift_down(samples.min - Coord{1, 1, 1}, 4), last = shift_down(samples.max, 4);
+  static_assert(kBlockCells == 1 << 4);
+  for (int x = first.x; x <= last.x; ++x)
+    for (int y = first.y; y <= last.y; ++y)
+      for (int z = first.z; z <= last.z; ++z) {
+        const BlockKey key{id, 0, {x, y, z}};
+        if (bone().has_bone(block_samples(key))) keys.push_back(key);
+      }
+}
+
+void Room::focus(std::vector<Focus> focuses) {
+  focuses_ = std::move(focuses);
+  for (auto& [id, body] : bodies_)
+    if (body.present) stale_.merge(focused(body));
+}
+
+std::set<BlockKey> Room::focused(Body& body) const {
+  const auto keys = body.surface.focus(focuses_, body.reach, bone().pitch_mm());
+  return {keys.begin(), keys.end()};
 }
 
 BlockSamples Room::gather_block(const BlockKey& key) const {

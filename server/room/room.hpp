@@ -13,7 +13,7 @@
 #include "common/core/result.hpp"
 #include "common/field/cut.hpp"
 #include "common/surface/surface_blocks.hpp"
-#include "common/tools/scene_item.hpp"
+#include "common/tools/scene.hpp"
 #include "common/tools/tool_box.hpp"
 #include "common/volume/cut_field.hpp"
 #include "common/volume/cut_history.hpp"
@@ -74,6 +74,16 @@ struct RoomEvent {
   std::vector<RoomSeq> places;            // undo, redo: of the events taken back or done again, oldest first
 };
 
+// What has come apart from a body. `fields`: for each piece that is no debris, in order, the field that it will have, made
+// beforehand because that takes long: from a copy of the parent in which nothing is missing but what take_changes() has
+// yet to tell. Each of the body that the piece will be, next_body() and on; without it the room makes the field itself.
+struct Separation {
+  BodyId parent;
+  std::vector<Fragment> fragments;
+  std::uint64_t seen = 0;        // lease_epoch() when it was looked for
+  std::vector<CutField> fields = {};
+};
+
 // Leaves of one body that changed, for whoever looks for pieces.
 struct BodyLeaves {
   BodyId body;
@@ -96,7 +106,8 @@ inline constexpr std::size_t kMostItems = 256, kMostTools = 1024, kMostBodies = 
 class Room {
  public:
   explicit Room(Case bone, CutLimits limits = {}, std::shared_ptr<ToolBox> tools = builtin_tool_box());
-  // Goes on from saved fields; what came before cannot be undone. Errors: unsupported (of another case or kernel).
+  // Goes on from what was saved; that cannot be undone. Errors: unsupported (of another case or kernel), exists (one of
+  // its tools has the name of another that is in the box), invalid_input (a file that contradicts itself).
   static Result<Room> resume(Case bone, const SavedFields& saved, CutLimits limits = {},
                              std::shared_ptr<ToolBox> tools = builtin_tool_box());
 
@@ -120,10 +131,15 @@ class Room {
   Result<RoomEvent> undo_last(AuthorId by, std::size_t count, AuthorId of);
   Result<RoomEvent> redo_last(AuthorId by, std::size_t count);  // the newest undo events that still stand
   Result<RoomEvent> remove_body(AuthorId by, BodyId body);
-  Result<RoomEvent> set_item(AuthorId by, SceneItem item);  // id 0: a new one
-  Result<RoomEvent> remove_item(AuthorId by, std::uint32_t item);
+  // By the rules of common/tools/scene.hpp, which also say whether it is seated. id 0: a new one.
+  Result<RoomEvent> set_item(AuthorId by, SceneItem item);
+  Result<RoomEvent> remove_item(AuthorId by, std::uint32_t item);  // not a guide that pins fix
   // What a FragmentFinder has found in `parent`; `seen`: the lease_epoch() when it looked.
-  Result<RoomEvent> split(BodyId parent, std::vector<Fragment> fragments, std::uint64_t seen);
+  Result<RoomEvent> split(BodyId parent, std::vector<Fragment> fragments, std::uint64_t seen) {
+    return split({parent, std::move(fragments), seen});
+  }
+  Result<RoomEvent> split(Separation found);
+  [[nodiscard]] BodyId next_body() const { return BodyId{last_body_ + 1}; }
 
   [[nodiscard]] RoomSeq room_seq() const { return room_seq_; }
   [[nodiscard]] const RoomCounts& counts() const { return counts_; }
@@ -145,6 +161,8 @@ class Room {
   [[nodiscard]] std::size_t stale_blocks() const { return stale_.size(); }
   // Every block that the bodies may have a surface in before they are cut further.
   [[nodiscard]] std::vector<BlockKey> bone_blocks() const;
+  // Draws all bodies for these focuses from now on; none: everything in full. What that changes is stale.
+  void focus(std::vector<Focus> focuses);
   // Copies what make_block() needs, so that only this has to be kept from running beside submit(). Of a body that
   // exists.
   [[nodiscard]] BlockSamples gather_block(const BlockKey& key) const;
@@ -166,14 +184,14 @@ class Room {
   struct Piece {
     BodyId body;  // of debris null
     CoordBox reach;
-    std::vector<FieldLeaf> left;
+    Mask left;
   };
   struct Event {
     EventKind kind = EventKind::cut;
     AuthorId author{};
     bool undone = false;
     BodyId body{};                      // split: its parent; remove_body
-    std::vector<FieldLeaf> taken = {};  // split
+    Mask taken = {};                    // split
     std::vector<Piece> pieces = {};
     std::uint32_t item = 0;             // scene
     std::vector<RoomSeq> places = {};   // undo
@@ -187,13 +205,19 @@ class Room {
   [[nodiscard]] Rejection judge(const Cut& cut) const;
   [[nodiscard]] Result<void> check_member(AuthorId by) const;
   [[nodiscard]] bool exists(BodyId body) const;
+  [[nodiscard]] std::vector<Standing> with_tools(const std::vector<SceneItem>& items) const;
+  Result<void> know(const Tool& tool);
   [[nodiscard]] std::set<RoomSeq> with_what_falls_too(std::set<RoomSeq> places) const;
   RoomEvent begin_event(EventKind kind, AuthorId by, Event row);
   void finish_event(RoomEvent& event) const;  // says what exists after it
   void note_changed(BodyId body, const std::vector<LevelLeaves>& changed, RoomEvent* event);
   void add_body(BodyId id, CutField field, CutHistory history, const CoordBox& reach);
   void show_whole(BodyId body, RoomEvent& event);
-  void cut_apart(RoomSeq place, Event& row, RoomEvent& event);
+  [[nodiscard]] std::set<BlockKey> focused(Body& body) const;  // what its focus makes stale
+  [[nodiscard]] CutField made_piece(const Body& parent, const Piece& piece) const;
+  void catch_up(const Body& parent, CutField& field) const;
+  void cut_apart(RoomSeq place, Event& row, RoomEvent& event, std::vector<CutField> fields = {});
+  void list_blocks(BodyId id, const Body& body, std::vector<BlockKey>& keys) const;
   RoomEvent take_back(AuthorId by, const std::set<RoomSeq>& falls);
 
   CutLimits limits_;
@@ -202,6 +226,7 @@ class Room {
   std::uint32_t last_body_ = 0, last_item_ = 0;
   std::map<std::uint32_t, std::vector<ItemRow>> items_;  // rows in order
   std::map<RoomSeq, Event> events_;                      // committed ones, tombstones included
+  std::vector<Focus> focuses_;
   std::set<BlockKey> stale_;
   std::vector<BodyLeaves> changes_;
   RoomSeq room_seq_;

@@ -1,10 +1,12 @@
 // The room's events beside cuts: undo and redo, pieces, the scene, tools.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <string>
 #include <tuple>
 
 #include "common/field/kernel.hpp"
+#include "common/tools/scene.hpp"
 #include "server/room/room.hpp"
 
 namespace osteon {
@@ -16,18 +18,30 @@ constexpr std::uint64_t kLeftOfSplit = std::uint64_t{1} << 63, kLoaded = std::ui
 
 tl::unexpected<Error> refuse(std::string why) { return failure(ErrorCode::invalid_input, std::move(why)); }
 
+auto place_of(const FieldLeaf& leaf) { return std::tuple(leaf.level, leaf.origin); }
+
 // Masks of several fragments as one: a leaf that several name is taken once, with the least values.
 std::vector<FieldLeaf> united(std::vector<FieldLeaf> masks) {
-  std::ranges::stable_sort(masks, {}, [](const FieldLeaf& leaf) { return std::tuple(leaf.level, leaf.origin); });
+  if (std::ranges::is_sorted(masks, std::less_equal{}, place_of)) return masks;
+  std::ranges::stable_sort(masks, {}, place_of);
   std::vector<FieldLeaf> out;
   for (FieldLeaf& leaf : masks) {
     if (out.empty() || out.back().level != leaf.level || out.back().origin != leaf.origin) {
       out.push_back(std::move(leaf));
       continue;
     }
-    for (std::size_t i = 0; i < leaf.values.size(); ++i) out.back().values[i] = std::min(out.back().values[i], leaf.values[i]);
+    FieldLeaf& last = out.back();
+    if (!leaf.is_constant()) last.expand();
+    for (std::size_t i = 0; i < last.values.size(); ++i) last.values[i] = std::min(last.values[i], leaf.value(i));
+    last.compact();
   }
   return out;
+}
+
+Mask shared(std::vector<FieldLeaf> mask) { return std::make_shared<const std::vector<FieldLeaf>>(united(std::move(mask))); }
+
+bool is_guide(const Tool& tool) {
+  return tool.kind == ToolKind::drill_sleeve || tool.kind == ToolKind::distal_block || tool.kind == ToolKind::four_in_one_block;
 }
 
 CoordBox level_0_box(int level, Coord origin) {
@@ -66,6 +80,16 @@ Result<Room> Room::resume(Case bone, const SavedFields& saved, CutLimits limits,
     found->second.history.add_mask(RoomSeq{kLoaded}, of_body);
     room.show_whole(id, nobody_hears);
   }
+  for (const Tool& tool : saved.tools)
+    if (Result<void> added = room.know(tool); !added) return tl::unexpected(added.error());
+  // Set by nobody and not to be undone.
+  room.events_[RoomSeq{}] = {.kind = EventKind::tool};
+  for (const SceneItem& item : saved.items) {
+    if (!room.tools_->find(item.tool)) return refuse("the saved scene has an item of a tool that is not saved");
+    if (!room.exists(item.body)) return refuse("the saved scene has an item on a body that is not saved");
+    room.items_[item.id] = {{RoomSeq{}, item}};
+    room.last_item_ = std::max(room.last_item_, item.id);
+  }
   return room;
 }
 
@@ -99,7 +123,17 @@ std::vector<SceneItem> Room::items() const {
         std::find_if(rows.rbegin(), rows.rend(), [&](const ItemRow& row) { return !events_.at(row.place).undone; });
     if (newest != rows.rend() && newest->item && exists(newest->item->body)) standing.push_back(*newest->item);
   }
+  // Whether a guide is fixed follows from the pins that stand with it.
+  const std::vector<Standing> scene = with_tools(standing);
+  for (std::size_t i = 0; i < scene.size(); ++i)
+    if (is_guide(scene[i].tool)) standing[i].seated = pins_in(scene[i].tool, scene[i].item.pose_bone_item, scene) >= kPinsThatFix;
   return standing;
+}
+
+std::vector<Standing> Room::with_tools(const std::vector<SceneItem>& items) const {
+  std::vector<Standing> scene;
+  for (const SceneItem& item : items) scene.push_back({item, tools_->find(item.tool)->tool});
+  return scene;
 }
 
 Result<void> Room::check_member(AuthorId by) const {
@@ -152,8 +186,11 @@ void Room::show_whole(BodyId id, RoomEvent& event) {
   // Most of a piece's leaves are gone throughout and far from it: only those round it are drawn.
   for (const auto& [level, origins] : cut)
     for (const BlockKey& key : body.surface.touch(level, origins)) stale_.insert(key);
-  for (const BlockKey& key : bone_blocks())
-    if (key.body == id) stale_.insert(key);
+  std::vector<BlockKey> whole;
+  list_blocks(id, body, whole);
+  stale_.insert(whole.begin(), whole.end());
+  stale_.merge(focused(body));
+  for (const BlockKey& key : body.surface.coarse_blocks()) stale_.insert(key);
   std::ranges::move(leaves, std::back_inserter(event.leaves));
   event.bone = true;
 }
@@ -167,16 +204,23 @@ Result<RoomEvent> Room::add_tool(AuthorId by, const Tool& tool) {
     finish_event(event);
     return event;
   }
+  if (Result<void> known = know(tool); !known) return tl::unexpected(known.error());
+  event = begin_event(EventKind::tool, by, {});
+  event.tool = tools_->find(tool.hash());
+  finish_event(event);
+  return event;
+}
+
+Result<void> Room::know(const Tool& tool) {
+  if (tools_->find(tool.hash())) return {};
   const auto entries = tools_->entries();
   if (entries.size() >= kMostTools) return refuse("the room knows " + std::to_string(kMostTools) + " tools and takes no more");
   // States and lists name tools by their names, so that two must not have one.
   for (const ToolBox::Entry* entry : entries)
     if (entry->tool.name == tool.name)
       return failure(ErrorCode::exists, "the room has another tool of the name " + tool.name + "; give this one a name of its own");
-  event = begin_event(EventKind::tool, by, {});
-  event.tool = &tools_->add(tool);
-  finish_event(event);
-  return event;
+  tools_->add(tool);
+  return {};
 }
 
 // What was done to a piece as such falls with the split that made it; with a cut falls every later split of a body that
@@ -328,46 +372,67 @@ Result<RoomEvent> Room::remove_body(AuthorId by, BodyId body) {
   return event;
 }
 
-Result<RoomEvent> Room::split(BodyId parent, std::vector<Fragment> fragments, std::uint64_t seen) {
-  if (seen != lease_epoch_ || !exists(parent))
+Result<RoomEvent> Room::split(Separation found) {
+  if (found.seen != lease_epoch_ || !exists(found.parent))
     return failure(ErrorCode::unavailable, "bone has come back since these pieces were found");
-  if (fragments.empty()) return refuse("a split needs a piece");
-  Event row{.body = parent};
+  if (found.fragments.empty()) return refuse("a split needs a piece");
+  Event row{.body = found.parent};
   std::vector<FieldLeaf> taken;
   std::uint32_t next = last_body_;
-  for (Fragment& fragment : fragments) {
+  for (Fragment& fragment : found.fragments) {
     std::ranges::move(fragment.taken, std::back_inserter(taken));
     if (fragment.debris()) continue;
     const double h = bone().pitch_mm();
     const CoordBox reach = covering_samples(fragment.bounds.grown((kBandVoxels + 1) * h), h);
-    row.pieces.push_back({BodyId{++next}, reach, united(std::move(fragment.left))});
+    row.pieces.push_back({BodyId{++next}, reach, shared(std::move(fragment.left))});
   }
   if (bodies().size() + row.pieces.size() > kMostBodies)
     return refuse("the room has " + std::to_string(kMostBodies) + " bodies and makes no more; take some away");
-  row.taken = united(std::move(taken));
+  row.taken = shared(std::move(taken));
   last_body_ = next;
   RoomEvent event = begin_event(EventKind::split, AuthorId{}, std::move(row));
-  cut_apart(event.room_seq, events_.at(event.room_seq), event);
+  cut_apart(event.room_seq, events_.at(event.room_seq), event, std::move(found.fields));
   event.scene = true;
   ++bone_changes_;
   finish_event(event);
   return event;
 }
 
+// A copy of the parent with all but the piece gone.
+CutField Room::made_piece(const Body& parent, const Piece& piece) const {
+  CutField field(bone(), piece.body, tools_);
+  for (const FieldLeaf& leaf : parent.field.leaves()) field.restore(leaf);
+  for (const FieldLeaf& leaf : *piece.left) field.merge(leaf);
+  return field;
+}
+
+// What the parent lost since the copy that a piece was made from; between split and undo a field only falls.
+void Room::catch_up(const Body& parent, CutField& field) const {
+  FieldLeaf leaf;
+  for (const BodyLeaves& change : changes_) {
+    if (change.body != parent.field.body()) continue;
+    for (const Coord origin : change.origins) {
+      leaf.level = change.level;
+      leaf.origin = origin;
+      parent.field.read(leaf);
+      field.merge(leaf);
+    }
+  }
+}
+
 // The pieces are copies of the parent, each with all but itself gone; then the parent loses them.
-void Room::cut_apart(RoomSeq place, Event& row, RoomEvent& event) {
+void Room::cut_apart(RoomSeq place, Event& row, RoomEvent& event, std::vector<CutField> fields) {
   Body& parent = bodies_.at(row.body);
   const RoomSeq left_key{kLeftOfSplit | place.value};
-  if (!row.pieces.empty()) {
-    const std::vector<FieldLeaf> leaves = parent.field.leaves();
-    for (const Piece& piece : row.pieces) {
-      CutField field(bone(), piece.body, tools_);
-      CutHistory history = parent.history;
-      for (const FieldLeaf& leaf : leaves) field.restore(leaf);
-      for (const FieldLeaf& leaf : piece.left) field.merge(leaf);
-      history.add_mask(left_key, piece.left);
-      add_body(piece.body, std::move(field), std::move(history), piece.reach);
-    }
+  const bool ready = fields.size() == row.pieces.size();
+  for (std::size_t i = 0; i < row.pieces.size(); ++i) {
+    const Piece& piece = row.pieces[i];
+    const bool use = ready && fields[i].body() == piece.body;
+    if (use) catch_up(parent, fields[i]);
+    CutField field = use ? std::move(fields[i]) : made_piece(parent, piece);
+    CutHistory history = parent.history.fork();
+    history.add_mask(left_key, piece.left);
+    add_body(piece.body, std::move(field), std::move(history), piece.reach);
   }
   std::vector<LevelLeaves> changed;
   if (parent.history.contains(place)) {
@@ -376,7 +441,7 @@ void Room::cut_apart(RoomSeq place, Event& row, RoomEvent& event) {
   } else {
     parent.history.add_mask(place, row.taken);
     std::map<int, std::vector<Coord>> origins;
-    for (const FieldLeaf& leaf : row.taken)
+    for (const FieldLeaf& leaf : *row.taken)
       if (parent.field.merge(leaf)) origins[leaf.level].push_back(leaf.origin);
     for (auto& [level, of_level] : origins) changed.push_back({level, std::move(of_level)});
   }
@@ -396,6 +461,14 @@ Result<RoomEvent> Room::set_item(AuthorId by, SceneItem item) {
   const Vec3& at = item.pose_bone_item.position_mm;
   if (!((at.array() >= room.min_mm.array()).all() && (at.array() <= room.max_mm.array()).all()))
     return refuse("item.pose_bone_item is too far from the bone");
+  const std::vector<SceneItem> standing = items();
+  const std::vector<Standing> scene = with_tools(standing);
+  const auto before = std::ranges::find(scene, item.id, [](const Standing& one) { return one.item.id; });
+  const CutField& body = bodies_.at(item.body).field;
+  Result<SceneItem> ruled = set_by_rules(scene, before == scene.end() ? nullptr : &*before, {item, tools_->find(item.tool)->tool},
+                                         [&](const Vec3& p) { return body.solid_mm(p); });
+  if (!ruled) return tl::unexpected(ruled.error());
+  item = *ruled;
   if (item.id == 0) item.id = ++last_item_;
   RoomEvent event = begin_event(EventKind::scene, by, {.item = item.id});
   item.set_at = event.room_seq.value;
@@ -409,8 +482,10 @@ Result<RoomEvent> Room::set_item(AuthorId by, SceneItem item) {
 Result<RoomEvent> Room::remove_item(AuthorId by, std::uint32_t item) {
   if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
   const auto standing = items();
-  if (std::ranges::find(standing, item, &SceneItem::id) == standing.end())
-    return refuse("item " + std::to_string(item) + " does not stand in the scene");
+  const auto found = std::ranges::find(standing, item, &SceneItem::id);
+  if (found == standing.end()) return refuse("item " + std::to_string(item) + " does not stand in the scene");
+  const Tool& tool = tools_->find(found->tool)->tool;
+  if (is_guide(tool) && found->seated) return refuse("\"" + tool.name + "\" is fixed by pins; draw a pin first");
   RoomEvent event = begin_event(EventKind::scene, by, {.item = item});
   items_[item].push_back({event.room_seq, std::nullopt});
   event.item = item;

@@ -51,7 +51,8 @@ int run(std::size_t count, int orders, int threads, int lanes) {
   std::size_t samples = 0, between = 0;
   for (const FieldLeaf& leaf : reference.leaves()) {
     const auto band = static_cast<std::int16_t>(4.0 * 1024.0 * level_pitch_mm(bone.pitch_mm(), leaf.level));
-    for (const std::int16_t value : leaf.values) {
+    for (std::size_t i = 0; i < kLeafVoxels; ++i) {
+      const std::int16_t value = leaf.value(i);
       ++samples;
       between += value > -band && value < band ? 1 : 0;
     }

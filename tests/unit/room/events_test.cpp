@@ -213,6 +213,40 @@ TEST(RoomSplit, MakesABodyOfThePieceAndCutsReachBoth) {
   EXPECT_EQ(room.find_field(BodyId{1})->hash(), piece.hash());
 }
 
+// A piece made beforehand, from a copy that lacks the last cuts, is the one that the room would have made.
+TEST(RoomSplit, TakesAPieceThatWasMadeBeforehand) {
+  Room slow(test_block()), fast(test_block());
+  const AuthorId surgeon = slow.join(MemberKind::surgeon);
+  fast.join(MemberKind::surgeon);
+  const auto cuts = strokes(surgeon, 8, 41);
+  for (std::size_t i = 0; i < 4; ++i) {
+    commit(slow, cuts[i]);
+    commit(fast, cuts[i]);
+  }
+  Separation found{BodyId{0}, {half(fast.bone(), true)}, fast.lease_epoch()};
+  found.fields.emplace_back(fast.bone(), fast.next_body(), fast.tools());
+  (void)fast.take_changes();
+  for (FieldLeaf leaf : fast.field().leaves()) found.fields[0].restore(leaf);
+  for (const FieldLeaf& leaf : found.fragments[0].left) found.fields[0].merge(leaf);
+  for (std::size_t i = 4; i < 8; ++i) {
+    commit(slow, cuts[i]);
+    commit(fast, cuts[i]);
+  }
+  const auto split = fast.split(std::move(found));
+  ASSERT_TRUE(split) << split.error().message;
+  ASSERT_TRUE(slow.split(BodyId{0}, {half(slow.bone(), true)}, slow.lease_epoch()));
+  EXPECT_EQ(fast.find_field(BodyId{1})->hash(), slow.find_field(BodyId{1})->hash());
+  EXPECT_EQ(fast.field_hash(), slow.field_hash());
+  // Its history goes its own way.
+  for (Room* room : {&slow, &fast}) {
+    const RoomSeq second[] = {RoomSeq{2}, RoomSeq{7}};
+    ASSERT_TRUE(room->undo(surgeon, second));
+    ASSERT_TRUE(room->redo_last(surgeon, 1));
+    ASSERT_TRUE(room->undo_last(surgeon, 2, {}));
+  }
+  EXPECT_EQ(fast.field_hash(), slow.field_hash());
+}
+
 TEST(RoomSplit, DebrisVanishesInTheSameEvent) {
   Room room(test_block());
   const auto split = room.split(BodyId{0}, {half(room.bone(), true, 0.5)}, room.lease_epoch());
@@ -269,12 +303,13 @@ TEST(RoomScene, KeepsWhatWasSetAndTakesItBack) {
   moved.seated = true;
   moved.pose_bone_item.position_mm.x() = 3;
   ASSERT_TRUE(room.set_item(surgeon, moved));
-  EXPECT_TRUE(room.items()[0].seated);
+  EXPECT_EQ(room.items()[0].pose_bone_item.position_mm.x(), 3);
+  EXPECT_FALSE(room.items()[0].seated) << "without pins, whatever it says of itself";
   ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
-  EXPECT_FALSE(room.items()[0].seated);
+  EXPECT_EQ(room.items()[0].pose_bone_item.position_mm.x(), 1);
   EXPECT_EQ(room.lease_epoch(), 1u) << "no bone came back";
   ASSERT_TRUE(room.redo_last(surgeon, 1));
-  EXPECT_TRUE(room.items()[0].seated);
+  EXPECT_EQ(room.items()[0].pose_bone_item.position_mm.x(), 3);
 
   const auto second = room.set_item(surgeon, guide);
   EXPECT_EQ(second->item, 2u);
@@ -284,6 +319,72 @@ TEST(RoomScene, KeepsWhatWasSetAndTakesItBack) {
   EXPECT_EQ(room.items()[0].id, 2u);
   ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
   EXPECT_EQ(room.items().size(), 2u);
+}
+
+TEST(RoomScene, PinsFixAGuideUntilOneIsDrawn) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  const Tool block = tool_named("guide-2");
+  SceneItem guide;
+  guide.tool = block.hash();
+  guide.pose_bone_item = pose_along({1, 2, 0}, {0, 0, -1});
+  const std::uint32_t id = room.set_item(surgeon, guide)->item;
+  const GuideShape shape = guide_shape(block);
+  ASSERT_GE(shape.pin_holes.size(), 2u);
+  std::vector<std::uint32_t> pins;
+  for (std::size_t hole = 0; hole < 2; ++hole) {
+    EXPECT_FALSE(room.items()[0].seated);
+    const GuideBore& bore = shape.pin_holes[hole];
+    SceneItem pin;
+    pin.tool = tool_named("pin-1").hash();
+    pin.pose_bone_item = guide.pose_bone_item * Pose{bore.entry_mm + (bore.length_mm + 20.0) * bore.direction, Eigen::Quaterniond::Identity()};
+    const auto set = room.set_item(surgeon, pin);
+    ASSERT_TRUE(set) << set.error().message;
+    pins.push_back(set->item);
+  }
+  EXPECT_TRUE(room.items()[0].seated) << "by the pins that came after it";
+  SceneItem moved = room.items()[0];
+  moved.pose_bone_item.position_mm.x() += 2.0;
+  const RoomSeq before = room.room_seq();
+  const auto refused = room.set_item(surgeon, moved);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("pin"), std::string::npos) << refused.error().message;
+  EXPECT_FALSE(room.remove_item(surgeon, id)) << "nor is it taken off";
+  EXPECT_EQ(room.room_seq(), before) << "what is refused has no place in the order";
+  ASSERT_TRUE(room.remove_item(surgeon, pins[0]));
+  EXPECT_FALSE(room.items()[0].seated);
+  ASSERT_TRUE(room.set_item(surgeon, moved));
+  ASSERT_TRUE(room.undo_last(surgeon, 2, {}));
+  EXPECT_TRUE(room.items()[0].seated) << "with the pin that is back";
+}
+
+TEST(RoomScene, AScrewGoesByItsThread) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  const Tool tool = tool_named("screw-1");
+  SceneItem screw;
+  screw.tool = tool.hash();
+  screw.pose_bone_item = pose_along({1, 2, -4}, {0, 0, -1});
+  screw.id = room.set_item(surgeon, screw)->item;
+  SceneItem deeper = screw;
+  deeper.turns = 3;
+  EXPECT_FALSE(room.set_item(surgeon, deeper)) << "turned on the spot";
+  deeper.pose_bone_item.position_mm.z() -= 3 * tool.thread_pitch_mm;
+  EXPECT_TRUE(room.set_item(surgeon, deeper));
+  deeper.pose_bone_item.position_mm.x() += 1.0;
+  EXPECT_FALSE(room.set_item(surgeon, deeper)) << "out of its hole";
+}
+
+// A cup of 50 mm on the flat of the block touches it at its pole only.
+TEST(RoomScene, ATrialImplantIsSeatedWhereItFits) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  SceneItem cup;
+  cup.tool = tool_named("trial-cup-50").hash();
+  cup.pose_bone_item = pose_along({0, 0, 0}, {0, 0, -1});
+  cup.seated = true;
+  ASSERT_TRUE(room.set_item(surgeon, cup));
+  EXPECT_FALSE(room.items()[0].seated);
 }
 
 TEST(RoomScene, RefusesItemsThatCannotStandHere) {
@@ -448,6 +549,16 @@ TEST(RoomResume, GoesOnFromWhatWasSaved) {
   saved.bodies = room.bodies();
   for (const BodyId body : saved.bodies)
     for (const FieldLeaf& leaf : room.find_field(body)->leaves()) saved.leaves.push_back(leaf);
+  SceneItem pin;
+  Tool tool = tool_named("pin-1");
+  tool.name = "pin-of-ours";
+  tool.diameter_mm += 0.5;
+  saved.tools = {tool};
+  pin.id = 7;
+  pin.body = BodyId{1};
+  pin.tool = tool.hash();
+  pin.pose_bone_item = pose_along({3, 2, -4}, {0, 0, -1});
+  saved.items = {pin};
 
   Result<Room> resumed = Room::resume(test_block(), saved);
   ASSERT_TRUE(resumed) << resumed.error().message;
@@ -466,11 +577,24 @@ TEST(RoomResume, GoesOnFromWhatWasSaved) {
   ASSERT_TRUE(room.undo_last(surgeon, 2, {}));
   ASSERT_TRUE(resumed->undo_last(again, 2, {}));
   EXPECT_EQ(resumed->field_hash(), room.field_hash()) << "undo rebuilds on top of what was loaded";
+  EXPECT_EQ(resumed->items(), saved.items);
+  pin.id = 0;
+  EXPECT_EQ(resumed->set_item(again, pin)->item, 8u) << "numbers are not given twice";
+  EXPECT_NE(resumed->tools()->find(tool.hash()), nullptr);
+  ASSERT_TRUE(resumed->remove_item(again, 7));
+  ASSERT_TRUE(resumed->undo_last(again, 1, {}));
+  EXPECT_EQ(resumed->items().size(), 2u);
   ASSERT_TRUE(resumed->remove_body(again, BodyId{1}));
 
   SavedFields other = saved;
   other.case_hash.bytes[0] ^= 1;
   EXPECT_EQ(Room::resume(test_block(), other).error().code, ErrorCode::unsupported);
+  other = saved;
+  other.tools.clear();
+  EXPECT_EQ(Room::resume(test_block(), other).error().code, ErrorCode::invalid_input) << "a pin of no tool";
+  other = saved;
+  other.tools[0].name = "pin-1";
+  EXPECT_EQ(Room::resume(test_block(), other).error().code, ErrorCode::exists);
   other = saved;
   ++other.kernel_version;
   EXPECT_EQ(Room::resume(test_block(), other).error().code, ErrorCode::unsupported);

@@ -55,6 +55,33 @@ TEST(FieldFile, BringsBackTheSameBone) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp.path()), std::filesystem::directory_iterator()), 1);
 }
 
+TEST(FieldFile, KeepsTheSceneAndItsToolsBitForBit) {
+  const test::TempDir temp;
+  const Cut2 scene;
+  SavedFields saved = scene.saved();
+  Tool pin = *find_tool("pin-1");
+  pin.name = "pin-of-ours";
+  pin.diameter_mm += 0.1;
+  saved.tools = {pin};
+  for (const std::uint32_t id : {2u, 9u}) {
+    SceneItem item;
+    item.id = id;
+    item.body = {3};
+    item.tool = pin.hash();
+    item.pose_bone_item = pose_along({1.0 / 3.0, -2.7, 1e-9}, Vec3{0.3, -0.5, id / 7.0});
+    item.turns = id / 3.0;
+    item.seated = id == 9;
+    item.set_at = 77 + id;
+    saved.items.push_back(item);
+  }
+  ASSERT_TRUE(save_fields(temp / "fields.vdb", saved));
+  const auto loaded = load_fields(temp / "fields.vdb");
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  EXPECT_EQ(loaded->items, saved.items);
+  ASSERT_EQ(loaded->tools.size(), 1u);
+  EXPECT_EQ(loaded->tools[0].hash(), pin.hash());
+}
+
 TEST(FieldFile, IsAnOrdinaryVdbFileForOthers) {
   const test::TempDir temp;
   const Cut2 scene;
@@ -72,7 +99,7 @@ TEST(FieldFile, IsAnOrdinaryVdbFileForOthers) {
   for (const FieldLeaf& leaf : scene.parent.leaves())
     if (leaf.level == 2) {
       const openvdb::Coord at(leaf.origin.x + 1, leaf.origin.y + 2, leaf.origin.z + 3);
-      EXPECT_EQ(grid->tree().getValue(at), static_cast<float>(leaf.values[64 + 16 + 3]) / 1024.0f);
+      EXPECT_EQ(grid->tree().getValue(at), static_cast<float>(leaf.value(64 + 16 + 3)) / 1024.0f);
     }
 }
 

@@ -138,6 +138,49 @@ TEST(Fragments, ASawnBlockIsTwoPiecesWithTheirVolumes) {
   EXPECT_TRUE(FragmentFinder(piece).take_fragments(piece).empty());
 }
 
+// What was removed is kerf and piece, although the masks of the piece are of two levels. A sample on an edge of the block
+// counts half where a quarter of it is bone: that much may be too much along the edges of what is gone.
+TEST(Fragments, WhatAPieceTakesAlongCountsAsRemoved) {
+  for (const double x0 : {1.06, 4.0, 5.3}) {
+    SCOPED_TRACE(x0);
+    Room room(plain_block(20.0, 10.0, 0.5));
+    room.remove_box(2, slab_of(x0, x0 + 1.04));
+    EXPECT_NEAR(room.field.removed_mm3(), 1.04 * 20.0 * 10.0, 0.01 * 1.04 * 20.0 * 10.0);
+    const auto pieces = room.pieces();
+    ASSERT_EQ(pieces.size(), 1u);
+    room.remove(pieces[0].taken);
+    const double all = (10.0 - x0) * 20.0 * 10.0;
+    const double edges_mm = 4.0 * (10.0 - x0) + 2.0 * (20.0 + 10.0);
+    EXPECT_NEAR(room.field.removed_mm3(), all, 0.25 * 0.5 * 0.5 * edges_mm + 0.001 * all);
+  }
+}
+
+// Most leaves of a piece's masks are of one value and take a hundredth of the memory.
+TEST(Fragments, MasksKeepWhatIsGoneThroughoutAsOneValue) {
+  Room room(plain_block(20.0, 10.0, 0.5));
+  room.remove_box(2, slab_of(1.06, 2.1));
+  const CutField before = copy_of(room.field);
+  const auto pieces = room.pieces();
+  ASSERT_EQ(pieces.size(), 1u);
+  for (const auto* mask : {&pieces[0].taken, &pieces[0].left})
+    for (const FieldLeaf& leaf : *mask) {
+      const bool equal = std::ranges::all_of(leaf.values, [&](std::int16_t v) { return v == leaf.values.front(); });
+      EXPECT_EQ(leaf.is_constant(), equal);
+    }
+  // Listed in full they do the same to a field, to its hash and to a history.
+  CutField compact = body_of(pieces[0], before), full = copy_of(compact);
+  Fragment listed = pieces[0];
+  for (FieldLeaf& leaf : listed.left) leaf.expand();
+  EXPECT_EQ(listed.left, pieces[0].left);
+  full = body_of(listed, before);
+  EXPECT_EQ(full.hash(), compact.hash());
+  EXPECT_EQ(full.leaves(), compact.leaves());
+  std::vector<FieldLeaf> leaves = compact.leaves();
+  EXPECT_TRUE(std::ranges::any_of(leaves, &FieldLeaf::is_constant));
+  for (FieldLeaf& leaf : leaves) leaf.expand();
+  EXPECT_EQ(field_hash(std::move(leaves), 0.5), compact.hash());
+}
+
 // No point is solid in both, and none that was solid is lost or gained: at samples of every level, and anywhere.
 void expect_partition(const CutField& before, const CutField& parent, const CutField& piece, const Box& box, int allowed = 0) {
   for (int level = 0; level < kLevels; ++level) {
