@@ -188,8 +188,8 @@ Result<FieldLeaf> from_wire(const v1::FieldLeaf& leaf) {
     const auto low = static_cast<std::uint8_t>(leaf.values()[2 * i]), high = static_cast<std::uint8_t>(leaf.values()[2 * i + 1]);
     return static_cast<std::int16_t>(low | high << 8);
   };
-  out.values.assign(kLeafVoxels, value(0));
-  for (std::size_t i = 1; 2 * i < size; ++i) out.values[i] = value(i);
+  out.values.resize(size / 2);
+  for (std::size_t i = 0; i < out.values.size(); ++i) out.values[i] = value(i);
   return out;
 }
 

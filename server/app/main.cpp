@@ -13,7 +13,7 @@
 #include "common/runtime/log.hpp"
 #include "common/runtime/progress.hpp"
 #include "common/runtime/stop_signal.hpp"
-#include "common/tools/tool_file.hpp"
+#include "common/volume/mesh_distance.hpp"
 #include "server/net/room_server.hpp"
 
 namespace {
@@ -86,7 +86,7 @@ Result<void> load_tools(const std::filesystem::path& folder, ToolBox& box) {
   if (error) return failure(ErrorCode::not_found, "the tools' folder " + folder.string() + " cannot be read: " + error.message());
   std::sort(files.begin(), files.end());
   for (const std::filesystem::path& file : files) {
-    const Result<Tool> tool = load_tool(file);
+    const Result<Tool> tool = load_tool_file(file);
     if (!tool) return tl::unexpected(tool.error());
     const auto entries = box.entries();
     const auto same = std::find_if(entries.begin(), entries.end(), [&](const auto* e) { return e->tool.name == tool->name; });
@@ -166,9 +166,12 @@ int main(int argc, char** argv) {
   app.add_option("--case", options.case_folder, "Folder of the case, as osteon-import writes it")->required();
   app.add_option("--listen", options.listen, "HOST:PORT on this machine; port 0 lets the system choose")->capture_default_str();
   app.add_option("--address-file", options.address_file, "Written with HOST:PORT when clients may come");
-  app.add_option("--tools", options.tools_folder, "Folder of tool files (*.yaml) that the room knows beside the built-in tools");
-  app.add_option("--save", options.save_file, "Cut fields of all bodies (.vdb), written at a clean stop and when a client asks");
-  app.add_option("--resume", options.resume_file, "Cut fields that --save wrote: the room goes on from them");
+  app.add_option("--tools", options.tools_folder,
+                 "Folder of tool files (*.yaml, with the STL files they name) that the room knows beside the built-in tools");
+  app.add_option("--save", options.save_file,
+                 "The cut bone in all its bodies, the scene and added tools (.vdb), written at a clean stop and when a client asks");
+  app.add_option("--resume", options.resume_file,
+                 "What --save wrote: the room goes on from there; what came before cannot be undone");
   app.add_option("--summary", options.summary_file, "JSON written at the end: field hash, counts, ticks, latencies");
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
 

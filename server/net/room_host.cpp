@@ -16,6 +16,7 @@
 #include "common/field/kernel.hpp"
 #include "common/runtime/periodic.hpp"
 #include "common/wire/convert.hpp"
+#include "server/net/piece_watch.hpp"
 #include "server/net/room_rows.hpp"
 
 namespace osteon {
@@ -91,9 +92,10 @@ struct RoomHost::Impl {
     RoomSeq room_seq;
     RoomCounts counts;
     std::map<BodyId, CutField> bodies;
+    std::vector<SceneItem> items;
   };
   BoneCopy copy_bone();
-  void look_for_pieces();
+  void ask_for_split(Separation found);
 
   Room room;
   std::shared_mutex room_mutex;
@@ -131,9 +133,10 @@ struct RoomHost::Impl {
 
   std::mutex pieces_mutex;
   std::condition_variable pieces_wake;
-  bool pieces_due = false, pieces_end = false;
-  std::set<BodyId> lost_finders;               // under pieces_mutex: what they found was not taken
-  std::map<BodyId, FragmentFinder> finders;    // of the piece thread
+  bool pieces_due = true, pieces_end = false;
+  std::uint64_t looks_begun = 0, looks_done = 0;  // under pieces_mutex
+  bool look_wanted = false;                       // someone waits for the next one
+  PieceWatch pieces{room, room_mutex, [this](std::vector<FieldLeaf>& leaves) { read_leaves(leaves); }};  // of the piece thread
 
   std::mutex jobs_mutex;
   std::condition_variable jobs_wake;
@@ -424,10 +427,6 @@ void RoomHost::Impl::run_jobs() {
 RoomHost::RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress)
     : impl_(std::make_unique<Impl>(std::move(room), rates)) {
   impl_->make_whole_surface(progress);
-  // Of the bone before it is cut here: what those cuts separate is found as it comes apart.
-  for (const BodyId body : impl_->room.bodies())
-    impl_->finders.emplace(body, FragmentFinder(*impl_->room.find_field(body)));
-  (void)impl_->room.take_changes();
   impl_->tick_thread = std::thread([this] { impl_->run_ticks(); });
   impl_->mesh_thread = std::thread([this] { impl_->run_mesh(); });
   impl_->piece_thread = std::thread([this] { impl_->run_pieces(); });
@@ -533,6 +532,7 @@ RoomHost::Impl::BoneCopy RoomHost::Impl::copy_bone() {
       const std::shared_lock lock(room_mutex);
       copy.room_seq = room.room_seq();
       copy.counts = room.counts();
+      copy.items = room.items();
       cuts = std::move(*meanwhile);
       meanwhile.reset();
       // Bone that came back or fell apart meanwhile: what was copied before is of another bone. A room in which that
@@ -583,6 +583,10 @@ SavedFields RoomHost::saved_fields() {
   saved.kernel_version = kKernelVersion;
   saved.room_seq = copy.room_seq;
   saved.pitch_mm = bone().pitch_mm();
+  saved.items = copy.items;
+  const std::shared_ptr<ToolBox> built_in = builtin_tool_box();
+  for (const ToolBox::Entry* entry : impl_->room.tools()->entries())
+    if (!built_in->find(entry->hash)) saved.tools.push_back(entry->tool);
   for (const auto& [id, field] : copy.bodies) {
     saved.bodies.push_back(id);
     std::ranges::move(field.leaves(), std::back_inserter(saved.leaves));
@@ -590,83 +594,55 @@ SavedFields RoomHost::saved_fields() {
   return saved;
 }
 
-// [piece thread] The finders follow the bodies at some distance. What they find is a queued event like any other.
+// [piece thread] What it finds is a queued event like any other.
 void RoomHost::Impl::run_pieces() {
   while (true) {
     {
       std::unique_lock lock(pieces_mutex);
       pieces_wake.wait(lock, [&] { return pieces_due || pieces_end; });
       if (pieces_end) return;
-      pieces_due = false;
+      pieces_due = look_wanted = false;
+      ++looks_begun;
     }
-    look_for_pieces();
+    for (Separation& found : pieces.look()) ask_for_split(std::move(found));
     std::unique_lock lock(pieces_mutex);
-    pieces_wake.wait_for(lock, rates_.pieces, [&] { return pieces_end; });
+    looks_done = looks_begun;
+    pieces_wake.notify_all();
+    pieces_wake.wait_for(lock, rates_.pieces, [&] { return pieces_end || look_wanted; });
   }
 }
 
-void RoomHost::Impl::look_for_pieces() {
-  std::vector<BodyLeaves> changes;
-  std::vector<BodyId> present;
+// Waits for the room's decision: until then the room must not tell anyone of its changes, see Separation.
+void RoomHost::Impl::ask_for_split(Separation found) {
+  const auto shared = std::make_shared<Separation>(std::move(found));  // by the queued event and by this thread
+  bool decided = false;
   {
-    const std::unique_lock lock(room_mutex);
-    changes = room.take_changes();
-    present = room.bodies();
-  }
-  {
-    const std::lock_guard lock(pieces_mutex);
-    for (const BodyId body : lost_finders) finders.erase(body);
-    lost_finders.clear();
-  }
-  std::erase_if(finders, [&](const auto& entry) { return !std::ranges::binary_search(present, entry.first); });
-  for (const BodyId body : present) {
-    if (finders.contains(body)) continue;
-    // Labelled from a copy, since that takes longer than a tick may wait.
-    std::vector<FieldLeaf> leaves;
-    {
-      const std::shared_lock lock(room_mutex);
-      if (const CutField* field = room.find_field(body)) leaves = field->leaf_places();
-    }
-    CutField copy(room.bone(), body, room.tools());
-    if (body == BodyId{0}) {
-      // From the bone as it was, so that what has come apart since is found.
-      for (const FieldLeaf& leaf : leaves) changes.push_back({body, leaf.level, {leaf.origin}});
-    } else {
-      read_leaves(leaves);
-      for (const FieldLeaf& leaf : leaves) copy.restore(leaf);
-    }
-    finders.emplace(body, FragmentFinder(copy));
-  }
-  std::set<BodyId> touched;
-  for (const BodyLeaves& change : changes) {
-    const std::shared_lock lock(room_mutex);
-    const CutField* field = room.find_field(change.body);
-    if (!field) continue;
-    finders.at(change.body).touch(*field, change.level, change.origins);
-    touched.insert(change.body);
-  }
-  for (const BodyId body : touched) {
-    std::vector<Fragment> fragments;
-    std::uint64_t seen = 0;
-    {
-      const std::shared_lock lock(room_mutex);
-      const CutField* field = room.find_field(body);
-      if (!field) continue;
-      fragments = finders.at(body).take_fragments(*field);
-      seen = room.lease_epoch();
-    }
-    if (fragments.empty()) continue;
     const std::lock_guard lock(queue_mutex);
-    if (queue_closed) return;
-    queue.emplace_back(std::in_place_type<QueuedEvent>, QueuedEvent{[body, fragments, seen](Room& r) { return r.split(body, fragments, seen); },
-                                [this, body](const Result<RoomEvent>& split) {
-                                  if (split) return;
-                                  const std::lock_guard lost(pieces_mutex);
-                                  lost_finders.insert(body);
-                                  pieces_due = true;
-                                },
-                                Clock::now()});
+    if (queue_closed) return;  // stop() looks once more
+    queue.emplace_back(std::in_place_type<QueuedEvent>,
+                       QueuedEvent{[shared](Room& r) { return r.split(std::move(*shared)); },
+                                   [this, shared, &decided](const Result<RoomEvent>& split) {
+                                     const std::lock_guard answered(pieces_mutex);
+                                     if (!split && split.error().code == ErrorCode::unavailable) {
+                                       pieces.lose(shared->parent);
+                                       pieces_due = true;
+                                     }
+                                     decided = true;
+                                     pieces_wake.notify_all();
+                                   },
+                                   Clock::now()});
   }
+  std::unique_lock lock(pieces_mutex);
+  pieces_wake.wait(lock, [&] { return decided; });
+}
+
+void RoomHost::find_pieces() {
+  std::unique_lock lock(impl_->pieces_mutex);
+  // One that has begun may have missed the newest cuts.
+  const std::uint64_t wanted = impl_->looks_begun + 1;
+  impl_->pieces_due = impl_->look_wanted = true;
+  impl_->pieces_wake.notify_all();
+  impl_->pieces_wake.wait(lock, [&] { return impl_->looks_done >= wanted || impl_->pieces_end; });
 }
 
 Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink) {
@@ -783,7 +759,13 @@ void RoomHost::stop() {
     impl_->pieces_end = true;
     impl_->pieces_wake.notify_all();
   }
-  if (impl_->piece_thread.joinable()) impl_->piece_thread.join();
+  if (impl_->piece_thread.joinable()) {
+    impl_->piece_thread.join();
+    // What the last cuts separated, so that the bone is left, and saved, in its pieces.
+    for (Separation& found : impl_->pieces.look()) (void)impl_->room.split(std::move(found));
+    impl_->room_seq = impl_->room.room_seq().value;
+    impl_->make_stale_blocks();
+  }
   {
     const std::lock_guard lock(impl_->jobs_mutex);
     impl_->jobs_end = true;

@@ -95,6 +95,7 @@ class RoomHost {
   void run_slowly(std::function<void()> job);
   AuthorId join(MemberKind kind);
   [[nodiscard]] BoneStatus bone_status();
+  void find_pieces();                        // waits until what was cut so far is looked through, and its pieces are bodies
   [[nodiscard]] SavedFields saved_fields();  // of all bodies, at its room_seq
   // The sink hears every row after those of its leaves. Error: invalid_input (the author may not cut, or
   // has an open session).

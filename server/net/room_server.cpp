@@ -172,6 +172,7 @@ const std::string& RoomServer::address() const { return impl_->address; }
 HostHealth RoomServer::health() const { return impl_->host->health(); }
 
 RoomServerSummary RoomServer::stop() {
+  impl_->host->find_pieces();
   // Streams hear why first; those whose reader does not read are cut off after a moment.
   impl_->host->end_streams("the server stops");
   impl_->server->Shutdown(std::chrono::system_clock::now() + std::chrono::milliseconds(500));

@@ -608,6 +608,7 @@ class RoomServiceImpl final : public RoomBase {
       return refuse(reactor, invalid("file_name is not a plain name that ends in .vdb"));
     const std::filesystem::path file = name.empty() ? files_.save : files_.save.parent_path() / name;
     host_.run_slowly([this, reactor, response, file] {
+      host_.find_pieces();
       const SavedFields saved = host_.saved_fields();
       if (const Result<void> written = save_fields(file, saved); !written)
         return reactor->Finish({StatusCode::INTERNAL, written.error().message});

@@ -279,5 +279,36 @@ TEST_F(RoomRpc, ASawnOffPieceBecomesABodyForEveryone) {
   EXPECT_EQ(of_piece(), 0);
 }
 
+// Saved and stopped right after the cut that separates a piece: the piece is a body in both.
+TEST_F(RoomRpc, ThePieceOfTheLastCutIsFoundBeforeTheBoneIsSaved) {
+  const auto hand = surgeon();
+  std::vector<Cut> cuts;
+  for (double z = 0.0; z > -14.0; z -= 2.0)
+    for (const double y : {-14.0, 0.0}) {
+      Cut cut = straight_cut(tool_named("burr-round-5"), {5, y, z}, {5, y + 14.0, z}, {0, 0, -1}, cuts.size() + 1);
+      cut.author = hand->author();
+      cuts.push_back(cut);
+    }
+  send(*hand, cuts);
+  ASSERT_TRUE(wait_until([&] { return hand->own() == cuts.size(); }, kPatience));
+  v1::SaveFieldsRequest request;
+  request.set_file_name("last.vdb");
+  v1::SaveFieldsResponse saved;
+  ASSERT_TRUE(call(&v1::RoomService::Stub::SaveFields, request, saved).ok());
+  EXPECT_EQ(load_fields(dir_ / "last.vdb", test_block())->bodies.size(), 2u);
+  v1::UndoResponse undone;
+  ASSERT_TRUE(undo(1, undone).ok());
+  ASSERT_TRUE(wait_until([&] { return hand->seq().value >= undone.room_seq(); }, kPatience));
+  v1::RedoRequest redo;
+  redo.set_count(1);
+  v1::RedoResponse redone;
+  ASSERT_TRUE(call(&v1::RoomService::Stub::Redo, redo, redone).ok());
+  const RoomServerSummary summary = server_->stop();
+  server_.reset();
+  EXPECT_EQ(summary.bone.bodies.size(), 2u);
+  EXPECT_EQ(summary.fields.bodies.size(), 2u);
+  EXPECT_EQ(summary.bone.field_hash, field_hash(summary.fields.leaves, test_block().pitch_mm()));
+}
+
 }  // namespace
 }  // namespace osteon

@@ -1,0 +1,141 @@
+// Guided drilling with all programs: a trembling hand drills through a sleeve that it has set on the bone, and leaves a
+// pin and a screw. What is checked is what the server saved: the hole by what is solid, the scene by its items.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <numbers>
+
+#include "common/geometry/mesh_file.hpp"
+#include "common/tools/guide.hpp"
+#include "common/volume/field_file.hpp"
+#include "tests/integration/stage.hpp"
+#include "tests/support/scenes/bones.hpp"
+#include "tests/unit/room/members.hpp"
+
+namespace osteon::test {
+namespace {
+
+using namespace std::chrono_literals;
+using nlohmann::json;
+
+json entry_at(double x_mm, double y_mm) { return {{"point_mm", {x_mm, y_mm, 0.0}}, {"axis", {0.0, 0.0, -1.0}}}; }
+
+CutField field_of(const Case& bone, const SavedFields& saved) {
+  CutField field(bone, BodyId{0});
+  for (const FieldLeaf& leaf : saved.leaves)
+    if (leaf.body == BodyId{0}) field.restore(leaf);
+  return field;
+}
+
+TEST(Guided, ATremblingHandDrillsWhereTheGuideSays) {
+  constexpr double kLimit_mm = 0.15;  // an eighth of a voxel of the case beside what the field resolves
+  const TempDir kept;
+  const auto screen = Xvfb::start("640x480");
+  ASSERT_TRUE(screen) << "Xvfb is needed; deploy/install installs it";
+  Stage stage(30.0, {"--save", kept / "bone.vdb"});
+  ScriptedViewer viewer(stage.address(), *screen, {"--summary", stage / "viewer.json"});
+  ASSERT_TRUE(viewer.tell("wait surface"));
+  const json drill{{"action", "drill"}, {"tool", "drill-3.2"}, {"guide", true}, {"tremor_mm", 1.2}, {"hand", "expert"}, {"spindle_rpm", 1000},
+             {"feed_mm_per_s", 2.0}, {"beyond_mm", 3.0}};
+  const json pin{{"action", "drill"}, {"tool", "pin-1"}, {"to_mm", 10.0}, {"leave", true}, {"spindle_rpm", 800}, {"entry", entry_at(9, 6)}};
+  const json screw{{"action", "screw"}, {"tool", "screw-1"}, {"spindle_rpm", 240}, {"entry", entry_at(-9, 6)}};
+  Process haptic = stage.start_haptic("hand", {{"steps", json::array({json{{"action", "place"}, {"tool", "guide-1"}, {"entry", entry_at(2, -3)}},
+                                                                    drill, pin, screw})}});
+  ASSERT_EQ(haptic.wait(180s), 0) << haptic.err();
+  ASSERT_TRUE(viewer.tell("wait items 3"));
+  const json summary = read_json(stage / "hand.json");
+  ASSERT_TRUE(viewer.tell("wait seq " + std::to_string(summary.at("room_seq").get<std::uint64_t>())));
+  EXPECT_EQ(viewer.process().terminate(), 0);
+  ASSERT_EQ(stage.server().terminate(), 0);
+  const json server = read_json(stage / "server.json");
+  EXPECT_EQ(summary.at("field_hash"), server.at("field_hash"));
+  EXPECT_EQ(read_json(stage / "viewer.json").at("scene_mesh_hash"), server.at("mesh_hash"));
+
+  const auto bone = Case::load(stage / "case");
+  ASSERT_TRUE(bone) << bone.error().message;
+  const auto saved = load_fields(kept / "bone.vdb", *bone);
+  ASSERT_TRUE(saved) << saved.error().message;
+  ASSERT_EQ(saved->items.size(), 3u);
+  EXPECT_EQ(saved->items[0].tool, find_tool("guide-1")->hash());
+  EXPECT_LT((saved->items[0].pose_bone_item.position_mm - Vec3(2, -3, 0)).norm(), 0.5);
+  EXPECT_EQ(saved->items[1].tool, find_tool("pin-1")->hash());
+  EXPECT_NEAR(saved->items[1].pose_bone_item.position_mm.z(), -10.0, 0.5);
+  EXPECT_EQ(saved->items[2].tool, find_tool("screw-1")->hash());
+  EXPECT_GT(saved->items[2].turns, 1.0);
+
+  // Beyond a bore of length L the axis stays within c (1 + 2 l / L) of the middle, c the play; so the hole, which all
+  // its ways together make, stays within that of the drill's radius.
+  const GuideBore bore = guide_shape(*find_tool("guide-1")).bores.at(0);
+  const double radius = 1.6, play = 0.5 * (bore.diameter_mm - 2.0 * radius);
+  ASSERT_GT(play, 0.0);
+  const CutField field = field_of(*bone, *saved);
+  const Pose guide = saved->items[0].pose_bone_item;
+  for (double depth = 2.0; depth < 28.0; depth += 2.0) {
+    SCOPED_TRACE(depth);
+    const double bound = play * (1.0 + 2.0 * depth / bore.length_mm);
+    EXPECT_GT(field.solid_mm(guide.point({0, 0, depth})), 0.0);
+    for (int i = 0; i < 24; ++i) {
+      const double angle = 2.0 * std::numbers::pi * i / 24.0;
+      const Vec3 out{std::cos(angle), std::sin(angle), 0};
+      EXPECT_LT(field.solid_mm(guide.point((radius + bound + kLimit_mm) * out + Vec3(0, 0, depth))), 0.0);
+    }
+  }
+}
+
+// The shape of a tool of the box, written as triangles, comes back from a folder as a tool of its own.
+TEST(ToolFolder, ABallOfTrianglesCutsAsABallDoes) {
+  const TempDir tools, kept;
+  constexpr double kRadius_mm = 2.5;
+  Stage stage(16.0, {});
+  ASSERT_EQ(stage.server().terminate(), 0);
+  TriangleMesh ball;
+  constexpr int kAround = 96, kRows = 48;
+  const auto corner = [&](int row, int i) {
+    const double polar = std::numbers::pi * row / kRows, angle = 2.0 * std::numbers::pi * i / kAround;
+    const Vec3 p = kRadius_mm * Vec3{std::sin(polar) * std::cos(angle), std::sin(polar) * std::sin(angle), std::cos(polar) - 1.0};
+    return std::array<float, 3>{static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())};
+  };
+  ball.positions_mm.push_back(corner(0, 0));
+  for (int row = 1; row < kRows; ++row)
+    for (int i = 0; i < kAround; ++i) ball.positions_mm.push_back(corner(row, i));
+  ball.positions_mm.push_back(corner(kRows, 0));
+  const auto index = [&](int row, int i) {
+    return static_cast<std::uint32_t>(row == 0 ? 0 : row == kRows ? 1 + (kRows - 1) * kAround : 1 + (row - 1) * kAround + i % kAround);
+  };
+  for (int row = 0; row < kRows; ++row)
+    for (int i = 0; i < kAround; ++i) {
+      if (row > 0) ball.triangles.push_back({index(row, i), index(row + 1, i), index(row, i + 1)});
+      if (row < kRows - 1) ball.triangles.push_back({index(row, i + 1), index(row + 1, i), index(row + 1, i + 1)});
+    }
+  ASSERT_TRUE(write_stl(ball, tools / "ball.stl"));
+  std::ofstream(tools / "ball.yaml") << "name: ball-of-the-folder\ntitle: Ball\nkind: mesh\nmesh: ball.stl\nmesh_pitch_mm: 0.25\n"
+                                        "spindle_rpm: 1000\nteeth: 4\nfeed_mm_per_rev: 1\ncut_level: 2\n";
+  stage.start_server({"--tools", tools / "", "--save", kept / "bone.vdb"});
+  {
+    Surgeon hand(stage.address(), stage / "cache");
+    ASSERT_TRUE(wait_until([&] { return hand.complete(); }, kPatience));
+    const ToolBox::Entry* tool = nullptr;
+    for (const ToolBox::Entry* entry : hand.session().tools()->entries())
+      if (entry->tool.name == "ball-of-the-folder") tool = entry;
+    ASSERT_NE(tool, nullptr);
+    Cut cut = straight_cut(tool->tool, {0.013, 0.027, -10}, {0.013, 0.027, -10}, {0, 0, -1});
+    cut.author = hand.author();
+    ASSERT_TRUE(hand.session().send(cut));
+    ASSERT_TRUE(wait_until([&] { return hand.own() == 1; }, kPatience)) << hand.rejected();
+    EXPECT_EQ(wire::to_wire(hand.hash()), status_of(hand.session().room()).field_hash());
+  }
+  ASSERT_EQ(stage.server().terminate(), 0);
+  const double whole = 4.0 / 3.0 * std::numbers::pi * std::pow(kRadius_mm, 3);
+  // Chords of the triangles and the lattice of 0.25 mm both make it a little smaller.
+  EXPECT_NEAR(read_json(stage / "server.json").at("removed_mm3").get<double>(), whole, 0.02 * whole);
+
+  // The tool is in the file: without its folder the bone goes on, and can be cut with it.
+  stage.start_server({"--resume", kept / "bone.vdb"});
+  Surgeon resumed(stage.address(), stage / "cache");
+  ASSERT_TRUE(wait_until([&] { return resumed.complete(); }, kPatience));
+  EXPECT_TRUE(std::ranges::any_of(resumed.session().tools()->entries(), [](const auto* e) { return e->tool.name == "ball-of-the-folder"; }));
+}
+
+}  // namespace
+}  // namespace osteon::test
