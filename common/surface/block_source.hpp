@@ -32,6 +32,7 @@ void gather_block(const Field& field, const SurfaceBlocks& blocks, const BlockKe
   out.level_pitch_mm = level_pitch_mm(pitch_mm, key.level);
   out.covered = blocks.covered(key);
   out.seams = {};
+  out.uncut = false;
   if (out.covered == kWhollyCovered) return;
   out.seams = blocks.seams(key);
   const auto solid = [&](int level, const CoordBox& box, std::span<float> to) { field.gather_solid(level, box, to); };
@@ -41,10 +42,12 @@ void gather_block(const Field& field, const SurfaceBlocks& blocks, const BlockKe
     constexpr std::size_t kSamples = static_cast<std::size_t>(kBlockApron) * kBlockApron * kBlockApron;
     out.solid_mm.resize(kSamples);
     out.surface_mm.resize(kSamples);
-    if (!field.gather_both(key.level, box, out.solid_mm, out.surface_mm)) {
+    const auto gathered = field.gather_block(key.level, box, out.solid_mm, out.surface_mm);
+    if (gathered == Field::Gathered::nothing) {
       out.covered = kWhollyCovered;
       return;
     }
+    out.uncut = gathered == Field::Gathered::solid;
   } else {
     gather_level(solid, key.level, box, out.solid_mm);
     gather_level(surface, key.level, box, out.surface_mm);

@@ -16,12 +16,17 @@ std::uint32_t drawn_cells(CoveredGroups covered, int x, int y) {
 
 }  // namespace
 
-const std::array<std::int32_t, kCellEdges>& Contour::offsets() {
+const std::array<Contour::CaseTriangles, 256>& Contour::case_triangles() {
   static const auto made = [] {
-    std::array<std::int32_t, kCellEdges> all{};
-    for (std::size_t e = 0; e < all.size(); ++e) {
-      const CellEdge edge = marching_cubes_table().edges[e];
-      all[e] = edge.axis * kBlockSampleCount + sample_number(edge.corner >> 2 & 1, edge.corner >> 1 & 1, edge.corner & 1);
+    const MarchingCubesTable& table = marching_cubes_table();
+    std::array<CaseTriangles, 256> all{};
+    for (std::size_t c = 0; c < all.size(); ++c) {
+      all[c].corners = table.cases[c].corners;
+      for (std::size_t i = 0; i < table.cases[c].corners; ++i) {
+        const CellEdge edge = table.edges[table.cases[c].edges[i]];
+        all[c].offsets[i] = static_cast<std::int16_t>(
+            edge.axis * kBlockSampleCount + sample_number(edge.corner >> 2 & 1, edge.corner >> 1 & 1, edge.corner & 1));
+      }
     }
     return all;
   }();

@@ -22,28 +22,46 @@ class Contour {
 
   [[nodiscard]] std::span<const std::uint16_t> vertex_edges() const { return {edge_of_vertex_.data(), vertices_}; }
 
+  // visit(number, x, y, z, axis) for every vertex in that order: its edge goes from the sample along the axis.
+  template <class Visit>
+  void for_vertices(Visit visit) const {
+    std::size_t vertex = 0;
+    for (unsigned x = 0; x < kBlockSamples; ++x)
+      for (unsigned y = 0; y < kBlockSamples; ++y)
+        for (unsigned axis = 0; axis < 3; ++axis)
+          for (std::uint32_t left = edges_[axis][x][y]; left != 0; left &= left - 1)
+            visit(vertex++, x, y, static_cast<unsigned>(std::countr_zero(left)), axis);
+  }
+
   // visit(a, b, c) for every triangle that is not shrunk to a line.
   template <class Visit>
   void for_triangles(Visit visit) const {
-    const MarchingCubesTable& table = marching_cubes_table();
+    const auto& cases = case_triangles();
     for (int x = 0; x < kBlockCells; ++x)
-      for (int y = 0; y < kBlockCells; ++y)
+      for (int y = 0; y < kBlockCells; ++y) {
+        const std::uint32_t row00 = solid_[x][y], row01 = solid_[x][y + 1];
+        const std::uint32_t row10 = solid_[x + 1][y], row11 = solid_[x + 1][y + 1];
         for (std::uint32_t left = cells_[x][y]; left != 0; left &= left - 1) {
           const int z = std::countr_zero(left);
-          const auto pair = [&](int dx, int dy) { return solid_[x + dx][y + dy] >> z & 3; };
-          const CellCase& cell = table.cases[pair(0, 0) | pair(0, 1) << 2 | pair(1, 0) << 4 | pair(1, 1) << 6];
+          const unsigned corners = (row00 >> z & 3) | (row01 >> z & 3) << 2 | (row10 >> z & 3) << 4 | (row11 >> z & 3) << 6;
+          const CaseTriangles& cell = cases[corners];
           const std::uint16_t* at = vertex_of_edge_.data() + sample_number(x, y, z);
           for (std::size_t i = 0; i < cell.corners; i += 3) {
-            const std::uint32_t a = at[offsets()[cell.edges[i]]], b = at[offsets()[cell.edges[i + 1]]],
-                                c = at[offsets()[cell.edges[i + 2]]];
+            const std::uint32_t a = at[cell.offsets[i]], b = at[cell.offsets[i + 1]], c = at[cell.offsets[i + 2]];
             if (!collapsed_ || (a != b && b != c && c != a)) visit(a, b, c);
           }
         }
+      }
   }
 
  private:
   using Rows = std::uint32_t[kBlockSamples][kBlockSamples];
-  static const std::array<std::int32_t, kCellEdges>& offsets();
+  // A case's triangles, their corners as steps in vertex_of_edge_ from the cell's first sample.
+  struct CaseTriangles {
+    std::uint16_t corners = 0;
+    std::array<std::int16_t, 3 * kCaseTriangles> offsets{};
+  };
+  static const std::array<CaseTriangles, 256>& case_triangles();
   [[nodiscard]] bool used(int edge) const;
   void collapse(const SeamRule& seams);
   void collapse_face(const std::array<int, 3>& origin, int axis, int cells);

@@ -208,7 +208,10 @@ struct Vertex {
 class Mesher {
  public:
   // False where the block has no surface.
-  bool begin(const BlockSamples& samples) { return begin(samples, samples.solid_mm, samples.surface_mm, samples.covered, samples.seams); }
+  bool begin(const BlockSamples& samples) {
+    const std::vector<float>& surface = samples.uncut ? samples.solid_mm : samples.surface_mm;
+    return begin(samples, samples.solid_mm, surface, samples.covered, samples.seams);
+  }
 
   bool begin(const BlockSamples& samples, std::span<const float> solid, std::span<const float> surface, CoveredGroups covered,
              const Seams& seams) {
@@ -242,22 +245,22 @@ class Mesher {
   // visit(number, x, y, z, axis, vertex) for every vertex in order.
   template <class Visit>
   void for_vertices(double level_pitch_mm, Visit visit) const {
-    const auto edges = contour_.vertex_edges();
     // On the imported surface S is zero up to the rounding of the vertex's place.
     const float below_surface = -static_cast<float>(level_pitch_mm) / 32.0f;
-    for (std::size_t v = 0; v < edges.size(); ++v) {
-      const unsigned axis = edges[v] / kBlockSampleCount, sample = edges[v] % kBlockSampleCount;
-      const unsigned x = sample / (kN * kN), y = sample / kN % kN, z = sample % kN;
+    const bool ruled = rule_.any();
+    const float *const field = field_, *const raw = raw_, *const surface = surface_;
+    contour_.for_vertices([&](std::size_t v, unsigned x, unsigned y, unsigned z, unsigned axis) {
       Vertex vertex;
-      if (!rule_.any() || !on_coarse_edge({static_cast<int>(x), static_cast<int>(y), static_cast<int>(z)}, axis, below_surface, vertex)) {
+      const std::array at{static_cast<int>(x), static_cast<int>(y), static_cast<int>(z)};
+      if (!ruled || !on_coarse_edge(at, axis, below_surface, vertex)) {
         const std::size_t a = gathered(x, y, z), b = a + kNeighbour[axis];
-        const float t = field_[a] / (field_[a] - field_[b]);
-        vertex.place = edge_place(field_[a], field_[b]);
-        vertex.gradient = gradient_between(raw_ + a, raw_ + b, t, kSlab, kRow);
-        vertex.cut = surface_[a] + t * (surface_[b] - surface_[a]) < below_surface;
+        const float t = field[a] / (field[a] - field[b]);
+        vertex.place = edge_place(field[a], field[b]);
+        vertex.gradient = gradient_between(raw + a, raw + b, t, kSlab, kRow);
+        vertex.cut = surface[a] + t * (surface[b] - surface[a]) < below_surface;
       }
       visit(v, x, y, z, axis, vertex);
-    }
+    });
   }
 
  private:
@@ -343,18 +346,23 @@ class Places {
  public:
   Places(const BlockKey& key, double level_pitch_mm) : unit_mm_(level_pitch_mm / kEdgePlaces) {
     const std::array<std::int32_t, 3> index{key.index.x, key.index.y, key.index.z};
-    for (std::size_t k = 0; k < 3; ++k) first_[k] = std::int64_t{index[k]} * kBlockCells * kEdgePlaces;
+    for (std::size_t k = 0; k < 3; ++k) {
+      first_[k] = std::int64_t{index[k]} * kBlockCells * kEdgePlaces;
+      for (unsigned i = 0; i < kN; ++i) on_sample_[k][i] = along(k, i * kEdgePlaces);
+    }
   }
-  [[nodiscard]] std::array<float, 3> at(unsigned x, unsigned y, unsigned z, unsigned axis, int place) const {
-    std::array<std::int64_t, 3> whole{first_[0] + std::int64_t{x} * kEdgePlaces, first_[1] + std::int64_t{y} * kEdgePlaces,
-                                      first_[2] + std::int64_t{z} * kEdgePlaces};
-    whole[axis] += place;
-    return {static_cast<float>(static_cast<double>(whole[0]) * unit_mm_), static_cast<float>(static_cast<double>(whole[1]) * unit_mm_),
-            static_cast<float>(static_cast<double>(whole[2]) * unit_mm_)};
+  void put(unsigned x, unsigned y, unsigned z, unsigned axis, int place, std::array<float, 3>& position_mm) const {
+    position_mm = {on_sample_[0][x], on_sample_[1][y], on_sample_[2][z]};
+    position_mm[axis] = along(axis, (axis == 0 ? x : axis == 1 ? y : z) * kEdgePlaces + static_cast<unsigned>(place));
   }
 
  private:
+  [[nodiscard]] float along(std::size_t axis, unsigned places) const {
+    return static_cast<float>(static_cast<double>(first_[axis] + places) * unit_mm_);
+  }
+
   std::array<std::int64_t, 3> first_;
+  std::array<std::array<float, kN>, 3> on_sample_;
   double unit_mm_;
 };
 
@@ -394,14 +402,28 @@ void mesh_block(const BlockSamples& samples, Mesh& mesh) {
   if (!any) return;
   const Places places(samples.key, samples.level_pitch_mm);
   at.for_vertices(samples.level_pitch_mm, [&](std::size_t v, unsigned x, unsigned y, unsigned z, unsigned axis, const Vertex& vertex) {
-    mesh.positions_mm[v] = places.at(x, y, z, axis, vertex.place);
-    const auto& g = vertex.gradient;
-    const float squared = g[0] * g[0] + g[1] * g[1] + g[2] * g[2], scale = squared > 0.0f ? 1.0f / std::sqrt(squared) : 0.0f;
-    mesh.normals[v] = {g[0] * scale, g[1] * scale, squared > 0.0f ? g[2] * scale : 1.0f};
+    places.put(x, y, z, axis, vertex.place, mesh.positions_mm[v]);
+    mesh.normals[v] = vertex.gradient;
     mesh.cut_face[v] = vertex.cut;
   });
-  mesh.triangles.reserve(2 * count + 64);
-  at.contour().for_triangles([&](std::uint32_t a, std::uint32_t b, std::uint32_t c) { mesh.triangles.push_back({a, b, c}); });
+  // Roots and quotients several at a time.
+  static thread_local std::array<float, 3 * kBlockSampleCount> scales;
+  for (std::size_t v = 0; v < count; ++v) {
+    const auto& g = mesh.normals[v];
+    const float squared = g[0] * g[0] + g[1] * g[1] + g[2] * g[2];
+    scales[v] = squared > 0.0f ? 1.0f / std::sqrt(squared) : 0.0f;
+  }
+  for (std::size_t v = 0; v < count; ++v) {
+    auto& n = mesh.normals[v];
+    n = {n[0] * scales[v], n[1] * scales[v], scales[v] > 0.0f ? n[2] * scales[v] : 1.0f};
+  }
+  // Into memory that is large enough for any block, then out at once.
+  using Triangle = std::array<std::uint32_t, 3>;
+  constexpr std::size_t kCells = static_cast<std::size_t>(kBlockCells) * kBlockCells * kBlockCells;
+  static thread_local std::array<Triangle, kCaseTriangles * kCells> made;
+  Triangle* next = made.data();
+  at.contour().for_triangles([&](std::uint32_t a, std::uint32_t b, std::uint32_t c) { *next++ = {a, b, c}; });
+  mesh.triangles.assign(made.data(), next);
 }
 
 Result<Mesh> decode_block(const BlockKey& key, const BlockPayload& payload, double level_pitch_mm) {
@@ -439,7 +461,7 @@ Result<Mesh> decode_block(const BlockKey& key, const BlockPayload& payload, doub
   for (std::size_t v = 0; v < count; ++v) {
     if (place_bytes[v] > kEdgePlaces) return broken("has a vertex beyond its edge");
     const unsigned axis = edges[v] / kBlockSampleCount, sample = edges[v] % kBlockSampleCount;
-    mesh.positions_mm[v] = places.at(sample / (kN * kN), sample / kN % kN, sample % kN, axis, place_bytes[v]);
+    places.put(sample / (kN * kN), sample / kN % kN, sample % kN, axis, place_bytes[v], mesh.positions_mm[v]);
     mesh.normals[v] = decode_normal(normals[2 * v], normals[2 * v + 1]);
     mesh.cut_face[v] = some_cut ? cuts[v / 8] >> (v % 8) & 1 : (flags & kAllCut) != 0;
   }

@@ -56,6 +56,7 @@ struct BlockSamples {
   double level_pitch_mm = 0;
   std::vector<float> solid_mm;     // f on block_samples(key), negative where bone is left
   std::vector<float> surface_mm;   // S on the same samples: a vertex below the imported surface lies on a cut face
+  bool uncut = false;              // solid_mm is S as well, and surface_mm is not read
   CoveredGroups covered = 0;       // kWhollyCovered: the block is not drawn, and nothing else here is read
   Seams seams;
   // For each number of levels that seams has: f on coarse_samples(key, steps), for the normals on that seam.

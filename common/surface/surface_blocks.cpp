@@ -103,35 +103,90 @@ Seams SurfaceBlocks::seams(const BlockKey& key) const {
   return seams;
 }
 
-std::vector<BlockKey> SurfaceBlocks::touch(int level, const std::vector<Coord>& changed_leaves) {
-  std::set<BlockKey> stale;
-  std::vector<Coord> fresh;
-  const bool any_coarse = std::ranges::any_of(coarse_, [](const Indices& drawn) { return !drawn.empty(); });
-  const auto box_of = [](Coord origin) { return CoordBox{origin, origin + Coord{kLeafSize - 1, kLeafSize - 1, kLeafSize - 1}}; };
-  if (level > 0)
-    for (const Coord origin : changed_leaves)
-      for_each(readers(box_of(origin), 1), [&](Coord index) {
-        if (fine_[static_cast<std::size_t>(level - 1)].insert(index).second) fresh.push_back(index);
-      });
+// Whether seams(key).most() is at least `steps`.
+bool SurfaceBlocks::meets(const BlockKey& key, int steps) const {
+  const bool no_coarse = std::ranges::all_of(coarse_, [](const Indices& drawn) { return drawn.empty(); });
+  if (key.level - steps < kCoarsestLevel || (key.level - steps < 0 && no_coarse)) return false;
+  const std::int32_t wide = key.level == kFinest ? 1 : 2;  // half blocks along a block; at the finest level only whole ones
+  bool found = false;
+  for_each({{-1, -1, -1}, {wide, wide, wide}}, [&](Coord at) {
+    const auto inside = [wide](std::int32_t i) { return i >= 0 && i < wide; };
+    if (found || (inside(at.x) && inside(at.y) && inside(at.z))) return;
+    const Coord finest = wide == 1 ? key.index + at : at_shift(2 * key.index + at, kFinest - 1 - key.level);
+    found = key.level - level_at(finest) >= steps;
+  });
+  return found;
+}
 
-  const auto distinct = [](std::vector<Coord>& indices) {
-    std::ranges::sort(indices);
-    indices.erase(std::unique(indices.begin(), indices.end()), indices.end());
-  };
-  std::vector<Coord> near, far;
+namespace {
+
+// The distinct blocks that read any of a cut's leaves. A cut's leaves lie together, so they are marked in a box.
+class Readers {
+ public:
+  // Blocks of level `to` that read, up to `reach` samples beyond their cells, samples of these leaves of level `from`.
+  void find(const std::vector<Coord>& leaves, int from, int to, std::int32_t reach, std::vector<Coord>& found) {
+    found.clear();
+    boxes_.clear();
+    CoordBox all;
+    for (const Coord origin : leaves) {
+      const CoordBox box =
+          readers(at_level({origin, origin + Coord{kLeafSize - 1, kLeafSize - 1, kLeafSize - 1}}, from, to), reach);
+      if (!boxes_.empty() && boxes_.back() == box) continue;
+      boxes_.push_back(box);
+      if (all.empty()) all = box;
+      all = {{std::min(all.min.x, box.min.x), std::min(all.min.y, box.min.y), std::min(all.min.z, box.min.z)},
+             {std::max(all.max.x, box.max.x), std::max(all.max.y, box.max.y), std::max(all.max.z, box.max.z)}};
+    }
+    if (boxes_.empty()) return;
+    const Coord d = all.dims();
+    if (std::int64_t{d.x} * d.y > kMostMarks / d.z) {
+      for (const CoordBox& box : boxes_) for_each(box, [&](Coord index) { found.push_back(index); });
+      std::ranges::sort(found);
+      found.erase(std::unique(found.begin(), found.end()), found.end());
+      return;
+    }
+    marks_.assign(static_cast<std::size_t>(d.x * d.y * d.z), 0);
+    for (const CoordBox& box : boxes_)
+      for_each({box.min - all.min, box.max - all.min},
+               [&](Coord at) { marks_[static_cast<std::size_t>((at.x * d.y + at.y) * d.z + at.z)] = 1; });
+    std::size_t i = 0;
+    for_each(all, [&](Coord index) {
+      if (marks_[i++] != 0) found.push_back(index);
+    });
+  }
+
+ private:
+  static constexpr std::int64_t kMostMarks = 1 << 15;
+  std::vector<CoordBox> boxes_;
+  std::vector<std::uint8_t> marks_;
+};
+
+}  // namespace
+
+std::vector<BlockKey> SurfaceBlocks::touch(int level, const std::vector<Coord>& changed_leaves) {
+  std::vector<BlockKey> stale;
+  if (changed_leaves.empty()) return stale;
+  Readers readers_of;
+  std::vector<Coord> fresh, near, far;
+  const bool any_coarse = std::ranges::any_of(coarse_, [](const Indices& drawn) { return !drawn.empty(); });
+  if (level > 0) {
+    readers_of.find(changed_leaves, level, level, 1, near);
+    for (const Coord index : near)
+      if (fine_[static_cast<std::size_t>(level - 1)].insert(index).second) fresh.push_back(index);
+  }
+
   for (int l = any_coarse ? kCoarsestLevel : 0; l < kLevels; ++l) {
+    if (l > 0 && fine_[static_cast<std::size_t>(l - 1)].empty()) continue;  // nothing is drawn at it
+    readers_of.find(changed_leaves, level, l, 1, near);
+    for (const Coord index : near)
+      if (const BlockKey key{body_, l, index}; drawn(key)) stale.push_back(key);
     // The normals on a seam come from the coarser level's samples, which reach further: 2, 4, … samples.
     const int most_steps = any_coarse ? l - kCoarsestLevel : l;
-    for (int steps = 0; steps <= most_steps; ++steps) {
-      std::vector<Coord>& indices = steps == 0 ? near : far;
-      indices.clear();
-      for (const Coord origin : changed_leaves)
-        for_each(readers(at_level(box_of(origin), level, l), 1 << steps), [&](Coord index) { indices.push_back(index); });
-      distinct(indices);
-      for (const Coord index : indices) {
+    for (int steps = 1; steps <= most_steps; ++steps) {
+      readers_of.find(changed_leaves, level, l, 1 << steps, far);
+      for (const Coord index : far) {
         const BlockKey key{body_, l, index};
-        if (steps > 0 && std::ranges::binary_search(near, index)) continue;
-        if (drawn(key) && (steps == 0 || seams(key).most() >= steps)) stale.insert(key);
+        if (!std::ranges::binary_search(near, index) && drawn(key) && meets(key, steps)) stale.push_back(key);
       }
     }
   }
@@ -139,16 +194,18 @@ std::vector<BlockKey> SurfaceBlocks::touch(int level, const std::vector<Coord>& 
   // Where a block is drawn for the first time, the coarser ones give up their cells and the others change their seams.
   for (const Coord index : fresh) {
     for (int l = 0; l < level; ++l)
-      if (const BlockKey key{body_, l, shift_down(index, level - l)}; drawn(key)) stale.insert(key);
+      if (const BlockKey key{body_, l, shift_down(index, level - l)}; drawn(key)) stale.push_back(key);
     for (int l = 1; l < kLevels; ++l) {
       const std::int32_t wide = l > level ? 1 << (l - level) : 1;
       const Coord first = at_shift(index, l - level);
       for_each({first - Coord{1, 1, 1}, first + Coord{wide, wide, wide}}, [&](Coord at) {
-        if (const BlockKey key{body_, l, at}; drawn(key)) stale.insert(key);
+        if (const BlockKey key{body_, l, at}; drawn(key)) stale.push_back(key);
       });
     }
   }
-  return {stale.begin(), stale.end()};
+  std::ranges::sort(stale);
+  stale.erase(std::unique(stale.begin(), stale.end()), stale.end());
+  return stale;
 }
 
 std::vector<BlockKey> SurfaceBlocks::focus(std::span<const Focus> focuses, const CoordBox& bone_samples, double pitch_mm) {

@@ -42,6 +42,7 @@ class SurfaceBlocks {
   using Indices = std::unordered_set<Coord, CoordHash>;
   // At which level a place is drawn, named by the block of the finest level there.
   [[nodiscard]] int level_at(Coord finest) const;
+  [[nodiscard]] bool meets(const BlockKey& key, int steps) const;
   [[nodiscard]] int base_level(Coord block) const;  // of a block of level 0: 0 or below
   [[nodiscard]] bool cut_at(int level, Coord index) const { return fine_[static_cast<std::size_t>(level - 1)].contains(index); }
   [[nodiscard]] bool coarse_at(int level, Coord index) const { return coarse_[static_cast<std::size_t>(-1 - level)].contains(index); }

@@ -385,6 +385,10 @@ Box Case::bounds() const {
 }
 
 void Case::gather_surface(const CoordBox& box, std::span<float> out) const { grids_->surface.gather(box, out); }
+bool Case::view_surface(const CoordBox& box, std::span<LeafView> leaves) const {
+  grids_->surface.view(box, leaves);
+  return std::ranges::any_of(leaves, [](const LeafView& leaf) { return leaf.samples != nullptr; });
+}
 void Case::gather_density(const CoordBox& box, std::span<float> out) const { grids_->density.gather(box, out); }
 double Case::surface_mm(const Vec3& point_mm) const { return grids_->surface.trilinear(point_mm / pitch_mm()); }
 double Case::density_g_cm3(const Vec3& point_mm) const { return grids_->density.trilinear(point_mm / pitch_mm()); }

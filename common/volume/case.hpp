@@ -7,6 +7,7 @@
 #include <string>
 
 #include "common/core/digest.hpp"
+#include "common/volume/block_gather.hpp"
 #include "common/core/result.hpp"
 #include "common/volume/dense_volume.hpp"
 #include "common/volume/iso_surface.hpp"
@@ -71,6 +72,8 @@ class Case {
 
   // Samples of level 0, z fastest. Signed distance S clipped to ±4 h, and density.
   void gather_surface(const CoordBox& box, std::span<float> out) const;
+  // The leaves of S that meet the box, x slowest; false where all samples of them are on one side, beyond the band.
+  bool view_surface(const CoordBox& box, std::span<LeafView> leaves) const;
   void gather_density(const CoordBox& box, std::span<float> out) const;
   // Trilinear, at any point of the bone frame.
   [[nodiscard]] double surface_mm(const Vec3& point_mm) const;

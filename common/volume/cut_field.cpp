@@ -10,6 +10,7 @@
 
 #include "common/core/check.hpp"
 #include "common/field/kernel.hpp"
+#include "common/volume/block_gather.hpp"
 #include "common/volume/sparse_volume.hpp"
 
 namespace osteon {
@@ -101,6 +102,17 @@ void gather_at_level(const SparseVolume& cuts, int from_level, int level, const 
   scratch.coarse.resize(count(coarse));
   cuts.gather(coarse, scratch.coarse);
   interpolate(coarse, scratch.coarse, box, shift, out, scratch.lines);
+}
+
+// R at its clip says only that no cut is near: there the depth is that of S.
+void take_cut(std::span<const float> cuts, float uncut, std::span<float> out) {
+  const float* cut = cuts.data();
+  float* solid = out.data();
+  const std::size_t samples = out.size();
+  for (std::size_t i = 0; i < samples; ++i) {
+    const float other = cut[i] < uncut ? -cut[i] : solid[i];
+    solid[i] = solid[i] < other ? other : solid[i];
+  }
 }
 
 std::int16_t to_quanta(float mm) { return static_cast<std::int16_t>(std::lround(mm * 1024.0f)); }
@@ -363,19 +375,60 @@ void CutField::gather_solid(int level, const CoordBox& box, std::span<float> out
   take_cuts(level, box, out, scratch);
 }
 
-bool CutField::gather_both(int level, const CoordBox& box, std::span<float> solid, std::span<float> surface) const {
+CutField::Gathered CutField::gather_block(int level, const CoordBox& box, std::span<float> solid,
+                                          std::span<float> surface) const {
+  OSTEON_CHECK(is_block(box) && solid.size() == kBlockVolume && surface.size() == kBlockVolume);
   static thread_local GatherScratch scratch;  // blocks are made many at a time, on any thread
-  bool any = grids_->bone.has_surface(coarse_box(box, level));
-  for (int from = 0; from < kLevels && !any; ++from) {
+  using Out = std::span<float, kBlockVolume>;
+  std::array<LeafView, kBlockLeaves> leaves;  // of S at level 0, else of R of the block's own level
+  const CoordBox coarse = coarse_box(box, level);
+  const bool any_surface = level == 0 ? grids_->bone.view_surface(box, leaves) : grids_->bone.has_surface(coarse);
+  std::array<bool, kLevels> any_cut{};
+  bool any = false;
+  std::array<LeafView, kBlockLeaves> own;
+  for (int from = 0; from < kLevels; ++from) {
+    const SparseVolume& cuts = grids_->cuts[static_cast<std::size_t>(from)];
     const std::int32_t fine = 1 << std::max(0, from - level);
-    any = grids_->cuts[static_cast<std::size_t>(from)].any_stored(
-        from <= level ? coarse_box(box, level - from) : CoordBox{fine * box.min, fine * box.max});
+    const CoordBox there = from < level ? coarse_box(box, level - from) : CoordBox{fine * box.min, fine * box.max};
+    bool& here = any_cut[static_cast<std::size_t>(from)];
+    here = from == level ? cuts.view(box, own) : cuts.any_stored(there);
+    any |= here;
   }
-  if (!any) return false;
-  gather_surface(level, box, surface, scratch);
-  std::ranges::copy(surface, solid.begin());
-  take_cuts(level, box, solid, scratch);
-  return true;
+  if (!any_surface && !any) return Gathered::nothing;
+
+  float* const uncut = any ? surface.data() : solid.data();
+  if (level == 0) {
+    copy_block(leaves, Out(uncut, kBlockVolume));
+  } else {
+    scratch.coarse.resize(count(coarse));
+    grids_->bone.gather_surface(coarse, scratch.coarse);
+    interpolate_block(scratch.coarse, level, Out(uncut, kBlockVolume));
+  }
+  if (!any) return Gathered::solid;
+
+  bool first = true;
+  for (int from = 0; from < kLevels; ++from) {
+    if (!any_cut[static_cast<std::size_t>(from)]) continue;
+    const SparseVolume& cuts = grids_->cuts[static_cast<std::size_t>(from)];
+    if (from == level) {
+      const std::span<const float, kBlockVolume> before(first ? surface.data() : solid.data(), kBlockVolume);
+      cut_block(own, cuts.background(), before, Out(solid.data(), kBlockVolume));
+    } else {
+      if (first) std::ranges::copy(surface, solid.begin());
+      scratch.cut.resize(kBlockVolume);
+      if (from < level) {
+        const CoordBox there = coarse_box(box, level - from);
+        scratch.coarse.resize(count(there));
+        cuts.gather(there, scratch.coarse);
+        interpolate_block(scratch.coarse, level - from, Out(scratch.cut.data(), kBlockVolume));
+      } else {
+        cuts.gather_every(1 << (from - level), box, scratch.cut);
+      }
+      take_cut(scratch.cut, cuts.background(), solid);
+    }
+    first = false;
+  }
+  return Gathered::both;
 }
 
 void CutField::take_cuts(int level, const CoordBox& box, std::span<float> out, GatherScratch& scratch) const {
@@ -386,15 +439,7 @@ void CutField::take_cuts(int level, const CoordBox& box, std::span<float> out, G
     if (!cuts.any_stored(there)) continue;
     scratch.cut.resize(out.size());
     gather_at_level(cuts, from, level, box, scratch.cut, scratch);
-    // R at its clip says only that no cut is near: there the depth is that of S.
-    const float uncut = cuts.background();
-    const float* cut = scratch.cut.data();
-    float* solid = out.data();
-    const std::size_t samples = out.size();
-    for (std::size_t i = 0; i < samples; ++i) {
-      const float other = cut[i] < uncut ? -cut[i] : solid[i];
-      solid[i] = solid[i] < other ? other : solid[i];
-    }
+    take_cut(scratch.cut, cuts.background(), out);
   }
 }
 

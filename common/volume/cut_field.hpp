@@ -69,9 +69,10 @@ class CutField {
   // band of a level, its R says nothing and f has the depth of S.
   void gather_solid(int level, const CoordBox& box, std::span<float> out) const;
   void gather_solid(int level, const CoordBox& box, std::span<float> out, GatherScratch& scratch) const;
-  // Both at once, for a mesher. False, and nothing written, where all samples are on one side of the surface and no cut is
-  // stored.
-  bool gather_both(int level, const CoordBox& box, std::span<float> solid, std::span<float> surface) const;
+  // Both at once for a mesh block of 19³ samples. Nothing is written where all samples are on one side of the surface and no
+  // cut is stored, and f alone where there is no cut: S is the same.
+  enum class Gathered { nothing, solid, both };
+  Gathered gather_block(int level, const CoordBox& box, std::span<float> solid, std::span<float> surface) const;
   // f at a point, each grid trilinear.
   [[nodiscard]] double solid_mm(const Vec3& point_mm) const;
   [[nodiscard]] std::size_t memory_bytes() const;  // of R: leaves, constants and the trees over them

@@ -103,7 +103,32 @@ void SparseVolume::gather_every(std::int32_t stride, const CoordBox& box, std::s
       }
 }
 
+bool SparseVolume::view(const CoordBox& box, std::span<LeafView> leaves) const {
+  const Tree& tree = impl_->grid->tree();
+  const float uncut = background();
+  if (tree.root().getTableSize() == 0) {
+    std::ranges::fill(leaves, LeafView{nullptr, uncut});
+    return false;
+  }
+  const Grid::ConstUnsafeAccessor accessor(tree);
+  const Coord first = floor_to(box.min, kLeafSize);
+  bool any = false;
+  std::size_t i = 0;
+  for (std::int32_t x = first.x; x <= box.max.x; x += kLeafSize)
+    for (std::int32_t y = first.y; y <= box.max.y; y += kLeafSize)
+      for (std::int32_t z = first.z; z <= box.max.z; z += kLeafSize) {
+        const openvdb::Coord origin(x, y, z);
+        const Leaf* leaf = accessor.probeConstLeaf(origin);
+        leaves[i] = leaf ? LeafView{leaf->buffer().data(), 0.0f} : LeafView{nullptr, accessor.getValue(origin)};
+        any |= leaf != nullptr || leaves[i].constant != uncut;
+        ++i;
+      }
+  OSTEON_CHECK(i == leaves.size());
+  return any;
+}
+
 bool SparseVolume::any_stored(const CoordBox& box) const {
+  if (impl_->grid->tree().root().getTableSize() == 0) return false;
   const Grid::ConstUnsafeAccessor accessor = impl_->grid->getConstUnsafeAccessor();
   const Coord first = floor_to(box.min, kLeafSize);
   for (std::int32_t x = first.x; x <= box.max.x; x += kLeafSize)

@@ -9,6 +9,7 @@
 
 #include "common/core/result.hpp"
 #include "common/geometry/lattice.hpp"
+#include "common/volume/block_gather.hpp"
 
 namespace osteon {
 
@@ -25,6 +26,8 @@ class SparseVolume {
   void gather(const CoordBox& box, std::span<float> out) const;  // z fastest
   // Only every `stride`th sample, a power of two up to kLeafSize: those at stride · box.
   void gather_every(std::int32_t stride, const CoordBox& box, std::span<float> out) const;
+  // The leaves that meet the box, x slowest, and whether any of them is other than one of the background.
+  bool view(const CoordBox& box, std::span<LeafView> leaves) const;
   // Whether any leaf, or constant other than the background, meets the box.
   [[nodiscard]] bool any_stored(const CoordBox& box) const;
   [[nodiscard]] double trilinear(const Vec3& index) const;       // at a point in samples

@@ -1,6 +1,7 @@
 // Blocks of different levels side by side: the surface stays closed, by the bits of its vertices.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -171,6 +172,42 @@ TEST(Seams, FarBlocksAreCoarseAndTheSurfaceStaysClosed) {
   (void)drawn.blocks.focus({}, bone, 0.8);
   EXPECT_TRUE(drawn.blocks.coarse_blocks().empty());
   EXPECT_EQ(check(drawn.meshes()).open, 0);
+}
+
+// The loops for whole blocks beside the road for any box of samples: the same bits, at every level, below and above zero.
+TEST(BlockSource, GathersWhatTheFieldGathers) {
+  Drawn drawn = ball(7.0);
+  for (int i = 0; i < 6; ++i) {
+    const Vec3 at = 7.0 * Vec3(i < 3 ? 1 : -1, i % 2 ? 0.3 : -0.4, 0.2 * i).normalized();
+    drawn.cut(cut_at_level("burr-round-5", i % 3, at, at + Vec3(0, 1.5, 1), -at.normalized()));
+  }
+  BlockSamples samples;
+  int uncut = 0, both = 0, skipped = 0;
+  for (int level = 0; level < kLevels; ++level) {
+    const CoordBox bone = drawn.field.bone().bounds_samples();
+    const Coord first = shift_down((1 << level) * bone.min, 4), last = shift_down((1 << level) * bone.max, 4);
+    for (int x = first.x; x <= last.x; ++x)
+      for (int y = first.y; y <= last.y; ++y)
+        for (int z = first.z; z <= last.z; ++z) {
+          const CoordBox box = block_samples({{}, level, {x, y, z}});
+          const Coord d = box.dims();
+          std::vector<float> solid(static_cast<std::size_t>(d.x * d.y * d.z)), surface = solid, f = solid, s = solid;
+          drawn.field.gather_solid(level, box, f);
+          drawn.field.gather_surface(level, box, s);
+          const auto gathered = drawn.field.gather_block(level, box, solid, surface);
+          if (gathered == CutField::Gathered::nothing) {
+            ++skipped;
+            EXPECT_EQ(std::ranges::count_if(f, [](float v) { return v < 0; }) % static_cast<std::ptrdiff_t>(f.size()), 0);
+            continue;
+          }
+          (gathered == CutField::Gathered::solid ? uncut : both) += 1;
+          ASSERT_EQ(solid, f) << level << ": " << x << ' ' << y << ' ' << z;
+          ASSERT_EQ(gathered == CutField::Gathered::solid ? solid : surface, s) << level << ": " << x << ' ' << y << ' ' << z;
+        }
+  }
+  EXPECT_GT(uncut, 10);
+  EXPECT_GT(both, 10);
+  EXPECT_GT(skipped, 0);
 }
 
 }  // namespace
