@@ -5,8 +5,10 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -64,23 +66,27 @@ void hot(benchmark::State& state, const Cut& cut) {
   CutField field(bone(), BodyId{});
   const CutReport first = field.apply(cut);
   for (auto _ : state) benchmark::DoNotOptimize(field.apply(cut).visited);
-  count_samples(state, static_cast<double>(first.visited), static_cast<double>(first.computed), static_cast<double>(first.modified));
+  count_samples(state, static_cast<double>(first.visited), static_cast<double>(first.computed),
+                static_cast<double>(first.modified));
 }
 
 struct Times {
   std::vector<double> us;
-  void report(benchmark::State& state) {
+  void report(benchmark::State& state, const std::string& prefix = "") {
     std::ranges::sort(us);
-    const auto at = [&](double part) { return us[std::min(us.size() - 1, static_cast<std::size_t>(part * static_cast<double>(us.size())))]; };
-    state.counters["median_us"] = at(0.5);
-    state.counters["min_us"] = us.front();
-    state.counters["max_us"] = us.back();
-    state.counters["p99_us"] = at(0.99);
-    state.counters["cuts"] = static_cast<double>(us.size());
+    const auto at = [&](double part) {
+      return us[std::min(us.size() - 1, static_cast<std::size_t>(part * static_cast<double>(us.size())))];
+    };
+    state.counters[prefix + "median_us"] = at(0.5);
+    state.counters[prefix + "min_us"] = us.front();
+    state.counters[prefix + "max_us"] = us.back();
+    state.counters[prefix + "p99_us"] = at(0.99);
+    state.counters[prefix + "cuts"] = static_cast<double>(us.size());
   }
 };
 
-// Other work of the process: it leaves nothing of ours in the caches.
+// Other work of the process: every line of 96 MiB, three times the largest cache, is read and written, so that code, tools,
+// bone and cut field all come from memory again.
 void flush_caches() {
   static std::vector<std::uint64_t> memory(std::size_t{12} << 20);
   for (std::size_t i = 0; i < memory.size(); i += 8) memory[i] += i;
@@ -89,118 +95,240 @@ void flush_caches() {
 
 // A fresh place for every cut: none of its leaves is there yet, and the caches hold other work.
 void cold(benchmark::State& state, Cut (*cut_at)(const Vec3&)) {
+  constexpr int kPlaces = 200;
   const Threads threads(state.range(0));
   Times times;
   CutReport report;
   for (auto _ : state) {
     CutField field(bone(), BodyId{});
     double sum = 0.0;
-    for (int i = 0; i < 400; ++i) {
+    for (int i = 0; i < kPlaces; ++i) {
       const Cut cut = cut_at({-24.0 + 2.4 * (i % 20) + 0.01 * i, -24.0 + 2.4 * (i / 20), i % 7 * 0.037});
-      if (i % 4 == 0) {
-        flush_caches();
-      }
+      flush_caches();
       const auto start = Clock::now();
       report = field.apply(cut);
       const double us = us_since(start);
       sum += us;
       times.us.push_back(us);
     }
-    state.SetIterationTime(sum / 400 * 1e-6);
+    state.SetIterationTime(sum / kPlaces * 1e-6);
   }
   times.report(state);
-  count_samples(state, static_cast<double>(report.visited), static_cast<double>(report.computed), static_cast<double>(report.modified));
+  count_samples(state, static_cast<double>(report.visited), static_cast<double>(report.computed),
+                static_cast<double>(report.modified));
 }
 
 // The plain way, §5.4 of the dissertation: walk the voxels of the World Bounding Block, here of the swept tool and grown
 // by the band; reject those outside the Local Bounding Block, compute the tool's distance for the others, and write the
-// lower of it and the voxel's value by an accessor.
-void world_box(benchmark::State& state, const Cut& cut) {
-  const Tool tool = [&] {
-    for (const Tool& t : builtin_tools())
-      if (t.hash() == cut.tool) return t;
-    OSTEON_CHECK(false);
-    return Tool{};
-  }();
-  const CutBody body = tool.cut_body();
-  const double pitch = level_pitch_mm(kPitch_mm, cut.level);
-  const SweptTool swept(cut, body, kPitch_mm);
-  const float band = band_mm(pitch);
-  const auto band_d = static_cast<double>(band);
-  Box world;
-  for (const ToolSweep& sweep : swept.sweeps())
-    for (int corner = 0; corner < 2; ++corner) {
-      const double* p = corner ? sweep.max_mm : sweep.min_mm;
-      world.include({p[0], p[1], p[2]});
+// lower of it and the voxel's value by an accessor. For balls, and turned bodies that move along their axis.
+class PlainCut {
+ public:
+  explicit PlainCut(const Cut& cut) : body_(body_of(cut)) {
+    pitch_ = level_pitch_mm(kPitch_mm, cut.level);
+    band_ = static_cast<double>(band_mm(pitch_));
+    const Pose from = dequantise(cut.path.front()), to = dequantise(cut.path.back());
+    const Pose to_tool = from.inverse();
+    turn_ = to_tool.rotation.toRotationMatrix();
+    shift_ = to_tool.position_mm;
+    motion_ = turn_ * (to.position_mm - from.position_mm);
+    radius_ = body_.radius * kQuantum_mm;
+    Box local, world;
+    for (const Vec3& shift : {Vec3(Vec3::Zero()), motion_}) {
+      local.include(Vec3(body_.lowest[0], body_.lowest[1], body_.lowest[2]) * kQuantum_mm + shift);
+      local.include(Vec3(body_.highest[0], body_.highest[1], body_.highest[2]) * kQuantum_mm + shift);
     }
-  const CoordBox box = covering_samples(world.grown(band_d), pitch);
-  const Pose from = dequantise(cut.path.front()), to = dequantise(cut.path.back());
-  const Vec3 motion = from.inverse().direction(to.position_mm - from.position_mm);
-  Box local;
-  for (const Vec3& shift : {Vec3(Vec3::Zero()), motion}) {
-    local.include(Vec3(body.lowest[0], body.lowest[1], body.lowest[2]) * kQuantum_mm + shift);
-    local.include(Vec3(body.highest[0], body.highest[1], body.highest[2]) * kQuantum_mm + shift);
+    const double bottom = local.min_mm.z();
+    for (int corner = 0; corner < 8; ++corner)
+      world.include(from.point({(corner & 1 ? local.max_mm : local.min_mm).x(), (corner & 2 ? local.max_mm : local.min_mm).y(),
+                                (corner & 4 ? local.max_mm : local.min_mm).z()}));
+    box_ = covering_samples(world.grown(band_), pitch_);
+    local_ = local.grown(band_);
+    // The outline's edges, as the tool's implicit function has them. Of a drill going in, the back stays where it was.
+    const double lowest_z = body_.lowest[2] * kQuantum_mm;
+    for (std::size_t i = 0; i < body_.profile.size(); ++i) {
+      const ProfileCorner &a = body_.profile[i], &b = body_.profile[(i + 1) % body_.profile.size()];
+      if (a.r == 0 && b.r == 0) continue;
+      const double r0 = a.r * kQuantum_mm, r1 = b.r * kQuantum_mm;
+      const auto along = [&](const ProfileCorner& c) {
+        const double z = c.z * kQuantum_mm;
+        return z == lowest_z ? bottom : z + std::max(0.0, motion_.z());
+      };
+      const double s0 = along(a), s1 = along(b), length = std::hypot(r1 - r0, s1 - s0);
+      edges_.push_back({r0, s0, (r1 - r0) / length, (s1 - s0) / length, length});
+    }
   }
-  local = local.grown(band_d);
-  const Pose to_tool = from.inverse();
-  const auto is_ball = body.kind == CutKind::ball;
-  const double radius = is_ball ? body.radius * kQuantum_mm : 0.0;
-  // The outline's edges, as the tool's implicit function has them.
-  struct Edge {
-    double r, s, er, es, length;
+
+  struct Count {
+    std::int64_t visited = 0, computed = 0, modified = 0;
   };
-  std::vector<Edge> edges;
-  const double stretch = std::min(0.0, -motion.z());  // of a drill going in: its back stays where it was
-  for (std::size_t i = 0; i < body.profile.size(); ++i) {
-    const ProfileCorner &a = body.profile[i], &b = body.profile[(i + 1) % body.profile.size()];
-    if (a.r == 0 && b.r == 0) continue;
-    const double r0 = a.r * kQuantum_mm, r1 = b.r * kQuantum_mm;
-    double s0 = a.z * kQuantum_mm, s1 = b.z * kQuantum_mm;
-    if (a.z * kQuantum_mm == local.min_mm.z() + band_d) s0 += stretch;
-    if (b.z * kQuantum_mm == local.min_mm.z() + band_d) s1 += stretch;
-    const double length = std::hypot(r1 - r0, s1 - s0);
-    edges.push_back({r0, s0, (r1 - r0) / length, (s1 - s0) / length, length});
+
+  Count apply(openvdb::FloatGrid::Accessor& accessor) const {
+    return body_.kind == CutKind::ball ? walk(accessor, [this](const Vec3& p) { return ball_distance(p); })
+                                       : walk(accessor, [this](const Vec3& p) { return turned_distance(p); });
   }
-  const auto distance = [&](const Vec3& p) {
-    if (is_ball) {
-      const Vec3 q = p + Vec3(0, 0, radius);
-      const double t = std::clamp(q.dot(motion) / motion.squaredNorm(), 0.0, 1.0);
-      return (q - t * motion).norm() - radius;
-    }
-    const double r = std::sqrt(p.x() * p.x() + p.y() * p.y()), s = p.z() - motion.z();
+
+ private:
+  template <class Distance>
+  Count walk(openvdb::FloatGrid::Accessor& accessor, Distance distance) const {
+    Count count;
+    for (std::int32_t x = box_.min.x; x <= box_.max.x; ++x)
+      for (std::int32_t y = box_.min.y; y <= box_.max.y; ++y)
+        for (std::int32_t z = box_.min.z; z <= box_.max.z; ++z) {
+          ++count.visited;
+          const Vec3 p = turn_ * position_mm({x, y, z}, pitch_) + shift_;
+          if ((p.array() < local_.min_mm.array()).any() || (p.array() > local_.max_mm.array()).any()) continue;
+          ++count.computed;
+          const double d = std::clamp(distance(p), -band_, band_);
+          const auto rounded = static_cast<float>(std::nearbyint(d * 1024.0) / 1024.0);
+          const openvdb::Coord xyz(x, y, z);
+          if (rounded < accessor.getValue(xyz)) {
+            accessor.setValue(xyz, rounded);
+            ++count.modified;
+          }
+        }
+    return count;
+  }
+  [[nodiscard]] double ball_distance(const Vec3& p) const {
+    const Vec3 q = p + Vec3(0, 0, radius_);
+    const double t = std::clamp(q.dot(motion_) / motion_.squaredNorm(), 0.0, 1.0);
+    return (q - t * motion_).norm() - radius_;
+  }
+  [[nodiscard]] double turned_distance(const Vec3& p) const {
+    const double r = std::sqrt(p.x() * p.x() + p.y() * p.y()), s = p.z();
     double inside = -1e9, outside = 1e9;
-    for (const Edge& e : edges) {
+    for (const Edge& e : edges_) {
       const double dr = r - e.r, ds = s - e.s, along = std::clamp(dr * e.er + ds * e.es, 0.0, e.length);
       inside = std::max(inside, dr * e.es - ds * e.er);
       const double qr = dr - along * e.er, qs = ds - along * e.es;
       outside = std::min(outside, qr * qr + qs * qs);
     }
     return inside > 0.0 ? std::sqrt(outside) : inside;
-  };
+  }
 
-  const auto grid = openvdb::FloatGrid::create(band);
-  std::int64_t visited = 0, computed = 0, modified = 0, first_modified = -1;
+  struct Edge {
+    double r, s, er, es, length;
+  };
+  static const CutBody& body_of(const Cut& cut) {
+    static const auto tools = builtin_tool_box();
+    return tools->find(cut.tool)->body;
+  }
+
+  const CutBody& body_;
+  double pitch_ = 0.0, band_ = 0.0, radius_ = 0.0;
+  Eigen::Matrix3d turn_;
+  Vec3 shift_, motion_;
+  Box local_;
+  CoordBox box_;
+  std::vector<Edge> edges_;
+};
+
+openvdb::FloatGrid::Ptr plain_grid() { return openvdb::FloatGrid::create(band_mm(level_pitch_mm(kPitch_mm, 2))); }
+
+void world_box(benchmark::State& state, const Cut& cut) {
+  const PlainCut plain(cut);
+  const auto grid = plain_grid();
+  PlainCut::Count first, count;
   for (auto _ : state) {
     auto accessor = grid->getAccessor();
-    visited = computed = modified = 0;
-    for (std::int32_t x = box.min.x; x <= box.max.x; ++x)
-      for (std::int32_t y = box.min.y; y <= box.max.y; ++y)
-        for (std::int32_t z = box.min.z; z <= box.max.z; ++z) {
-          ++visited;
-          const Vec3 p = to_tool.point(position_mm({x, y, z}, pitch));
-          if ((p.array() < local.min_mm.array()).any() || (p.array() > local.max_mm.array()).any()) continue;
-          ++computed;
-          const double d = std::clamp(distance(p), -band_d, band_d);
-          const auto rounded = static_cast<float>(std::nearbyint(d * 1024.0) / 1024.0);
-          const openvdb::Coord xyz(x, y, z);
-          if (rounded < accessor.getValue(xyz)) {
-            accessor.setValue(xyz, rounded);
-            ++modified;
+    count = plain.apply(accessor);
+    if (first.visited == 0) first = count;
+  }
+  count_samples(state, static_cast<double>(count.visited), static_cast<double>(count.computed),
+                static_cast<double>(first.modified));
+}
+
+// A tool at work: cuts of 8 ms, each from where the last one ended, always into fresh bone.
+std::vector<Cut> at_work(const char* tool_name, const Vec3& from, const Vec3& way_mm_s, int count) {
+  const Tool tool = tool_at_finest(tool_name);
+  std::vector<Cut> cuts;
+  for (int i = 0; i < count; ++i)
+    cuts.push_back(straight_cut(tool, from + i * kCutSeconds * way_mm_s, from + (i + 1) * kCutSeconds * way_mm_s, {0, 0, -1}));
+  return cuts;
+}
+// 48 mm across the block, half immersed, and 6.4 mm straight in.
+std::vector<Cut> burr_at_work() { return at_work("burr-round-3.2", {-24, 0.03, -1.6}, {15, 0, 0}, 400); }
+std::vector<Cut> drill_at_work() { return at_work("drill-3.5", {0.04, 0.03, 0}, {0, 0, -1}, 800); }
+
+double middle_of(std::vector<double> values) {
+  std::ranges::nth_element(values, values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2));
+  return values[values.size() / 2];
+}
+
+// The same cuts by our field with one and with two threads and by the plain way on a grid of its own, in turns of some
+// cuts each. All three must hold the same bone in the end. `ratio` is that of the medians of single cuts, its least and most
+// over several passes through the whole sequence.
+void work(benchmark::State& state, const std::vector<Cut>& cuts) {
+  constexpr int kPasses = 5;
+  constexpr std::size_t kTurn = 20;
+  std::vector<PlainCut> plain_cuts(cuts.begin(), cuts.end());
+  std::array<Times, 3> all;  // one thread, two, plain
+  std::array<std::vector<double>, 2> ratios;
+  PlainCut::Count plain_count;
+  double computed = 0, modified = 0, visited = 0;
+  std::int64_t differing = 0, compared = 0;
+  for (auto _ : state) {
+    for (int pass = 0; pass < kPasses; ++pass) {
+      std::array<CutField, 2> fields{CutField(bone(), BodyId{}), CutField(bone(), BodyId{})};
+      const auto grid = plain_grid();
+      auto accessor = grid->getAccessor();
+      std::array<std::vector<double>, 3> us;
+      plain_count = {};
+      visited = computed = modified = 0;
+      for (std::size_t first = 0; first < cuts.size(); first += kTurn) {
+        const std::size_t last = std::min(cuts.size(), first + kTurn);
+        for (std::size_t k = 0; k < 3; ++k) {
+          const std::size_t who = (k + first / kTurn + static_cast<std::size_t>(pass)) % 3;
+          const Threads threads(who == 1 ? 2 : 1);
+          for (std::size_t i = first; i < last; ++i) {
+            const auto start = Clock::now();
+            if (who < 2) {
+              const CutReport report = fields[who].apply(cuts[i]);
+              us[who].push_back(us_since(start));
+              if (who == 1) continue;
+              visited += static_cast<double>(report.visited);
+              computed += static_cast<double>(report.computed);
+              modified += static_cast<double>(report.modified);
+            } else {
+              const PlainCut::Count count = plain_cuts[i].apply(accessor);
+              us[2].push_back(us_since(start));
+              plain_count.visited += count.visited;
+              plain_count.computed += count.computed;
+              plain_count.modified += count.modified;
+            }
           }
         }
-    if (first_modified < 0) first_modified = modified;
+      }
+      for (std::size_t who = 0; who < 3; ++who) all[who].us.insert(all[who].us.end(), us[who].begin(), us[who].end());
+      for (std::size_t who = 0; who < 2; ++who) ratios[who].push_back(middle_of(us[2]) / middle_of(us[who]));
+      if (pass > 0) continue;
+      // The plain way computes in doubles: a quantum apart where the two round a half to different sides.
+      OSTEON_CHECK(fields[0].hash() == fields[1].hash());
+      for (const FieldLeaf& leaf : fields[0].leaves())
+        for (std::int32_t i = 0; i < kLeafVoxels; ++i) {
+          const Coord c = leaf.origin + Coord{i / 64, i / 8 % 8, i % 8};
+          const std::int16_t ours = leaf.values[leaf.values.size() == 1 ? 0 : static_cast<std::size_t>(i)];
+          const auto other = static_cast<std::int32_t>(std::lround(accessor.getValue(openvdb::Coord(c.x, c.y, c.z)) * 1024.0f));
+          const std::int32_t apart = std::abs(other - ours);
+          OSTEON_CHECK(apart <= 1);
+          differing += apart;
+          ++compared;
+        }
+    }
   }
-  count_samples(state, static_cast<double>(visited), static_cast<double>(computed), static_cast<double>(first_modified));
+  const auto n = static_cast<double>(cuts.size());
+  count_samples(state, visited / n, computed / n, modified / n);
+  state.counters["plain_visited"] = static_cast<double>(plain_count.visited) / n;
+  state.counters["plain_computed"] = static_cast<double>(plain_count.computed) / n;
+  state.counters["plain_modified"] = static_cast<double>(plain_count.modified) / n;
+  state.counters["differing_share"] = static_cast<double>(differing) / static_cast<double>(compared);
+  const std::array<std::string, 3> names{"ours", "ours_2", "plain"};
+  for (std::size_t who = 0; who < 3; ++who) all[who].report(state, names[who] + "_");
+  for (std::size_t who = 0; who < 2; ++who) {
+    const std::string name = who == 0 ? "ratio" : "ratio_2";
+    state.counters[name] = middle_of(all[2].us) / middle_of(all[who].us);
+    state.counters[name + "_min"] = std::ranges::min(ratios[who]);
+    state.counters[name + "_max"] = std::ranges::max(ratios[who]);
+  }
 }
 
 // The accessor again, but with the kernel's own distances and only for leaves near the tool: what is left when the plain
@@ -302,11 +430,13 @@ void cut_with(benchmark::State& state, const Tool& tool) {
 
 template <class Run>
 void add(const std::string& name, Run run) {
-  benchmark::RegisterBenchmark(name.c_str(), run)->ArgName("threads")->Arg(1)->Arg(2)->Unit(benchmark::kMicrosecond)->UseRealTime();
+  benchmark::RegisterBenchmark(name.c_str(), run)
+      ->ArgName("threads")->Arg(1)->Arg(2)->Unit(benchmark::kMicrosecond)->UseRealTime();
 }
 template <class Run>
 void add_timed(const std::string& name, Run run, int iterations) {
-  benchmark::RegisterBenchmark(name.c_str(), run)->ArgName("threads")->Arg(1)->Arg(2)->Unit(benchmark::kMicrosecond)->UseManualTime()->Iterations(iterations);
+  benchmark::RegisterBenchmark(name.c_str(), run)
+      ->ArgName("threads")->Arg(1)->Arg(2)->Unit(benchmark::kMicrosecond)->UseManualTime()->Iterations(iterations);
 }
 template <class Run>
 void add_plain(const std::string& name, Run run) {
@@ -314,16 +444,24 @@ void add_plain(const std::string& name, Run run) {
 }
 
 const bool registered = [] {
+  const auto once = [](const char* name, auto cuts) {
+    benchmark::RegisterBenchmark(name, [cuts](benchmark::State& state) { work(state, cuts()); })
+        ->Iterations(1)->Unit(benchmark::kMillisecond);
+  };
+  once("cut_burr/work", burr_at_work);
+  once("cut_drill/work", drill_at_work);
   add("cut_burr/hot", [](benchmark::State& state) { hot(state, burr_cut()); });
   add_plain("cut_burr/world_box", [](benchmark::State& state) { world_box(state, burr_cut()); });
   add_plain("cut_burr/near_leaves", [](benchmark::State& state) { near_leaves(state, burr_cut()); });
-  add_timed("cut_burr/cold", [](benchmark::State& state) { cold(state, burr_cut); }, 2);
+  add_timed("cut_burr/cold", [](benchmark::State& state) { cold(state, burr_cut); }, 1);
   add("cut_drill/hot", [](benchmark::State& state) { hot(state, drill_cut()); });
   add_plain("cut_drill/world_box", [](benchmark::State& state) { world_box(state, drill_cut()); });
   add_plain("cut_drill/near_leaves", [](benchmark::State& state) { near_leaves(state, drill_cut()); });
-  add_timed("cut_drill/cold", [](benchmark::State& state) { cold(state, drill_cut); }, 2);
+  add_timed("cut_drill/cold", [](benchmark::State& state) { cold(state, drill_cut); }, 1);
   for (const Tool& tool : builtin_tools())
-    if (tool.cuts()) add_timed("cut_tool/" + tool.name, [tool](benchmark::State& state) { cut_with(state, tool); }, 1);
+    if (tool.cuts()) {
+      add_timed("cut_tool/" + tool.name, [tool](benchmark::State& state) { cut_with(state, tool); }, 1);
+    }
   return true;
 }();
 

@@ -56,8 +56,7 @@ void compare(const Case& bone, int level) {
   // Before anything is timed: code and pages that both share.
   {
     CutField warm(bone, {});
-    const auto sites = strokes(level);
-    for (const Cut& cut : sites[0]) warm.apply(cut);
+    for (const Cut& cut : sites.front()) warm.apply(cut);
   }
   std::vector<double> first[2], later[2];
   for (const auto& site : sites)
