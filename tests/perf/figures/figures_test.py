@@ -60,7 +60,8 @@ class SeveralSessions(unittest.TestCase):
     def test_the_worst_decides_and_the_median_informs(self):
         sessions = [{"rig_removed_volume_error": (error, None), "haptic_work_p50": (work, 1.0)}
                     for error, work in ((0.1, 9.0), (7.0, 10.0), (0.2, 30.0))]
-        self.assertEqual(groups.over_sessions(sessions), {"rig_removed_volume_error": (7.0, None), "haptic_work_p50": (10.0, 1.0)})
+        self.assertEqual(groups.over_sessions(sessions),
+                         {"rig_removed_volume_error": (7.0, None), "haptic_work_p50": (10.0, 1.0)})
 
     def test_a_session_without_a_value_is_not_hidden(self):
         sessions = [{"rig_force_after_exit": (0.0, None)}, {"rig_force_after_exit": (None, None)}]
