@@ -16,6 +16,8 @@ bool all_finite(std::initializer_list<double> values) {
   return std::ranges::all_of(values, [](double v) { return std::isfinite(v); });
 }
 
+constexpr double kFurthestLook_mm = 1e5;
+
 }  // namespace
 
 v1::Vector3 to_wire(const Vec3& v) {
@@ -219,6 +221,30 @@ Result<SceneItem> from_wire(const v1::SceneItem& item) {
   out.turns = item.turns();
   out.seated = item.seated();
   out.set_at = item.set_at();
+  return out;
+}
+
+v1::Look to_wire(const Look& look) {
+  v1::Look out;
+  *out.mutable_eye_mm() = to_wire(look.eye_mm);
+  *out.mutable_target_mm() = to_wire(look.target_mm);
+  out.set_pixel_rad(look.pixel_rad);
+  out.set_view_rad(look.view_rad);
+  return out;
+}
+
+Result<BlockKey> key_from_wire(const v1::MeshBlock& block) {
+  if (block.level() < kCoarsestLevel || block.level() >= kLevels) return bad("mesh block: level", "must be -2 to 2");
+  return BlockKey{BodyId{block.body()}, block.level(), from_wire(block.index())};
+}
+
+Result<Look> from_wire(const v1::Look& look) {
+  const Look out{from_wire(look.eye_mm()), from_wire(look.target_mm()), look.pixel_rad(), look.view_rad()};
+  const auto placed = [](const Vec3& at) { return at.allFinite() && at.norm() <= kFurthestLook_mm; };
+  if (!placed(out.eye_mm)) return bad("look.eye_mm", "is no place near the bone");
+  if (!placed(out.target_mm)) return bad("look.target_mm", "is no place near the bone");
+  if (!(out.pixel_rad > 0.0 && out.pixel_rad < 1.0)) return bad("look.pixel_rad", "must be between 0 and 1");
+  if (!(out.view_rad > 0.0 && out.view_rad < 1.5)) return bad("look.view_rad", "must be between 0 and 1.5");
   return out;
 }
 

@@ -5,7 +5,7 @@
 #include "common/core/result.hpp"
 #include "common/field/cut.hpp"
 #include "common/field/field_hash.hpp"
-#include "common/surface/mesh_block.hpp"
+#include "common/surface/look.hpp"
 #include "common/mechanics/cutting_state.hpp"
 #include "common/tools/scene_item.hpp"
 #include "osteon/v1/cutting.pb.h"
@@ -28,6 +28,7 @@ inline constexpr std::uint32_t kProtocolVersion = 2;
 [[nodiscard]] v1::FieldLeaf to_wire(const FieldLeaf& leaf);  // one value when all are equal
 [[nodiscard]] v1::SceneItem to_wire(const SceneItem& item);
 [[nodiscard]] v1::ToolDefinition to_wire(const Tool& tool);
+[[nodiscard]] v1::Look to_wire(const Look& look);
 [[nodiscard]] std::string to_wire(const Digest& digest);
 
 // Error invalid_input, naming the field, for anything a correct peer never sends: wrong counts, numbers that are not
@@ -38,6 +39,8 @@ inline constexpr std::uint32_t kProtocolVersion = 2;
 [[nodiscard]] Result<FieldLeaf> from_wire(const v1::FieldLeaf& leaf);
 [[nodiscard]] Result<SceneItem> from_wire(const v1::SceneItem& item);
 [[nodiscard]] Result<Tool> from_wire(const v1::ToolDefinition& tool);  // by the rules of tool files
+[[nodiscard]] Result<BlockKey> key_from_wire(const v1::MeshBlock& block);
+[[nodiscard]] Result<Look> from_wire(const v1::Look& look);
 [[nodiscard]] Result<Digest> digest_from_wire(const std::string& bytes);
 
 }  // namespace osteon::wire

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,6 +30,7 @@ struct Options {
   std::filesystem::path summary_file;
   std::filesystem::path tools_folder;
   std::filesystem::path save_file, resume_file;
+  Detail detail = Detail::automatic;
 };
 
 void log_health(const HostHealth& health) {
@@ -69,6 +71,7 @@ nlohmann::json summary_of(const RoomServerSummary& summary, const Case& bone) {
           {"repeated", health.counts.repeated},
           {"refused", health.counts.refused},
           {"surface_blocks", health.blocks},
+          {"surface_bytes", health.surface_bytes},
           {"tick",
            {{"ticks", health.tick.work.count()},
             {"missed", health.tick.missed},
@@ -135,12 +138,15 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   server_options.listen = options.listen;
   server_options.case_folder = options.case_folder;
   server_options.save = options.save_file;
+  server_options.detail = options.detail;
   Result<std::unique_ptr<RoomServer>> server = [&] {
     Progress progress("surface");
     return RoomServer::start(std::move(*room), server_options, [&](double fraction) { progress.update(fraction); });
   }();
   if (!server) return tl::unexpected(server.error());
-  log::info("listening", {{"address", (*server)->address()}, {"surface_blocks", (*server)->health().blocks}});
+  log::info("listening", {{"address", (*server)->address()},
+                          {"surface_blocks", (*server)->health().blocks},
+                          {"surface_bytes", (*server)->health().surface_bytes}});
   if (!options.address_file.empty())
     if (Result<void> written = write_file(options.address_file, (*server)->address() + "\n"); !written)
       return tl::unexpected(written.error());
@@ -172,6 +178,12 @@ int main(int argc, char** argv) {
                  "The cut bone in all its bodies, the scene and added tools (.vdb), written at a clean stop and when a client asks");
   app.add_option("--resume", options.resume_file,
                  "What --save wrote: the room goes on from there; what came before cannot be undone");
+  const std::map<std::string, Detail> details{{"auto", Detail::automatic}, {"full", Detail::full}, {"near", Detail::near}};
+  app.add_option("--detail", options.detail,
+                 "full: viewers are sent the whole bone at its own pitch; near: that only where they look and where tools "
+                 "work, coarser elsewhere; auto: near for a bone of more than " + std::to_string(kMostFullBlocks) + " blocks")
+      ->transform(CLI::CheckedTransformer(details, CLI::ignore_case))
+      ->default_str("auto");
   app.add_option("--summary", options.summary_file, "JSON written at the end: field hash, counts, ticks, latencies");
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
 

@@ -16,6 +16,8 @@
 #include "common/field/kernel.hpp"
 #include "common/runtime/periodic.hpp"
 #include "common/wire/convert.hpp"
+#include "server/net/host_parts.hpp"
+#include "server/net/lookers.hpp"
 #include "server/net/piece_watch.hpp"
 #include "server/net/room_rows.hpp"
 
@@ -23,42 +25,6 @@ namespace osteon {
 namespace {
 
 using Clock = RoomHost::Clock;
-
-// The open streams of one kind.
-template <class Sink>
-class Audience {
- public:
-  void add(Sink& sink) { sinks_.push_back(&sink); }
-  void remove(Sink& sink) { std::erase(sinks_, &sink); }
-  template <class Call>
-  void each(Call call) const {
-    for (Sink* sink : sinks_) call(*sink);
-  }
-  [[nodiscard]] std::size_t size() const { return sinks_.size(); }
-
- private:
-  std::vector<Sink*> sinks_;
-};
-
-struct QueuedCut {
-  std::shared_ptr<SessionSink> sink;  // owned by its stream and by its queued cuts
-  Cut cut;
-  Clock::time_point arrived;
-};
-struct QueuedEvent {
-  std::function<Result<RoomEvent>(Room&)> change;
-  std::function<void(const Result<RoomEvent>&)> answer;
-  Clock::time_point arrived;
-};
-using Queued = std::variant<QueuedCut, QueuedEvent>;
-
-// A tool's newest state; one whose session is over is shown idle for a while, so that every reader sees it stop.
-struct ShownState {
-  CuttingState state;
-  bool over = false;
-  std::uint64_t ticks_over = 0;
-};
-constexpr std::uint64_t kShowIdleTicks = 1200;
 
 }  // namespace
 
@@ -71,7 +37,10 @@ constexpr std::size_t kLeafBatch = 64;
 // Lock order: room_mutex, then sessions_mutex or mesh_mutex or cutting_mutex, then a stream's own, then jobs_mutex.
 // queue_mutex, mesh_wake_mutex, pieces_mutex and stats_mutex are never held with another.
 struct RoomHost::Impl {
-  Impl(Room r, HostRates rates) : room(std::move(r)), rates_(rates) {}
+  Impl(Room r, HostRates rates, Detail detail)
+      : room(std::move(r)),
+        rates_(rates),
+        near(detail == Detail::near || (detail == Detail::automatic && room.bone_blocks().size() > kMostFullBlocks)) {}
 
   void make_whole_surface(const std::function<void(double)>& progress);
   void run_ticks();
@@ -83,7 +52,9 @@ struct RoomHost::Impl {
   void publish(const RoomEvent& event);
   void show_scene();
   void publish_states();
-  void make_stale_blocks();
+  void make_stale_blocks(bool due);
+  void follow_looks();
+  void wake_mesh();
   void session_over(AuthorId author);
   void read_leaves(std::vector<FieldLeaf>& leaves);
 
@@ -101,6 +72,7 @@ struct RoomHost::Impl {
   std::shared_mutex room_mutex;
   std::optional<std::vector<Cut>> meanwhile;  // under room_mutex: cuts applied since copy_bone() began to copy
   const HostRates rates_;
+  const bool near;                       // in full only near viewers and tools
   std::atomic<std::uint64_t> room_seq{0}, authors{0};
   std::atomic<std::size_t> stale{0};
   std::atomic<bool> stopping{false};
@@ -125,6 +97,8 @@ struct RoomHost::Impl {
   Audience<MeshSink> mesh_streams;
   BlockStore store;
   MeshUpdate surface;        // every block with a surface, as it travels
+  Lookers lookers;
+  Clock::time_point next_look{};  // of the mesh thread
 
   std::mutex mesh_wake_mutex;
   std::condition_variable mesh_wake;
@@ -155,6 +129,7 @@ struct RoomHost::Impl {
 };
 
 void RoomHost::Impl::make_whole_surface(const std::function<void(double)>& progress) {
+  if (near) room.focus({focus_on_nothing()});
   std::vector<BlockKey> keys = room.bone_blocks();
   for (const BlockKey& key : room.take_stale_blocks()) keys.push_back(key);  // fine ones of fields that were loaded
   std::ranges::sort(keys);
@@ -334,21 +309,48 @@ void RoomHost::Impl::session_over(AuthorId author) {
 
 void RoomHost::Impl::run_mesh() {
   auto next = Clock::now();
+  bool due = false;
   while (true) {
     {
       std::unique_lock lock(mesh_wake_mutex);
-      mesh_wake.wait(lock, [&] { return mesh_due || mesh_end; });
-      if (!mesh_due) return;
+      if (near)  // tools move without anything else that wakes this thread
+        mesh_wake.wait_for(lock, rates_.looks, [&] { return mesh_due || mesh_end; });
+      else
+        mesh_wake.wait(lock, [&] { return mesh_due || mesh_end; });
+      if (!mesh_due && (mesh_end || !near)) return;
       // A first cut is shown at once, a row of cuts at the mesh rate.
       mesh_wake.wait_until(lock, next, [&] { return mesh_end; });
-      mesh_due = false;
+      due = std::exchange(mesh_due, false);
     }
     next = Clock::now() + rates_.mesh;
-    make_stale_blocks();
+    make_stale_blocks(due);
   }
 }
 
-void RoomHost::Impl::make_stale_blocks() {
+void RoomHost::Impl::wake_mesh() {
+  const std::lock_guard lock(mesh_wake_mutex);
+  mesh_due = true;
+  mesh_wake.notify_one();
+}
+
+// [mesh thread]
+void RoomHost::Impl::follow_looks() {
+  if (!near || Clock::now() < next_look) return;
+  next_look = Clock::now() + rates_.looks;
+  std::vector<Vec3> tips_mm;
+  {
+    const std::lock_guard lock(cutting_mutex);
+    for (const auto& [author, entry] : states)
+      if (!entry.over) tips_mm.push_back(entry.state.pose_bone_tool.position_mm);
+  }
+  auto focuses = lookers.focuses(room.bone().pitch_mm(), tips_mm);
+  if (!focuses) return;
+  const std::unique_lock lock(room_mutex);
+  room.focus(std::move(*focuses));
+}
+
+void RoomHost::Impl::make_stale_blocks(bool due) {
+  follow_looks();
   std::vector<BlockKey> keys;
   std::vector<BodyId> bodies_now;
   std::vector<Clock::time_point> arrivals;
@@ -365,6 +367,7 @@ void RoomHost::Impl::make_stale_blocks() {
     update.room_seq = room.room_seq();
     bodies_now = room.bodies();
   }
+  if (!due && keys.empty()) return;
 
   // The room goes on between two blocks; one that it changes meanwhile is stale again and made anew.
   std::vector<BlockPayload> payloads;
@@ -424,8 +427,8 @@ void RoomHost::Impl::run_jobs() {
   }
 }
 
-RoomHost::RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress)
-    : impl_(std::make_unique<Impl>(std::move(room), rates)) {
+RoomHost::RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress, Detail detail)
+    : impl_(std::make_unique<Impl>(std::move(room), rates, detail)) {
   impl_->make_whole_surface(progress);
   impl_->tick_thread = std::thread([this] { impl_->run_ticks(); });
   impl_->mesh_thread = std::thread([this] { impl_->run_mesh(); });
@@ -461,6 +464,7 @@ HostHealth RoomHost::health() const {
     const std::lock_guard lock(impl_->mesh_mutex);
     health.mesh_streams = impl_->mesh_streams.size();
     health.blocks = impl_->surface.blocks.size();
+    for (const auto& [key, message] : impl_->surface.blocks) health.surface_bytes += message->size();
     impl_->mesh_streams.each(look);
   }
   {
@@ -676,12 +680,23 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink) {
   return {};
 }
 
-void RoomHost::watch_mesh(MeshSink& sink) {
-  const std::lock_guard lock(impl_->mesh_mutex);
-  impl_->mesh_streams.add(sink);
-  sink.begin(impl_->surface);
-  if (impl_->ended) sink.end(*impl_->ended);
+void RoomHost::watch_mesh(MeshSink& sink, const std::optional<Look>& look) {
+  {
+    const std::lock_guard lock(impl_->mesh_mutex);
+    impl_->mesh_streams.add(sink);
+    impl_->lookers.open(sink.author(), look);
+    // What is there: the finer blocks that this viewer's look asks for follow.
+    sink.begin(impl_->surface);
+    if (impl_->ended) sink.end(*impl_->ended);
+  }
+  impl_->wake_mesh();
 }
+
+void RoomHost::look(AuthorId viewer, const Look& from) {
+  if (impl_->lookers.look(viewer, from)) impl_->wake_mesh();
+}
+
+bool RoomHost::draws_near() const { return impl_->near; }
 
 void RoomHost::watch_cutting(CuttingSink& sink) {
   const std::lock_guard lock(impl_->cutting_mutex);
@@ -704,7 +719,9 @@ void RoomHost::leave(SessionSink& sink) {
 
 void RoomHost::leave(MeshSink& sink) {
   const std::lock_guard lock(impl_->mesh_mutex);
+  const std::size_t before = impl_->mesh_streams.size();
   impl_->mesh_streams.remove(sink);
+  if (impl_->mesh_streams.size() < before) impl_->lookers.close(sink.author());
 }
 
 void RoomHost::leave(CuttingSink& sink) {
@@ -764,7 +781,7 @@ void RoomHost::stop() {
     // What the last cuts separated, so that the bone is left, and saved, in its pieces.
     for (Separation& found : impl_->pieces.look()) (void)impl_->room.split(std::move(found));
     impl_->room_seq = impl_->room.room_seq().value;
-    impl_->make_stale_blocks();
+    impl_->make_stale_blocks(false);
   }
   {
     const std::lock_guard lock(impl_->jobs_mutex);

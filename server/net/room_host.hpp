@@ -5,11 +5,13 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/core/result.hpp"
 #include "common/mechanics/cutting_state.hpp"
 #include "common/runtime/tick_stats.hpp"
+#include "common/surface/look.hpp"
 #include "server/net/outbox.hpp"
 #include "server/room/room.hpp"
 
@@ -24,6 +26,7 @@ class StreamSink {
 };
 class MeshSink : public StreamSink {
  public:
+  [[nodiscard]] virtual AuthorId author() const { return {}; }
   virtual void begin(MeshUpdate whole_surface) = 0;
   virtual void offer(const MeshUpdate& update) = 0;
 };
@@ -46,9 +49,15 @@ class SessionSink : public StreamSink {
   virtual void decided() = 0;                               // one queued cut has left the queue
 };
 
+// How much of the bone is drawn: all of it in full, or in full only what viewers look at and tools work on.
+// `automatic`: near for a bone of more than kMostFullBlocks blocks, full otherwise.
+enum class Detail : std::uint8_t { automatic, full, near };
+inline constexpr std::size_t kMostFullBlocks = 4000;
+
 struct HostRates {
   std::chrono::nanoseconds tick{1'000'000'000 / 120};
   std::chrono::nanoseconds mesh{1'000'000'000 / 30};
+  std::chrono::nanoseconds looks{250'000'000};   // at most so often the surface follows the looks of viewers and the tools
   std::chrono::nanoseconds pieces{1'000'000'000 / 8};  // at most so often is looked for what has come apart
 };
 
@@ -61,6 +70,7 @@ struct HostHealth {
   std::size_t queued_cuts = 0, stale_blocks = 0;
   std::size_t furthest_behind = 0;  // rows or blocks that wait for the slowest reader
   std::size_t blocks = 0;
+  std::size_t surface_bytes = 0;    // of the newest blocks: what a viewer that joins is sent
 };
 
 // The bone at one place of the room's order.
@@ -77,7 +87,7 @@ class RoomHost {
   using Clock = std::chrono::steady_clock;
 
   // Makes the whole surface, then starts the threads. `progress` hears fractions from one thread at a time.
-  RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress);
+  RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress, Detail detail = Detail::automatic);
   ~RoomHost();
   RoomHost(const RoomHost&) = delete;
   RoomHost& operator=(const RoomHost&) = delete;
@@ -100,7 +110,11 @@ class RoomHost {
   // The sink hears every row after those of its leaves. Error: invalid_input (the author may not cut, or
   // has an open session).
   [[nodiscard]] Result<void> open_session(const std::shared_ptr<SessionSink>& sink);
-  void watch_mesh(MeshSink& sink);
+  // From where its author looks at first; without a look it is sent the bone in full.
+  void watch_mesh(MeshSink& sink, const std::optional<Look>& look = std::nullopt);
+  // The newest of each viewer counts, until its last mesh stream ends. Of one without such a stream: nothing.
+  void look(AuthorId viewer, const Look& from);
+  [[nodiscard]] bool draws_near() const;  // what Detail has come to mean here
   void watch_cutting(CuttingSink& sink);
   // Afterwards the sink hears nothing more. Unknown sinks are none of its business.
   void leave(SessionSink& sink);

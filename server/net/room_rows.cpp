@@ -24,7 +24,7 @@ Bytes block_message(const BlockKey& key, const StoredBlock& block) {
   v1::WatchMeshResponse response;
   v1::MeshBlock& out = *response.add_blocks();
   out.set_body(key.body.value);
-  out.set_level(static_cast<std::uint32_t>(key.level));
+  out.set_level(key.level);
   *out.mutable_index() = wire::to_wire(key.index);
   out.set_version(block.version);
   out.set_payload(block.payload.bytes.data(), block.payload.bytes.size());

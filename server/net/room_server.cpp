@@ -138,7 +138,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(Room room, const RoomServe
 
   auto impl = std::make_unique<Impl>();
   impl->saves = !options.save.empty();
-  impl->host = std::make_unique<RoomHost>(std::move(room), options.rates, progress);
+  impl->host = std::make_unique<RoomHost>(std::move(room), options.rates, progress, options.detail);
   const std::uint64_t epoch = new_server_epoch();
   impl->services.push_back(make_room_service(*impl->host, {options.case_folder, options.save}, epoch));
   impl->services.push_back(make_cutting_service(*impl->host, epoch));

@@ -15,6 +15,7 @@ struct RoomServerOptions {
   std::filesystem::path case_folder;    // what clients are sent; holds the room's case
   std::filesystem::path save{};         // where the cut fields are written on request; empty: nowhere
   HostRates rates{};
+  Detail detail = Detail::automatic;
 };
 
 struct RoomServerSummary {

@@ -135,8 +135,9 @@ WriteReactor* refused(Status status) {
 
 class MeshStream final : public OutStream<WriteReactor>, public MeshSink {
  public:
-  explicit MeshStream(RoomHost& host) : host_(host) {}
+  MeshStream(RoomHost& host, AuthorId author) : host_(host), author_(author) {}
 
+  AuthorId author() const override { return author_; }
   void begin(MeshUpdate whole_surface) override {
     const std::lock_guard lock(mutex_);
     outbox_.emplace(std::move(whole_surface));
@@ -164,6 +165,7 @@ class MeshStream final : public OutStream<WriteReactor>, public MeshSink {
   void leave() override { host_.leave(*this); }
 
   RoomHost& host_;
+  const AuthorId author_;
   std::optional<MeshOutbox> outbox_;
 };
 
@@ -660,8 +662,8 @@ class CuttingServiceImpl final : public v1::CuttingService::WithRawCallbackMetho
   const std::uint64_t server_epoch_;
 };
 
-using WatchBase = v1::WatchService::WithRawCallbackMethod_WatchMesh<
-    v1::WatchService::WithRawCallbackMethod_WatchCutting<v1::WatchService::Service>>;
+using WatchBase = v1::WatchService::WithRawCallbackMethod_WatchMesh<v1::WatchService::WithRawCallbackMethod_WatchCutting<
+    v1::WatchService::WithCallbackMethod_LookFrom<v1::WatchService::Service>>>;
 
 class WatchServiceImpl final : public WatchBase {
  public:
@@ -671,9 +673,30 @@ class WatchServiceImpl final : public WatchBase {
     const auto request = parse<v1::WatchMeshRequest>(*bytes);
     if (!request) return refused(invalid("the WatchMeshRequest could not be parsed"));
     if (!host_.knows(AuthorId{request->author()})) return refused(not_joined("WatchMeshRequest", request->author()));
-    MeshStream* stream = MeshStream::launch(std::make_shared<MeshStream>(host_));
-    host_.watch_mesh(*stream);
+    std::optional<Look> look;
+    if (request->has_look()) {
+      const Result<Look> stated = wire::from_wire(request->look());
+      if (!stated) return refused(invalid(stated.error().message));
+      look = *stated;
+    }
+    MeshStream* stream = MeshStream::launch(std::make_shared<MeshStream>(host_, AuthorId{request->author()}));
+    host_.watch_mesh(*stream, look);
     return stream;
+  }
+
+  grpc::ServerUnaryReactor* LookFrom(grpc::CallbackServerContext* context, const v1::LookFromRequest* request,
+                                     v1::LookFromResponse*) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    const Result<Look> look = wire::from_wire(request->look());
+    if (!host_.knows(AuthorId{request->author()})) {
+      reactor->Finish(not_joined("LookFromRequest", request->author()));
+    } else if (!look) {
+      reactor->Finish(invalid(look.error().message));
+    } else {
+      host_.look(AuthorId{request->author()}, *look);
+      reactor->Finish(Status::OK);
+    }
+    return reactor;
   }
 
   WriteReactor* WatchCutting(grpc::CallbackServerContext*, const ByteBuffer* bytes) override {

@@ -1,7 +1,11 @@
 // Every program in one room beside plain drilling: a block is sawn in two, a piece is taken away and brought back, tools
 // and guides come in, and the bone is saved and resumed. The hands are clients in this process that hold replicas.
 #include <gtest/gtest.h>
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkPNGReader.h>
 
+#include <array>
 #include <fstream>
 
 #include "tests/integration/stage.hpp"
@@ -41,6 +45,30 @@ std::vector<Cut> slot(AuthorId author, const Tool& burr, double x_mm) {
 std::string bytes_of(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
+}
+
+// Seen from (60, -80, 60) the shank of a tool that points down at the origin goes straight up from the picture's middle, 20
+// pixels wide; the gauges are to the left of it.
+constexpr int kShankLeft = 316, kShankRight = 324, kShankTop = 100, kShankBottom = 150;
+constexpr int kShankPixels = (kShankRight - kShankLeft) * (kShankBottom - kShankTop);
+
+int differing_on_the_shank(const std::filesystem::path& one, const std::filesystem::path& other) {
+  std::array<vtkNew<vtkPNGReader>, 2> readers;
+  readers[0]->SetFileName(one.c_str());
+  readers[1]->SetFileName(other.c_str());
+  for (const auto& reader : readers) reader->Update();
+  int differing = 0;
+  for (int x = kShankLeft; x < kShankRight; ++x)
+    for (int y = kShankTop; y < kShankBottom; ++y) {
+      // Rows from below.
+      const auto at = [&](std::size_t i, int channel) {
+        return readers[i]->GetOutput()->GetScalarComponentAsDouble(x, 479 - y, 0, channel);
+      };
+      bool same = true;
+      for (int channel = 0; channel < 3; ++channel) same &= at(0, channel) == at(1, channel);
+      differing += same ? 0 : 1;
+    }
+  return differing;
 }
 
 TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
@@ -91,12 +119,24 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
   CuttingState state;
   state.author = hand.author();
   state.state_seq = 1;
-  state.tool_name = burr->tool.name;
+  state.tool_name = "tool-of-nobody";
   state.phase = CuttingPhase::free;
   state.pose_bone_tool = state.pose_bone_device = pose_along({0, 0, 10}, {0, 0, -1});
   hand.session().send(state);
   ASSERT_TRUE(viewer.tell("wait surface"));
-  ASSERT_TRUE(wait_until([&] { return picture("tool.png") != parted; }, kPatience)) << "the tool is in the picture";
+  // The gauges of a tool that nobody knows are in the picture, but nothing stands on the bone.
+  ASSERT_TRUE(wait_until([&] { return picture("gauges.png") != parted; }, kPatience));
+  EXPECT_EQ(differing_on_the_shank(stage / "gauges.png", stage / "parted.png"), 0);
+  ++state.state_seq;
+  state.tool_name = burr->tool.name;
+  hand.session().send(state);
+  EXPECT_TRUE(wait_until(
+      [&] {
+        (void)picture("tool.png");
+        return differing_on_the_shank(stage / "tool.png", stage / "parted.png") > kShankPixels * 9 / 10;
+      },
+      kPatience))
+      << "the tool is in the picture";
   ASSERT_TRUE(viewer.tell("tool off"));
 
   // Someone else takes the piece away, changes their mind, and undoes the whole of it.

@@ -82,6 +82,8 @@ Result<void> run(const Arguments& arguments) {
   watch_options.address = arguments.server;
   watch_options.patience = std::chrono::milliseconds(static_cast<long>(1000.0 * arguments.patience_s));
   watch_options.keep_trying = !scripted;
+  const auto seen_from = [size = *window_size](const CameraView& view) { return look_of(view, size.width_px, size.height_px); };
+  watch_options.first_look = [seen_from](const Box& bone) { return seen_from(overview(bone)); };
   auto watch = RoomWatch::start(watch_options, inbox, [&stop] { return stop.requested(); });
   if (!watch) {
     if (stop.requested()) return {};
@@ -104,6 +106,7 @@ Result<void> run(const Arguments& arguments) {
         },
         request);
   };
+  options.looked = [&watch = **watch, seen_from](const CameraView& view) { watch.look(seen_from(view)); };
   options.answers = !arguments.script.empty();
   options.stop_at_error = scripted && arguments.script != "-";
   auto viewer = Viewer::make(options, **window, inbox, std::move(script));

@@ -62,7 +62,9 @@ Result<Viewer::State> Viewer::turn(bool interrupted) {
 
   receive();
   draw_if_due(false);
-  return obey_script();
+  const auto state = obey_script();
+  if (options_.looked) options_.looked(window_->camera());
+  return state;
 }
 
 void Viewer::receive() {

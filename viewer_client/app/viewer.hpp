@@ -24,6 +24,7 @@ struct ViewerOptions {
   std::filesystem::path frame_log;  // empty: none
   bool answers = false;             // say ok or error on standard output after each command
   bool stop_at_error = false;       // a command that fails ends the run
+  std::function<void(const CameraView&)> looked;  // hears after every turn where the window looks
   // Asks the room and waits for its answer: the place of the event.
   std::function<Result<RoomSeq>(const RoomRequest&)> ask;
 };

@@ -23,17 +23,16 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kRetryPause{200};
 constexpr std::chrono::seconds kAnswerTime{10};
+constexpr std::chrono::milliseconds kLookPause{250};
 
 std::int64_t mono_ns() { return std::chrono::nanoseconds(Clock::now().time_since_epoch()).count(); }
 
 // Decodes and checks one block.
 Result<ReceivedBlock> receive(const v1::MeshBlock& wire_block, double pitch_mm) {
-  if (wire_block.level() >= static_cast<std::uint32_t>(kLevels)) {
-    return failure(ErrorCode::invalid_input,
-                   "the server sent a mesh block of level " + std::to_string(wire_block.level()) + ", which is none");
-  }
+  const Result<BlockKey> key = wire::key_from_wire(wire_block);
+  if (!key) return failure(ErrorCode::invalid_input, "the server sent what it must not: " + key.error().message);
   ReceivedBlock block;
-  block.key = {BodyId{wire_block.body()}, static_cast<int>(wire_block.level()), wire::from_wire(wire_block.index())};
+  block.key = *key;
   block.version = wire_block.version();
 
   BlockPayload payload;
@@ -105,9 +104,11 @@ struct RoomWatch::Impl {
   std::uint64_t joins = 0;  // rises with every join, so that the second reader knows that the first has rejoined
   grpc::ClientContext* mesh_context = nullptr;
   grpc::ClientContext* cutting_context = nullptr;
+  grpc::ClientContext* look_context = nullptr;
   std::optional<Error> failed;
+  std::optional<Look> newest_look, said_look;
 
-  std::thread mesh_thread, cutting_thread;
+  std::thread mesh_thread, cutting_thread, look_thread;
 
   Impl(RoomWatchOptions o, Inbox& i, std::function<bool()> s)
       : options(std::move(o)), inbox(i), asked_to_stop(std::move(s)) {}
@@ -117,6 +118,7 @@ struct RoomWatch::Impl {
   Result<void> rejoin();
   void read_mesh();
   void read_cutting();
+  void say_looks();
   Result<void> read_mesh_stream();
   void fetch_tools(const std::shared_ptr<grpc::Channel>& channel, std::uint64_t author, KnownTools& known);
   // Channel and author of the newest join.
@@ -173,6 +175,11 @@ Result<void> RoomWatch::Impl::read_mesh_stream() {
   if (!enter(mesh_context, context)) return {};
   v1::WatchMeshRequest request;
   request.set_author(joined.author.value);
+  {
+    const std::lock_guard lock(mutex);
+    if (newest_look) *request.mutable_look() = wire::to_wire(*newest_look);
+    said_look = newest_look;
+  }
   const auto stub = v1::WatchService::NewStub(joined.channel);
   const auto reader = stub->WatchMesh(&context, request);
 
@@ -297,6 +304,31 @@ void RoomWatch::Impl::read_cutting() {
   }
 }
 
+// [look thread] What cannot be said now is said by the next mesh stream.
+void RoomWatch::Impl::say_looks() {
+  while (true) {
+    v1::LookFromRequest request;
+    std::shared_ptr<grpc::Channel> channel;  // shared with the stub, which may outlive a rejoin
+    {
+      std::unique_lock lock(mutex);
+      changed.wait(lock, [&] { return ending.load() || (newest_look && said_look && !nearly_equal(*said_look, *newest_look)); });
+      if (ending) return;
+      said_look = newest_look;
+      channel = joined.channel;
+      request.set_author(joined.author.value);
+      *request.mutable_look() = wire::to_wire(*newest_look);
+    }
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kAnswerTime);
+    if (!enter(look_context, context)) return;
+    v1::LookFromResponse response;
+    (void)v1::WatchService::NewStub(channel)->LookFrom(&context, request, &response);
+    leave(look_context);
+    std::unique_lock lock(mutex);
+    changed.wait_for(lock, kLookPause, [&] { return ending.load(); });
+  }
+}
+
 RoomWatch::RoomWatch(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 Result<std::unique_ptr<RoomWatch>> RoomWatch::start(const RoomWatchOptions& options, Inbox& inbox,
@@ -304,8 +336,10 @@ Result<std::unique_ptr<RoomWatch>> RoomWatch::start(const RoomWatchOptions& opti
   auto impl = std::make_unique<Impl>(options, inbox, std::move(stop));
   if (auto joined = impl->join(options.patience); !joined) return tl::unexpected(joined.error());
   impl->room = {impl->joined.case_title, impl->joined.pitch_mm, impl->joined.bounds};
+  if (options.first_look) impl->newest_look = options.first_look(impl->room.bounds);
   impl->mesh_thread = std::thread([&at = *impl] { at.read_mesh(); });
   impl->cutting_thread = std::thread([&at = *impl] { at.read_cutting(); });
+  impl->look_thread = std::thread([&at = *impl] { at.say_looks(); });
   return std::unique_ptr<RoomWatch>(new RoomWatch(std::move(impl)));
 }
 
@@ -315,10 +349,12 @@ RoomWatch::~RoomWatch() {
     impl_->ending = true;
     if (impl_->mesh_context != nullptr) impl_->mesh_context->TryCancel();
     if (impl_->cutting_context != nullptr) impl_->cutting_context->TryCancel();
+    if (impl_->look_context != nullptr) impl_->look_context->TryCancel();
     impl_->changed.notify_all();
   }
   impl_->mesh_thread.join();
   impl_->cutting_thread.join();
+  impl_->look_thread.join();
 }
 
 const WatchedRoom& RoomWatch::room() const { return impl_->room; }
@@ -326,6 +362,12 @@ const WatchedRoom& RoomWatch::room() const { return impl_->room; }
 std::optional<Error> RoomWatch::failure_seen() const {
   const std::lock_guard lock(impl_->mutex);
   return impl_->failed;
+}
+
+void RoomWatch::look(const Look& from) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->newest_look = from;
+  impl_->changed.notify_all();
 }
 
 bool RoomWatch::interrupted() const { return impl_->interrupted.load(); }

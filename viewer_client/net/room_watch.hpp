@@ -9,6 +9,7 @@
 #include "common/core/id.hpp"
 #include "common/core/result.hpp"
 #include "common/geometry/lattice.hpp"
+#include "common/surface/look.hpp"
 #include "viewer_client/scene/inbox.hpp"
 
 namespace osteon {
@@ -17,6 +18,8 @@ struct RoomWatchOptions {
   std::string address;          // host:port
   std::string name = "viewer";  // shown to others
   std::chrono::milliseconds patience{5000};
+  // From where the window looks at a bone with these bounds at first; none: it wants all of the bone in full.
+  std::function<Look(const Box&)> first_look;
   bool keep_trying = false;  // after the connection was lost: until it is back, not just for `patience`
 };
 
@@ -26,7 +29,7 @@ struct WatchedRoom {
   Box bounds;
 };
 
-// Two reader threads, one for each stream, from start() to the destructor.
+// From start() to the destructor two reader threads, one for each stream, and one that says where the window looks.
 class RoomWatch {
  public:
   // Joins first. Errors: unavailable, unsupported, cancelled; one sentence each. `inbox` must outlive the watch;
@@ -40,6 +43,9 @@ class RoomWatch {
   [[nodiscard]] std::optional<Error> failure_seen() const;
   // The connection is lost and being made anew.
   [[nodiscard]] bool interrupted() const;
+
+  // Where the window looks now; returns at once. The server is told of a real change, at most 4 times a second.
+  void look(const Look& from);
 
   // What a viewer may ask of the room, and the place of the event that follows. They wait for the answer. Errors:
   // invalid_input, not_found (no such tool), unavailable (nothing to undo, no answer).

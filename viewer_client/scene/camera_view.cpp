@@ -14,6 +14,12 @@ Vec3 across(const Vec3& direction, const Vec3& axis, const Vec3& otherwise) {
 
 }  // namespace
 
+Look look_of(const CameraView& view, int width_px, int height_px) {
+  const double half_height = std::tan(0.5 * view.view_angle_rad);
+  const double shape = static_cast<double>(width_px) / height_px;
+  return {view.eye_mm, view.target_mm, 2.0 * half_height / height_px, std::atan(half_height * std::hypot(1.0, shape))};
+}
+
 CameraView overview(const Box& bone) {
   CameraView view;
   view.target_mm = 0.5 * (bone.min_mm + bone.max_mm);

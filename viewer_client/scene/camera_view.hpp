@@ -2,6 +2,7 @@
 #pragma once
 #include "common/geometry/lattice.hpp"
 #include "common/geometry/pose.hpp"
+#include "common/surface/look.hpp"
 
 namespace osteon {
 
@@ -11,6 +12,9 @@ struct CameraView {
   Vec3 up = Vec3::UnitZ();
   double view_angle_rad = 0.5236;  // full vertical angle
 };
+
+// What a window of this size shows of it.
+[[nodiscard]] Look look_of(const CameraView& view, int width_px, int height_px);
 
 // The whole bone from the front, its left and a little above (DICOM LPS: +x left, -y front, +z up).
 [[nodiscard]] CameraView overview(const Box& bone);

@@ -144,7 +144,7 @@ class MeshReader {
     while ((!complete_ || seq_ < seq) && stream_->Read(&message)) {
       largest_ = std::max(largest_, message.ByteSizeLong());
       for (const v1::MeshBlock& b : message.blocks()) {
-        const BlockKey key{BodyId{b.body()}, static_cast<int>(b.level()), wire::from_wire(b.index())};
+        const BlockKey key{BodyId{b.body()}, b.level(), wire::from_wire(b.index())};
         const BlockPayload payload{{b.payload().begin(), b.payload().end()}};
         EXPECT_EQ(b.mesh_hash(), wire::to_wire(mesh_hash(payload)));
         if (payload.bytes.empty())

@@ -145,5 +145,42 @@ TEST(Wire, ASceneItemComesBackAndBadOnesAreRefused) {
   EXPECT_FALSE(wire::from_wire(bad));
 }
 
+TEST(Wire, ABlocksLevelHasASign) {
+  for (int level = -2; level <= 2; ++level) {
+    v1::MeshBlock block, parsed;
+    block.set_body(3);
+    block.set_level(level);
+    *block.mutable_index() = wire::to_wire(Coord{-1, 2, -3});
+    ASSERT_TRUE(parsed.ParseFromString(block.SerializeAsString()));
+    const auto key = wire::key_from_wire(parsed);
+    ASSERT_TRUE(key) << level;
+    EXPECT_EQ(*key, (BlockKey{{3}, level, {-1, 2, -3}}));
+  }
+  for (const int level : {-3, 3, std::numeric_limits<int>::min(), std::numeric_limits<int>::max()}) {
+    v1::MeshBlock block;
+    block.set_level(level);
+    EXPECT_FALSE(wire::key_from_wire(block)) << level;
+  }
+}
+
+TEST(Wire, ALookComesBackAndBadOnesAreRefusedByTheNameOfTheField) {
+  const Look look{{1, -2, 300}, {4, 5, 6}, 0.0005, 0.4};
+  const auto back = wire::from_wire(wire::to_wire(look));
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(*back, look);
+  const auto refused = [&](const std::function<void(v1::Look&)>& change, const std::string& field) {
+    v1::Look bad = wire::to_wire(look);
+    change(bad);
+    const auto answer = wire::from_wire(bad);
+    ASSERT_FALSE(answer) << field;
+    EXPECT_NE(answer.error().message.find(field), std::string::npos) << answer.error().message;
+  };
+  refused([](v1::Look& l) { l.mutable_eye_mm()->set_x(std::numeric_limits<double>::quiet_NaN()); }, "eye_mm");
+  refused([](v1::Look& l) { l.mutable_target_mm()->set_z(1e300); }, "target_mm");
+  refused([](v1::Look& l) { l.set_pixel_rad(0); }, "pixel_rad");
+  refused([](v1::Look& l) { l.set_view_rad(std::numeric_limits<double>::infinity()); }, "view_rad");
+  refused([](v1::Look& l) { l.Clear(); }, "pixel_rad");
+}
+
 }  // namespace
 }  // namespace osteon

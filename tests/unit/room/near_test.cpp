@@ -1,0 +1,171 @@
+// A large bone is drawn in full only where somebody looks: what viewers hold follows their looks, and stays one closed surface.
+#include <gtest/gtest.h>
+
+#include <map>
+#include <mutex>
+#include <set>
+
+#include "common/surface/weld.hpp"
+#include "common/wire/convert.hpp"
+#include "server/net/room_host.hpp"
+#include "tests/support/scenes/bones.hpp"
+#include "tests/support/wait.hpp"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr double kPitch_mm = 0.8, kRadius_mm = 30.0;
+
+Case ball() {
+  return test::make_bone({Vec3::Constant(-kRadius_mm - 4), Vec3::Constant(kRadius_mm + 4)}, kPitch_mm,
+                         [](const Vec3& p) { return p.norm() - kRadius_mm; }, [](const Vec3&) { return 1.9; });
+}
+
+// Close enough for full detail, in a picture of `wide_mm` from its middle to its corner.
+Look close_to(const Vec3& target_mm, double wide_mm) {
+  return {target_mm + Vec3(0, -40, 0), target_mm, 0.3 * kPitch_mm / 40, std::atan(wide_mm / 40)};
+}
+
+class Reader final : public MeshSink {
+ public:
+  explicit Reader(AuthorId author) : author_(author) {}
+  AuthorId author() const override { return author_; }
+  void begin(MeshUpdate whole_surface) override {
+    offer(whole_surface);
+    for (const auto& [key, mesh] : whole_surface.blocks) first_.insert(key.level);
+  }
+  void offer(const MeshUpdate& update) override {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [key, bytes] : update.blocks) {
+      v1::WatchMeshResponse response;
+      ASSERT_TRUE(response.ParseFromString(*bytes));
+      const v1::MeshBlock& block = response.blocks(0);
+      EXPECT_EQ(wire::key_from_wire(block).value(), key);
+      if (block.payload().empty())
+        blocks_.erase(key);
+      else
+        blocks_[key] = {{block.payload().begin(), block.payload().end()}};
+    }
+  }
+  void end(const std::string&) override {}
+  std::size_t waiting() const override { return 0; }
+
+  Digest hash() const {
+    const std::lock_guard lock(mutex_);
+    std::map<BlockKey, Digest> hashes;
+    for (const auto& [key, payload] : blocks_) hashes[key] = mesh_hash(payload);
+    return surface_hash(hashes);
+  }
+  std::set<int> levels() const {
+    const std::lock_guard lock(mutex_);
+    std::set<int> levels;
+    for (const auto& [key, payload] : blocks_) levels.insert(key.level);
+    return levels;
+  }
+  // The finest level of those blocks that come nearest to the place.
+  int level_at(const Vec3& place_mm) const {
+    const std::lock_guard lock(mutex_);
+    double nearest = 1e9;
+    int level = kCoarsestLevel;
+    for (const auto& [key, payload] : blocks_)
+      for (const auto& p : decode_block(key, payload, level_pitch_mm(kPitch_mm, key.level))->positions_mm)
+        if (const double distance = (Vec3(p[0], p[1], p[2]) - place_mm).norm(); distance < nearest) {
+          nearest = distance;
+          level = key.level;
+        }
+    return level;
+  }
+  const std::set<int>& first_levels() const { return first_; }
+  std::size_t triangles() const { return whole().triangles.size(); }
+  // Edges that are not matched by one in the other direction.
+  int open_edges() const {
+    std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
+    for (const auto& t : whole().triangles)
+      for (std::size_t i = 0; i < 3; ++i) {
+        ++edges[{t[i], t[(i + 1) % 3]}];
+        --edges[{t[(i + 1) % 3], t[i]}];
+      }
+    return static_cast<int>(std::ranges::count_if(edges, [](const auto& edge) { return edge.second != 0; }));
+  }
+
+ private:
+  Mesh whole() const {
+    const std::lock_guard lock(mutex_);
+    std::vector<Mesh> meshes;
+    for (const auto& [key, payload] : blocks_)
+      meshes.push_back(decode_block(key, payload, level_pitch_mm(kPitch_mm, key.level)).value());
+    return weld(meshes);
+  }
+
+  const AuthorId author_;
+  mutable std::mutex mutex_;
+  std::map<BlockKey, BlockPayload> blocks_;
+  std::set<int> first_;
+};
+
+HostRates fast() { return {.tick = 1ms, .mesh = 3ms, .looks = 5ms}; }
+
+TEST(NearDetail, FollowsTheLooksOfAllViewers) {
+  RoomHost host(Room(ball()), fast(), {}, Detail::near);
+  RoomHost in_full(Room(ball()), fast(), {}, Detail::full);
+  Reader full(in_full.join(MemberKind::watcher));
+  in_full.watch_mesh(full);
+  EXPECT_EQ(full.levels(), std::set<int>{0});
+  EXPECT_EQ(full.open_edges(), 0);
+
+  // Nobody has looked yet: the one who joins is sent the coarse bone at once and then what it looks at.
+  const Vec3 north(0, 0, kRadius_mm), east(kRadius_mm, 0, 0), south(0, 0, -kRadius_mm);
+  Reader one(host.join(MemberKind::watcher));
+  host.watch_mesh(one, close_to(north, 8));
+  EXPECT_EQ(one.first_levels(), std::set<int>{kCoarsestLevel});
+  ASSERT_TRUE(test::wait_until([&] { return one.level_at(north) == 0; }, 20s));
+  EXPECT_LT(one.level_at(south), 0);
+  EXPECT_EQ(one.open_edges(), 0);
+  EXPECT_EQ(one.hash(), host.surface_hash());
+  EXPECT_LT(one.triangles(), full.triangles() / 2);
+
+  // Its look moves, and another one joins elsewhere: each has what it needs, both hold the same.
+  host.look(one.author(), close_to(east, 8));
+  ASSERT_TRUE(test::wait_until([&] { return one.level_at(east) == 0 && one.level_at(north) < 0; }, 20s));
+  EXPECT_EQ(one.open_edges(), 0);
+  Reader two(host.join(MemberKind::watcher));
+  host.watch_mesh(two, close_to(south, 8));
+  EXPECT_EQ(two.hash(), host.surface_hash()) << "as it is at the moment";
+  EXPECT_EQ(two.first_levels(), one.levels());
+  ASSERT_TRUE(test::wait_until([&] { return two.level_at(south) == 0; }, 20s));
+  EXPECT_EQ(two.level_at(east), 0);
+  EXPECT_EQ(one.open_edges(), 0);
+  EXPECT_EQ(one.hash(), two.hash());
+  EXPECT_EQ(one.hash(), host.surface_hash());
+
+  // A tool is seen in full wherever it works.
+  CuttingState state;
+  state.author = host.join(MemberKind::surgeon);
+  state.pose_bone_tool = pose_along(north, {0, 0, -1});
+  host.offer_state(state);
+  ASSERT_TRUE(test::wait_until([&] { return one.level_at(north) == 0; }, 20s));
+  EXPECT_EQ(one.open_edges(), 0);
+
+  // One that never says where it looks is sent all, to the bytes of a room that draws everything in full.
+  Reader all(host.join(MemberKind::watcher));
+  host.watch_mesh(all);
+  ASSERT_TRUE(test::wait_until([&] { return all.hash() == full.hash(); }, 20s));
+  EXPECT_EQ(one.hash(), full.hash());
+  host.leave(all);
+  host.look(two.author(), close_to(east, 9));
+  ASSERT_TRUE(test::wait_until([&] { return one.level_at(south) < 0; }, 20s));
+  EXPECT_EQ(one.open_edges(), 0);
+  EXPECT_EQ(one.hash(), host.surface_hash());
+  for (Reader* reader : {&one, &two}) host.leave(*reader);
+  in_full.leave(full);
+}
+
+TEST(NearDetail, IsForLargeBonesUnlessAskedFor) {
+  EXPECT_FALSE(RoomHost(Room(ball()), fast(), {}).draws_near());
+  EXPECT_TRUE(RoomHost(Room(ball()), fast(), {}, Detail::near).draws_near());
+}
+
+}  // namespace
+}  // namespace osteon
