@@ -226,13 +226,27 @@ std::vector<BlockKey> SurfaceBlocks::focus(std::span<const Focus> focuses, const
   };
   Indices& halves = coarse_[0];
   Indices& quarters = coarse_[1];
+  // What was cut is drawn in full, and so is the block of level 0 next to it.
+  Indices in_full;  // blocks of level -1
+  for (int level = 1; level < kLevels; ++level)
+    for (const Coord index : fine_[static_cast<std::size_t>(level - 1)]) {
+      const Coord block = shift_down(index, level);
+      for_each({shift_down(block - Coord{1, 1, 1}, 1), shift_down(block + Coord{1, 1, 1}, 1)}, [&](Coord c) { in_full.insert(c); });
+    }
+  const CoordBox roots = blocks_of_bone(kCoarsestLevel);
+  for_each(CoordBox{2 * roots.min, 2 * roots.max + Coord{1, 1, 1}}, [&](Coord child) {
+    const bool was_full = !halves.contains(child) && !quarters.contains(shift_down(child, 1));
+    if (near(-1, child, &Focus::full_mm, was_full)) in_full.insert(child);
+  });
   std::set<Coord> changed;  // blocks of level -1 whose level became another
-  for_each(blocks_of_bone(kCoarsestLevel), [&](Coord root) {
+  for_each(roots, [&](Coord root) {
     const bool was_quarter = quarters.contains(root);
-    const bool quarter = !near(kCoarsestLevel, root, &Focus::half_mm, !was_quarter);
+    // Levels change by one step at a time: where a coarse contour and one four times finer meet, the surface could fold.
+    bool quarter = !near(kCoarsestLevel, root, &Focus::half_mm, !was_quarter);
+    for_each({2 * root - Coord{1, 1, 1}, 2 * root + Coord{2, 2, 2}}, [&](Coord c) { quarter = quarter && !in_full.contains(c); });
     for_each({2 * root, 2 * root + Coord{1, 1, 1}}, [&](Coord child) {
       const bool was_half = halves.contains(child);
-      const bool half = !quarter && !near(-1, child, &Focus::full_mm, !was_quarter && !was_half);
+      const bool half = !quarter && !in_full.contains(child);
       if (quarter != was_quarter || half != was_half) changed.insert(child);
       if (half) halves.insert(child);
       else halves.erase(child);

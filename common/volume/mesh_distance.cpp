@@ -4,9 +4,14 @@
 #include <openvdb/tools/MeshToVolume.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <mutex>
+#include <numeric>
+#include <optional>
+#include <set>
+#include <thread>
 
 #include "common/geometry/mesh_file.hpp"
 
@@ -39,11 +44,11 @@ double distance_to(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   return (ap - ab * (vb * scale) - ac * (vc * scale)).norm();
 }
 
-Result<void> check(const TriangleMesh& mesh, double pitch_mm) {
+Result<void> check(const TriangleMesh& mesh, double pitch_mm, std::size_t most_triangles, double largest_mm) {
   char text[200];
   if (mesh.triangles.empty()) return failure(ErrorCode::invalid_input, "the mesh has no triangles");
-  if (mesh.triangles.size() > kMostMeshTriangles) {
-    std::snprintf(text, sizeof text, "the mesh has %zu triangles, more than %zu; simplify it", mesh.triangles.size(), kMostMeshTriangles);
+  if (mesh.triangles.size() > most_triangles) {
+    std::snprintf(text, sizeof text, "the mesh has %zu triangles, more than %zu; simplify it", mesh.triangles.size(), most_triangles);
     return failure(ErrorCode::invalid_input, text);
   }
   for (const auto& t : mesh.triangles)
@@ -53,9 +58,9 @@ Result<void> check(const TriangleMesh& mesh, double pitch_mm) {
     for (const float x : p)
       if (!std::isfinite(x)) return failure(ErrorCode::invalid_input, "the mesh has corners that are not numbers");
   const Vec3 size = bounds(mesh).size_mm();
-  if (size.maxCoeff() > kLargestMesh_mm) {
+  if (size.maxCoeff() > largest_mm) {
     std::snprintf(text, sizeof text, "the mesh is %.3g mm long, more than %.3g mm; its unit must be the millimetre", size.maxCoeff(),
-                  kLargestMesh_mm);
+                  largest_mm);
     return failure(ErrorCode::invalid_input, text);
   }
   if (const std::size_t open = open_edges(mesh); open > 0) {
@@ -66,6 +71,83 @@ Result<void> check(const TriangleMesh& mesh, double pitch_mm) {
     return failure(ErrorCode::invalid_input, "the mesh encloses less than one sample; its unit must be the millimetre, or choose a smaller pitch");
   return {};
 }
+
+// Asked by all threads of OpenVDB; the question goes on from the caller's alone.
+class Interrupter {
+ public:
+  explicit Interrupter(const KeepGoing& keep_going) : keep_going_(keep_going) {}
+  void start(const char* = nullptr) {}
+  void end() {}
+  bool wasInterrupted(int = -1) {  // NOLINT(readability-identifier-naming): the library's
+    if (std::this_thread::get_id() == caller_ && !keep_going_(0.0)) stopped_ = true;
+    return stopped_;
+  }
+
+ private:
+  const KeepGoing& keep_going_;
+  std::thread::id caller_ = std::this_thread::get_id();
+  std::atomic<bool> stopped_{false};
+};
+
+// Around the surface: distances, rough far from it, and the triangle they are to; beyond, the sign alone.
+struct Band {
+  openvdb::FloatGrid::Ptr value;
+  openvdb::Int32Grid nearest{static_cast<std::int32_t>(openvdb::util::INVALID_IDX)};
+  float width = 0;  // samples
+  bool stopped = false;
+};
+
+Band measure_band(const TriangleMesh& mesh, double pitch_mm, int width, const KeepGoing& keep_going) {
+  std::vector<openvdb::Vec3s> points;
+  for (const auto& p : mesh.positions_mm)
+    points.emplace_back(static_cast<float>(p[0] / pitch_mm), static_cast<float>(p[1] / pitch_mm), static_cast<float>(p[2] / pitch_mm));
+  std::vector<openvdb::Vec3I> triangles;
+  for (const auto& t : mesh.triangles) triangles.emplace_back(t[0], t[1], t[2]);
+  const openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I> adapter(points, triangles);
+  const auto transform = openvdb::math::Transform::createLinearTransform(1.0);
+  Interrupter interrupter(keep_going);
+  Band band;
+  band.width = static_cast<float>(width);
+  band.value = openvdb::tools::meshToVolume<openvdb::FloatGrid>(interrupter, adapter, *transform, band.width, band.width, 0, &band.nearest);
+  band.stopped = interrupter.wasInterrupted();
+  return band;
+}
+
+// The band's distances are good next to the surface and up to half a voxel wrong at the end of it, but its nearest
+// triangles are right or beside the right one: each sample looks at those of its neighbours as well.
+class BandDistance {
+ public:
+  BandDistance(const Band& band, const TriangleMesh& mesh, double pitch_mm)
+      : width_(static_cast<double>(band.width)), mesh_(mesh), pitch_mm_(pitch_mm), value_(band.value->getConstAccessor()),
+        nearest_(band.nearest.getConstAccessor()) {}
+
+  // mm; outside of the band as wide as it is.
+  [[nodiscard]] double at(Coord sample) const {
+    const openvdb::Coord here(sample.x, sample.y, sample.z);
+    const auto rough = static_cast<double>(value_.getValue(here));
+    double mm = width_ * pitch_mm_;
+    if (std::abs(rough) < width_) {
+      const Vec3 p = position_mm(sample, pitch_mm_);
+      std::int32_t last = -1;
+      for (int around = 0; around < 27; ++around) {
+        const openvdb::Coord beside = here.offsetBy(around / 9 - 1, around / 3 % 3 - 1, around % 3 - 1);
+        std::int32_t t = 0;
+        if (!nearest_.probeValue(beside, t) || t == last || t < 0 || static_cast<std::size_t>(t) >= mesh_.triangles.size()) continue;
+        last = t;
+        const auto& [a, b, c] = mesh_.triangles[static_cast<std::size_t>(t)];
+        mm = std::min(mm, distance_to(p, position(mesh_, a), position(mesh_, b), position(mesh_, c)));
+      }
+    }
+    return std::copysign(mm, rough);
+  }
+
+ private:
+  double width_;
+  const TriangleMesh& mesh_;
+  double pitch_mm_;
+  openvdb::FloatGrid::ConstAccessor value_;
+  openvdb::Int32Grid::ConstAccessor nearest_;
+};
 
 Result<std::shared_ptr<const SampledDistance>> measure(const TriangleMesh& mesh, std::int32_t pitch_quanta) {
   const double pitch = pitch_quanta * kQuantum_mm;
@@ -82,42 +164,15 @@ Result<std::shared_ptr<const SampledDistance>> measure(const TriangleMesh& mesh,
     return failure(ErrorCode::invalid_input, text);
   }
 
-  std::vector<openvdb::Vec3s> points;
-  for (const auto& p : mesh.positions_mm)
-    points.emplace_back(static_cast<float>(p[0] / pitch), static_cast<float>(p[1] / pitch), static_cast<float>(p[2] / pitch));
-  std::vector<openvdb::Vec3I> triangles;
-  for (const auto& t : mesh.triangles) triangles.emplace_back(t[0], t[1], t[2]);
-  const openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I> adapter(points, triangles);
-  openvdb::Int32Grid nearest(openvdb::util::INVALID_IDX);
-  const auto transform = openvdb::math::Transform::createLinearTransform(1.0);
-  const auto width = static_cast<float>(band + 1);
-  const auto grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(adapter, *transform, width, width, 0, &nearest);
-
-  // Its distances are good next to the surface and up to half a voxel wrong at the end of the band, but its nearest
-  // triangles are right or beside the right one: each sample looks at those of its neighbours as well.
-  const auto value = grid->getConstAccessor();
-  const auto triangle = nearest.getConstAccessor();
+  const Band found = measure_band(mesh, pitch, band + 1, [](double) { return true; });
+  const BandDistance distance(found, mesh, pitch);
   const double clip_mm = band * pitch;
-  const auto corner = [&](std::int32_t t, std::size_t k) { return position(mesh, mesh.triangles[static_cast<std::size_t>(t)][k]); };
   made->values.reserve(static_cast<std::size_t>(samples));
   for (std::int32_t x = made->box.min.x; x <= made->box.max.x; ++x)
     for (std::int32_t y = made->box.min.y; y <= made->box.max.y; ++y)
       for (std::int32_t z = made->box.min.z; z <= made->box.max.z; ++z) {
-        const openvdb::Coord at(x, y, z);
-        const auto rough = static_cast<double>(value.getValue(at));
-        double mm = clip_mm;
-        if (std::abs(rough) < static_cast<double>(width)) {
-          const Vec3 p = position_mm({x, y, z}, pitch);
-          std::int32_t last = -1;
-          for (int around = 0; around < 27; ++around) {
-            const openvdb::Coord beside = at.offsetBy(around / 9 - 1, around / 3 % 3 - 1, around % 3 - 1);
-            std::int32_t t = 0;
-            if (!triangle.probeValue(beside, t) || t == last || t < 0 || static_cast<std::size_t>(t) >= mesh.triangles.size()) continue;
-            last = t;
-            mm = std::min(mm, distance_to(p, corner(t, 0), corner(t, 1), corner(t, 2)));
-          }
-        }
-        made->values.push_back(static_cast<std::int16_t>(std::lround(std::copysign(mm, rough) * 1024.0)));
+        const double mm = std::clamp(distance.at({x, y, z}), -clip_mm, clip_mm);
+        made->values.push_back(static_cast<std::int16_t>(std::lround(mm * 1024.0)));
       }
   return std::shared_ptr<const SampledDistance>(std::move(made));
 }
@@ -127,10 +182,122 @@ Result<std::shared_ptr<const SampledDistance>> measure(const TriangleMesh& mesh,
 Result<std::shared_ptr<const SampledDistance>> sampled_distance(const TriangleMesh& mesh, double pitch_mm) {
   const auto quanta = pitch_mm > 0.0 && pitch_mm < 8.0 ? static_cast<std::int32_t>(std::lround(pitch_mm * 1024.0)) : 0;
   if (quanta < 1) return failure(ErrorCode::invalid_input, "the pitch of a mesh must be between 0.001 and 8 mm");
-  if (const auto good = check(mesh, pitch_mm); !good) return tl::unexpected(good.error());
+  if (const auto good = check(mesh, pitch_mm, kMostMeshTriangles, kLargestMesh_mm); !good) return tl::unexpected(good.error());
   try {
     initialize_once();
     return measure(mesh, quanta);
+  } catch (const std::exception& e) {
+    return failure(ErrorCode::internal, std::string("the mesh could not be measured: ") + e.what());
+  }
+}
+
+namespace {
+
+// What the band and the case made of it take, by their leaves: about so many bytes for each sample near the surface.
+constexpr double kBytesPerSample = 24.0, kMostBytes = 12e9;
+constexpr double kMostLattice = 4e9;  // samples of the whole box, most of which are never looked at
+constexpr double kBandShare = 0.5;    // of the time
+
+// The pieces of a surface that hang together, sorted into those that bound bone and those, turned the other way, that
+// bound cavities within it.
+struct Shells {
+  TriangleMesh bone, cavities;
+};
+
+Shells shells_of(const TriangleMesh& mesh) {
+  std::vector<std::uint32_t> parent(mesh.positions_mm.size());
+  std::iota(parent.begin(), parent.end(), 0u);
+  const auto root = [&](std::uint32_t v) {
+    while (parent[v] != v) v = parent[v] = parent[parent[v]];
+    return v;
+  };
+  for (const auto& t : mesh.triangles)
+    for (const std::uint32_t v : {t[1], t[2]}) parent[root(v)] = root(t[0]);
+  const Vec3 origin = position(mesh, 0);
+  std::vector<double> six_volumes(mesh.positions_mm.size(), 0.0);
+  for (const auto& [a, b, c] : mesh.triangles)
+    six_volumes[root(a)] += (position(mesh, a) - origin).dot((position(mesh, b) - origin).cross(position(mesh, c) - origin));
+  const double outwards = enclosed_mm3(mesh);
+  Shells out{{mesh.positions_mm, {}, {}}, {mesh.positions_mm, {}, {}}};
+  for (const auto& t : mesh.triangles) (six_volumes[root(t[0])] * outwards < 0.0 ? out.cavities : out.bone).triangles.push_back(t);
+  return out;
+}
+
+// A mesh's distance where it is near, and its sign everywhere.
+class PartDistance {
+ public:
+  PartDistance(const TriangleMesh& mesh, double pitch_mm, int width, const KeepGoing& keep_going)
+      : band_(measure_band(mesh, pitch_mm, width, keep_going)), distance_(band_, mesh, pitch_mm), sign_(band_.value->getConstAccessor()) {
+    for (auto leaf = band_.value->tree().cbeginLeaf(); leaf; ++leaf) near_.insert(part_of({leaf->origin().x(), leaf->origin().y(), leaf->origin().z()}));
+  }
+  [[nodiscard]] bool stopped() const { return band_.stopped; }
+  [[nodiscard]] bool near(Coord first) const { return near_.contains(part_of(first)); }
+  [[nodiscard]] bool inside(Coord sample) const { return sign_.getValue({sample.x, sample.y, sample.z}) < 0.0f; }
+  [[nodiscard]] double at(Coord sample) const { return distance_.at(sample); }
+
+ private:
+  static Coord part_of(Coord c) { return shift_down(c, 6); }
+  static_assert(Case::kPartSamples == 1 << 6);
+  Band band_;
+  BandDistance distance_;
+  openvdb::FloatGrid::ConstAccessor sign_;
+  std::set<Coord> near_;  // parts with samples in the band
+};
+
+Result<Case> build_of_mesh(CaseInfo info, const TriangleMesh& mesh, double density_g_cm3, const KeepGoing& keep_going) {
+  const double pitch = info.pitch_mm;
+  constexpr int kWidth = 5;  // samples: the case's band and one more
+  const CoordBox box = covering_samples(bounds(mesh), pitch).grown(kWidth);
+  const Shells shells = shells_of(mesh);
+  const auto waiting = [&](double) { return keep_going(0.0); };
+  const PartDistance bone(shells.bone, pitch, kWidth, waiting);
+  std::optional<PartDistance> cavities;
+  if (!bone.stopped() && !shells.cavities.triangles.empty()) cavities.emplace(shells.cavities, pitch, kWidth, waiting);
+  if (bone.stopped() || (cavities && cavities->stopped())) return failure(ErrorCode::cancelled, "stopped while measuring the mesh");
+
+  const auto fill = [&](const CoordBox& part, std::span<float> surface_mm, std::span<float> density) {
+    std::ranges::fill(density, static_cast<float>(density_g_cm3));
+    if (!bone.near(part.min) && !(cavities && cavities->near(part.min)))
+      return bone.inside(part.min) && !(cavities && cavities->inside(part.min)) ? PartKind::inside : PartKind::outside;
+    float* out = surface_mm.data();
+    for (std::int32_t x = part.min.x; x <= part.max.x; ++x)
+      for (std::int32_t y = part.min.y; y <= part.max.y; ++y)
+        for (std::int32_t z = part.min.z; z <= part.max.z; ++z) {
+          // One solid less another is the maximum of a distance and the other's, turned.
+          const double mm = bone.at({x, y, z});
+          *out++ = static_cast<float>(cavities ? std::max(mm, -cavities->at({x, y, z})) : mm);
+        }
+    return PartKind::samples;
+  };
+  return Case::build(std::move(info), box, fill, [&](double done) { return keep_going(kBandShare + (1.0 - kBandShare) * done); });
+}
+
+}  // namespace
+
+Result<Case> case_of_mesh(CaseInfo info, const TriangleMesh& mesh, double density_g_cm3, const KeepGoing& keep_going) {
+  const double pitch = info.pitch_mm;
+  char text[240];
+  if (!mesh.triangles.empty()) {
+    const double longest = bounds(mesh).size_mm().maxCoeff();
+    if (longest < kSmallestBone_mm || longest > kLargestBone_mm) {
+      std::snprintf(text, sizeof text, "the mesh is %.3g mm long, and a bone has %g to %g mm; say which unit its numbers have", longest,
+                    kSmallestBone_mm, kLargestBone_mm);
+      return failure(ErrorCode::invalid_input, text);
+    }
+  }
+  if (const auto good = check(mesh, pitch, kMostBoneTriangles, kLargestBone_mm); !good) return tl::unexpected(good.error());
+  // The band is ten samples deep, and its leaves reach some seven beyond it.
+  const double bytes = area_mm2(mesh) / (pitch * pitch) * 17.0 * kBytesPerSample;
+  const Vec3 samples = bounds(mesh).size_mm() / pitch;
+  if (bytes > kMostBytes || samples.prod() > kMostLattice) {
+    const double finest = std::max(pitch * std::sqrt(bytes / kMostBytes), pitch * std::cbrt(samples.prod() / kMostLattice));
+    std::snprintf(text, sizeof text, "a pitch of %.3g mm would take some %.0f GB of memory; this bone allows %.2g mm and coarser", pitch,
+                  bytes * 1e-9, 1.05 * finest);
+    return failure(ErrorCode::invalid_input, text);
+  }
+  try {
+    initialize_once();
+    return build_of_mesh(std::move(info), mesh, density_g_cm3, keep_going);
   } catch (const std::exception& e) {
     return failure(ErrorCode::internal, std::string("the mesh could not be measured: ") + e.what());
   }

@@ -7,9 +7,9 @@
 
 #include "common/geometry/mesh_file.hpp"
 #include "common/runtime/files.hpp"
-#include "common/tools/tool_file.hpp"
 #include "common/tools/tool_surface.hpp"
 #include "common/volume/field_file.hpp"
+#include "common/volume/mesh_distance.hpp"
 #include "server/import/bone_surface.hpp"
 #include "server/import/carving.hpp"
 #include "server/import/command.hpp"
@@ -139,7 +139,7 @@ std::string dimensions(const Tool& tool) {
 Result<std::string> run_tools(const Arguments& a) {
   std::vector<Tool> tools(builtin_tools().begin(), builtin_tools().end());
   if (!a.file.empty()) {
-    auto own = load_tool(a.file);
+    auto own = load_tool_file(a.file);  // with the STL that it may name
     if (!own) return tl::unexpected(own.error());
     tools = {std::move(*own)};
   }

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "common/core/check.hpp"
-#include "common/tools/tool_file.hpp"
+#include "common/volume/mesh_distance.hpp"
 
 namespace osteon::import {
 namespace {
@@ -106,7 +106,7 @@ Pose pose_across(const Vec3& tip_mm, const Vec3& axis, const Vec3& across) {
 Result<Tool> tool_named(const std::string& name, const fs::path& folder) {
   const fs::path given(name);
   if (given.extension() != ".yaml" && given.extension() != ".yml") return find_tool(name);
-  return load_tool(given.is_absolute() ? given : folder / given);
+  return load_tool_file(given.is_absolute() ? given : folder / given);  // with the STL that it may name
 }
 
 Result<std::vector<CarveStep>> read_carve_script(const fs::path& file) {

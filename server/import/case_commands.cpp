@@ -1,10 +1,13 @@
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "common/geometry/mesh_file.hpp"
+#include "common/volume/mesh_distance.hpp"
 #include "server/import/case_report.hpp"
 #include "server/import/command.hpp"
 #include "server/import/ct_import.hpp"
@@ -20,12 +23,13 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kPhantomPitch_mm = 0.4;
+constexpr double kMeshPitch_mm = 0.5;
 
 struct Arguments {
-  std::string input, out, title, layers, kind, dicom, legend, spacing;
+  std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm";
   std::vector<std::string> bone_colours;
   std::optional<double> pitch_mm, threshold_hu;
-  double width_mm = 20.0;
+  double width_mm = 20.0, density_g_cm3 = 1.9;
   bool json = false;
 };
 
@@ -142,6 +146,32 @@ Result<std::string> run_labels(const Arguments& a, const StopSignal& stop) {
   return text;
 }
 
+double millimetres_of(const std::string& unit) { return unit == "m" ? 1000.0 : unit == "inch" ? 25.4 : unit == "cm" ? 10.0 : 1.0; }
+
+Result<std::string> run_stl(const Arguments& a, const StopSignal& stop) {
+  if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
+  auto mesh = read_stl(a.input);
+  if (!mesh) return tl::unexpected(mesh.error());
+  const auto scale = static_cast<float>(millimetres_of(a.unit));
+  for (auto& corner : mesh->positions_mm)
+    for (float& value : corner) value *= scale;
+  const double enclosed = std::abs(enclosed_mm3(*mesh));
+
+  CaseInfo info;
+  info.title = a.title.empty() ? "Mesh" : a.title;
+  info.source = "STL mesh, " + std::to_string(mesh->triangles.size()) + " triangles";
+  info.pitch_mm = a.pitch_mm.value_or(kMeshPitch_mm);
+  Bar bar(stop);
+  const auto bone = case_of_mesh(std::move(info), *mesh, a.density_g_cm3, bar.stage(0.05, 0.95));
+  if (!bone) return tl::unexpected(about(a.input, bone.error()));
+  if (auto saved = save(*bone, a.out, stop); !saved) return tl::unexpected(saved.error());
+  bar.stage(1.0, 1.0)(1.0);
+  char line[160];
+  std::snprintf(line, sizeof line, "mesh       %.2f cm3 within its triangles; the sampled bone has %+.2f %% of that more\n", enclosed * 1e-3,
+                100.0 * (bone->volume_mm3() - enclosed) / enclosed);
+  return report_text(*bone) + line;
+}
+
 Result<std::string> run_info(const Arguments& a) {
   const auto bone = Case::load(a.input);
   if (!bone) return tl::unexpected(bone.error());
@@ -188,6 +218,15 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   labels->add_option("--legend", a.legend, "The same from a YAML file");
   labels->add_option("--title", a.title, "Name shown to people; do not use a patient's");
   commands.push_back({labels, [shared](const StopSignal& stop) { return run_labels(*shared, stop); }});
+
+  CLI::App* stl = app.add_subcommand("stl", "Make a case of one density from a closed triangle mesh");
+  stl->add_option("FILE", a.input, "STL file, binary or text")->required();
+  stl->add_option("--out", a.out, "Folder of the case, made by this command")->required();
+  stl->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: 0.5)")->check(CLI::Range(0.02, 10.0));
+  stl->add_option("--density", a.density_g_cm3, "Of all its bone, g/cm3")->check(CLI::Range(0.05, 3.0))->capture_default_str();
+  stl->add_option("--unit", a.unit, "Of the file's numbers: mm, cm, m or inch")->check(CLI::IsMember({"mm", "cm", "m", "inch"}))->capture_default_str();
+  stl->add_option("--title", a.title, "Name shown to people; do not use a patient's");
+  commands.push_back({stl, [shared](const StopSignal& stop) { return run_stl(*shared, stop); }});
 
   CLI::App* info = app.add_subcommand("info", "Say what a case is");
   info->add_option("CASE_DIR", a.input, "Folder of the case")->required();

@@ -10,7 +10,7 @@
 int main(int argc, char** argv) {
   using namespace osteon;
   static constexpr const char* kProgram = "osteon-import";
-  CLI::App app("Makes a case, the bone that osteon-server loads, from a CT scan, a label volume or a phantom.", kProgram);
+  CLI::App app("Makes a case, the bone that osteon-server loads, from a CT scan, a label volume, a mesh or a phantom.", kProgram);
   app.require_subcommand(1);
   app.set_help_all_flag("--help-all", "Help for all commands");
   std::vector<import::Command> commands;

@@ -153,13 +153,13 @@ TEST(Seams, RandomCutsOfAllLevelsLeaveAClosedSurface) {
 }
 
 TEST(Seams, FarBlocksAreCoarseAndTheSurfaceStaysClosed) {
-  Drawn drawn = ball(30.0, 0.8);
-  drawn.cut(cut_at_level("burr-round-5", 2, {-3, 0, 30}, {3, 1, 30}, {0, 0, -1}));
-  drawn.cut(cut_at_level("drill-3.2", 1, {20, 0, 26}, {10, 0, 10}, {0, 0, -1}));
+  Drawn drawn = ball(60.0, 0.8);
+  drawn.cut(cut_at_level("burr-round-5", 2, {-3, 0, 60}, {3, 1, 60}, {0, 0, -1}));
+  drawn.cut(cut_at_level("drill-3.2", 1, {20, 0, 58}, {10, 0, 40}, {0, 0, -1}));
   const CoordBox bone = drawn.field.bone().bounds_samples();
   std::size_t full = 0;
   for (const Mesh& mesh : drawn.meshes()) full += mesh.triangles.size();
-  for (const Focus focus : {Focus{{0, 0, 30}, 5, 20}, Focus{{0, 0, 30}, 3, 3}, Focus{{20, 0, 20}, 1, 30}}) {
+  for (const Focus& focus : {Focus{{0, 0, 60}, 5, 20}, Focus{{0, 0, 60}, 3, 3}, Focus{{40, 0, 40}, 1, 30}}) {
     (void)drawn.blocks.focus({&focus, 1}, bone, 0.8);
     EXPECT_GT(drawn.blocks.coarse_blocks().size(), 3u);
     const std::vector<Mesh> meshes = drawn.meshes();

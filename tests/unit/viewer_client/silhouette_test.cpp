@@ -31,20 +31,27 @@
 namespace osteon {
 namespace {
 
-constexpr double kPitch_mm = 0.8, kRadius_mm = 30.0, kDeepest_mm = 1.2;
+constexpr double kPitch_mm = 0.8, kDeepest_mm = 1.2;
+constexpr double kSmall_mm = 30.0;   // so close that the cracks between cuts fill pixels
+constexpr double kLarge_mm = 75.0;   // room for five levels side by side
 constexpr int kEdge_px = 900;
-constexpr double kDistance_mm = 150.0, kViewAngle_deg = 24.0;
+constexpr double kDistance = 5.0;  // of the eye, in radii
+constexpr double kViewAngle_deg = 24.0;
 constexpr int kEroded_px = 2;
+// Beside a seam a sliver of less than a hundredth of a square millimetre may lie the wrong way round; in all pictures
+// together that is a pixel here and there. Cracks show by tens.
+constexpr int kSlivers_px = 6;
 
 // A ball with a groove of each level; all three cross at its north pole.
 struct GroovedBall {
-  CutField field{test::make_bone({Vec3::Constant(-kRadius_mm - 4), Vec3::Constant(kRadius_mm + 4)}, kPitch_mm,
-                                 [](const Vec3& p) { return p.norm() - kRadius_mm; }, [](const Vec3&) { return 1.9; }),
+  double radius_mm;
+  CutField field{test::make_bone({Vec3::Constant(-radius_mm - 4), Vec3::Constant(radius_mm + 4)}, kPitch_mm,
+                                 [r = radius_mm](const Vec3& p) { return p.norm() - r; }, [](const Vec3&) { return 1.9; }),
                  BodyId{}};
   SurfaceBlocks blocks{BodyId{}};
 
-  GroovedBall() {
-    const double tip = kRadius_mm - 1.0;
+  explicit GroovedBall(double radius) : radius_mm(radius) {
+    const double tip = radius_mm - 1.0;
     const std::array<std::pair<Vec3, Vec3>, 3> ends{
         {{{-5, 0, tip}, {5, 0.3, tip}}, {{0.2, -5, tip}, {0, 5, tip}}, {{-4, -4, tip}, {4, 3.5, tip}}}};
     for (int level = 0; level < kLevels; ++level) {
@@ -124,9 +131,9 @@ class Silhouette : public testing::Test {
 
   // What is wrong within the outline of a ball that is smaller by the grooves' depth. From distance d it is a circle of
   // angle asin(r / d).
-  Leaks look(const Vec3& from) {
+  Leaks look(const Vec3& from, double radius_mm) {
     vtkCamera* camera = renderer_->GetActiveCamera();
-    const Vec3 eye = kDistance_mm * from.normalized();
+    const Vec3 eye = kDistance * radius_mm * from.normalized();
     camera->SetPosition(eye.x(), eye.y(), eye.z());
     camera->SetFocalPoint(0, 0, 0);
     const Vec3 up = std::abs(from.normalized().z()) > 0.9 ? Vec3::UnitX() : Vec3::UnitZ();
@@ -137,7 +144,7 @@ class Silhouette : public testing::Test {
     vtkNew<vtkUnsignedCharArray> pixels;
     window_->GetPixelData(0, 0, kEdge_px - 1, kEdge_px - 1, 1, pixels);
     const double focal_px = 0.5 * kEdge_px / std::tan(kViewAngle_deg * std::numbers::pi / 360.0);
-    const double radius_px = focal_px * std::tan(std::asin((kRadius_mm - kDeepest_mm) / kDistance_mm)) - kEroded_px;
+    const double radius_px = focal_px * std::tan(std::asin((radius_mm - kDeepest_mm) / (kDistance * radius_mm))) - kEroded_px;
     Leaks leaks;
     for (int y = 0; y < kEdge_px; ++y)
       for (int x = 0; x < kEdge_px; ++x) {
@@ -150,12 +157,12 @@ class Silhouette : public testing::Test {
       }
     return leaks;
   }
-  Leaks look_from_all_sides(vtkPolyData* surface) {
-    mapper_->SetInputData(surface);
+  Leaks look_from_all_sides(const GroovedBall& ball, bool seams) {
+    mapper_->SetInputData(ball.surface(seams));
     Leaks all;
     for (const Vec3& from : {Vec3(0, 0, 1), Vec3(0.3, 0.2, 1), Vec3(-0.7, 0.4, 0.6), Vec3(1, 0.1, 0.5),
                              Vec3(0.1, -1, 0.2), Vec3(-0.2, 0.3, -1)}) {
-      const Leaks leaks = look(from);
+      const Leaks leaks = look(from, ball.radius_mm);
       EXPECT_GT(leaks.covered, kEdge_px * kEdge_px / 4) << "the ball fills the picture";
       all.background += leaks.background;
       all.inside += leaks.inside;
@@ -172,27 +179,29 @@ class Silhouette : public testing::Test {
 };
 
 TEST_F(Silhouette, HasNoCracksWhereLevelsMeet) {
-  GroovedBall ball;
-  EXPECT_EQ(look_from_all_sides(ball.surface(true)).background, 0);
-  EXPECT_EQ(look_from_all_sides(ball.surface(true)).inside, 0);
-  EXPECT_EQ(ball.levels(), (std::set<int>{0, 1, 2}));
+  const GroovedBall small(kSmall_mm);
+  const Leaks grooves = look_from_all_sides(small, true);
+  EXPECT_EQ(grooves.background, 0);
+  EXPECT_EQ(grooves.inside, 0);
+  EXPECT_EQ(small.levels(), (std::set<int>{0, 1, 2}));
 
   // Far blocks coarser: five levels side by side, the coarse ones beyond the grooves.
-  for (const Focus& focus : {Focus{{0, 0, kRadius_mm}, 10, 20}, Focus{{0, 0, kRadius_mm}, 12, 16}}) {
-    ball.focus(focus);
-    const Leaks leaks = look_from_all_sides(ball.surface(true));
+  GroovedBall large(kLarge_mm);
+  for (const Focus& focus : {Focus{{0, 0, kLarge_mm}, 10, 20}, Focus{{0, 0, kLarge_mm}, 12, 16}}) {
+    large.focus(focus);
+    const Leaks leaks = look_from_all_sides(large, true);
     EXPECT_EQ(leaks.background, 0);
-    EXPECT_EQ(leaks.inside, 0);
-    EXPECT_EQ(ball.levels(), (std::set<int>{-2, -1, 0, 1, 2}));
+    EXPECT_LE(leaks.inside, kSlivers_px);
+    EXPECT_EQ(large.levels(), (std::set<int>{-2, -1, 0, 1, 2}));
   }
 }
 
 // What this test looks at shows cracks where there are some.
 TEST_F(Silhouette, ShowsTheCracksThatSeamsClose) {
-  GroovedBall ball;
-  const Leaks cut = look_from_all_sides(ball.surface(false));
-  ball.focus({{0, 0, kRadius_mm}, 8, 24});
-  const Leaks far = look_from_all_sides(ball.surface(false));
+  const Leaks cut = look_from_all_sides(GroovedBall(kSmall_mm), false);
+  GroovedBall large(kLarge_mm);
+  large.focus({{0, 0, kLarge_mm}, 8, 24});
+  const Leaks far = look_from_all_sides(large, false);
   RecordProperty("pixels_through_cracks_of_cuts", cut.inside + cut.background);
   RecordProperty("pixels_through_cracks_of_far_blocks", far.inside + far.background);
   EXPECT_GT(cut.inside + cut.background, 0);

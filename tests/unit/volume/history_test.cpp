@@ -119,6 +119,40 @@ TEST(CutHistory, ACutHiddenByAnotherComesBackWhenThatIsUndone) {
   EXPECT_EQ(field.hash(), small.hash());
 }
 
+// A piece's history: what both bodies had before is taken back in each of them by itself.
+TEST(CutHistory, AForkGoesItsOwnWay) {
+  const Case bone = plain_block(20.0, 8.0, 0.5);
+  const Tool burr = *find_tool("burr-round-5");
+  std::vector<Cut> cuts;
+  for (int i = 0; i < 4; ++i) cuts.push_back(straight_cut(burr, {-6.0 + 3.0 * i, -2, -1}, {-5.0 + 3.0 * i, 2, -1}, {0, 0, -1}));
+  CutField parent(bone, {}), piece(bone, {});
+  CutHistory history;
+  const auto cut = [&](CutField& field, CutHistory& its, std::size_t i) { its.add({i + 1}, cuts[i], field.apply(cuts[i]).reached_leaves); };
+  for (CutField* field : {&parent, &piece}) (void)field->apply(cuts[0]), (void)field->apply(cuts[1]);
+  for (std::size_t i = 0; i < 2; ++i) history.add({i + 1}, cuts[i], parent.reach(cuts[i]));
+  CutHistory other = history.fork();
+  cut(parent, history, 2);
+  cut(piece, other, 3);
+  EXPECT_EQ(history.size(), 3u);
+  EXPECT_EQ(other.size(), 3u);
+  EXPECT_FALSE(other.contains({3}));
+  const auto only = [&](std::initializer_list<std::size_t> which) {
+    CutField field(bone, {});
+    for (const std::size_t i : which) field.apply(cuts[i]);
+    return field.hash();
+  };
+  const RoomSeq first{1}, second{2};
+  history.undo(parent, {&first, 1});
+  EXPECT_TRUE(history.undone(first));
+  EXPECT_FALSE(other.undone(first));
+  EXPECT_EQ(parent.hash(), only({1, 2}));
+  EXPECT_EQ(piece.hash(), only({0, 1, 3}));
+  other.undo(piece, {&second, 1});
+  EXPECT_EQ(piece.hash(), only({0, 3}));
+  history.redo(parent, {&first, 1});
+  EXPECT_EQ(parent.hash(), only({0, 1, 2}));
+}
+
 TEST(CutHistory, CostsWhatWasTouchedAndNamesTheLeavesThatChanged) {
   const Case bone = plain_block(40.0, 8.0, 0.5);
   CutField field(bone, {});
