@@ -28,11 +28,14 @@
 #include <vtkTypeInt32Array.h>
 #include <vtkUnsignedCharArray.h>
 
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <map>
+#include <memory>
 #include <numbers>
+#include <thread>
 #include <utility>
 
 #include "common/runtime/files.hpp"
@@ -180,34 +183,45 @@ class BoneStyle : public vtkInteractorStyleTrackballCamera {
 };
 vtkStandardNewMacro(BoneStyle);
 
-// Asks the X server itself, because VTK aborts the process where there is none.
-Result<void> check_display() {
+struct CloseDisplay {
+  void operator()(Display* display) const { XCloseDisplay(display); }
+};
+using OpenDisplay = std::unique_ptr<Display, CloseDisplay>;
+
+// Asks the X server itself, because VTK ends the process where there is none. The connection stays open as long as the
+// window: an X server without any starts afresh, and refuses the next one for that moment.
+Result<OpenDisplay> open_display() {
   const char* name = std::getenv("DISPLAY");
   if (name == nullptr || *name == '\0') {
     return failure(ErrorCode::not_found,
                    "there is no screen to draw on: set DISPLAY to an X server's display, or start the program with "
                    "`xvfb-run -a`");
   }
-  Display* display = XOpenDisplay(name);
-  if (display == nullptr) {
+  OpenDisplay display(XOpenDisplay(name));
+  // A server that has just lost its last client may need a moment.
+  for (int attempt = 0; !display && attempt < 10; ++attempt) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    display.reset(XOpenDisplay(name));
+  }
+  if (!display) {
     return failure(ErrorCode::not_found, "the X display " + std::string(name) +
                                              " named by DISPLAY cannot be opened: correct DISPLAY, or start the "
                                              "program with `xvfb-run -a`");
   }
   int opcode = 0, event = 0, error = 0;
-  const bool has_gl = XQueryExtension(display, "GLX", &opcode, &event, &error) != 0;
-  XCloseDisplay(display);
+  const bool has_gl = XQueryExtension(display.get(), "GLX", &opcode, &event, &error) != 0;
   if (!has_gl) {
     return failure(ErrorCode::not_found, "the X display " + std::string(name) +
                                              " has no OpenGL (GLX): use one that has, or start the program with "
                                              "`xvfb-run -a`");
   }
-  return {};
+  return display;
 }
 
 }  // namespace
 
 struct BoneWindow::Impl {
+  OpenDisplay display;  // closed last
   vtkNew<vtkRenderer> renderer;
   vtkNew<vtkRenderWindow> window;
   vtkSmartPointer<vtkRenderWindowInteractor> interactor;
@@ -271,8 +285,10 @@ BoneWindow::~BoneWindow() {
 }
 
 Result<std::unique_ptr<BoneWindow>> BoneWindow::open(const WindowOptions& options) {
-  if (auto display = check_display(); !display) return tl::unexpected(display.error());
+  auto display = open_display();
+  if (!display) return tl::unexpected(display.error());
   auto impl = std::make_unique<Impl>();
+  impl->display = std::move(*display);
   vtkRenderer* renderer = impl->renderer;
   vtkRenderWindow* window = impl->window;
 
