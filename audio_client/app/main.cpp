@@ -1,9 +1,7 @@
 // osteon-audio: joins a room and makes its tools heard.
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
-#include <unistd.h>
 
-#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -11,7 +9,6 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <thread>
 
 #include "audio_client/net/cutting_watch.hpp"
@@ -44,22 +41,6 @@ struct Options {
   std::filesystem::path wav_file, state_log_file, summary_file;
   double patience_s = 5;
 };
-
-// Whether a file could be written there; what it holds stays. No file is always well.
-Result<void> check_writable(const std::filesystem::path& file, const std::string& what, const std::string& option) {
-  if (file.empty()) return {};
-  std::error_code ignored;
-  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
-  int reason = 0;
-  if (std::filesystem::is_directory(file, ignored))
-    reason = EISDIR;
-  else if (std::filesystem::exists(file, ignored) ? ::access(file.c_str(), W_OK) != 0 : ::access(folder.c_str(), W_OK | X_OK) != 0)
-    reason = errno;
-  if (reason == 0) return {};
-  return failure(ErrorCode::internal, "cannot write " + what + " " + file.string() + ": " +
-                                          std::generic_category().message(reason) + "; give " + option +
-                                          " a file in a folder that exists and may be written");
-}
 
 // Rows of the state log and the latency that they add up to.
 //

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fstream>
 #include <sstream>
+#include <system_error>
 
 namespace osteon {
 
@@ -36,6 +37,21 @@ Result<std::string> read_file(const std::filesystem::path& file) {
   content << in.rdbuf();
   if (!in) return failure(ErrorCode::internal, "cannot read " + file.string());
   return std::move(content).str();
+}
+
+Result<void> check_writable(const std::filesystem::path& file, const std::string& what, const std::string& option) {
+  if (file.empty()) return {};
+  std::error_code ignored;
+  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  int reason = 0;
+  if (std::filesystem::is_directory(file, ignored))
+    reason = EISDIR;
+  else if (std::filesystem::exists(file, ignored) ? ::access(file.c_str(), W_OK) != 0 : ::access(folder.c_str(), W_OK | X_OK) != 0)
+    reason = errno;
+  if (reason == 0) return {};
+  return failure(ErrorCode::internal, "cannot write " + what + " " + file.string() + ": " +
+                                          std::generic_category().message(reason) + "; give " + option +
+                                          " a file in a folder that exists and may be written");
 }
 
 }  // namespace osteon

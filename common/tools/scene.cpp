@@ -175,6 +175,8 @@ Result<SceneItem> set_by_rules(std::span<const Standing> scene, const Standing* 
   const Tool& tool = wanted.tool;
   const std::string name = "\"" + tool.name + "\"";
   if (before && before->item.tool != item.tool) return failure(ErrorCode::invalid_input, "an item cannot become another tool; take it out and set " + name);
+  if (tool.cuts() && tool.kind != ToolKind::pin && tool.kind != ToolKind::screw && tool.kind != ToolKind::mesh)
+    return failure(ErrorCode::invalid_input, name + " is a tool for the hand; guides, pins, screws and implants are left on the bone");
   const Motion moved = before ? motion(before->item.pose_bone_item, item.pose_bone_item) : Motion{};
   const bool moves = before && (std::abs(moved.along_mm) > kAcross_mm || moved.across_mm > kAcross_mm || moved.tilt_rad > kTilt_rad ||
                                 (std::abs(moved.turn_rad) > kTilt_rad && tool.kind != ToolKind::pin && tool.kind != ToolKind::screw));

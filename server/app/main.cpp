@@ -124,6 +124,7 @@ Result<void> run(const Options& options, const StopSignal& stop) {
     std::filesystem::remove(options.address_file, ignored);
   }
   if (Result<void> usable = RoomServer::check_listen(options.listen); !usable) return usable;
+  if (Result<void> usable = check_writable(options.save_file, "the fields", "--save"); !usable) return usable;
   Result<Case> bone = Case::load(options.case_folder);
   if (!bone) return tl::unexpected(bone.error());
   log::info("case", {{"title", bone->info().title},

@@ -452,7 +452,7 @@ void Room::cut_apart(RoomSeq place, Event& row, RoomEvent& event, std::vector<Cu
 
 Result<RoomEvent> Room::set_item(AuthorId by, SceneItem item) {
   if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
-  if (!exists(item.body)) return refuse("item.body: the room has no body " + std::to_string(item.body.value));
+  if (!exists(item.body)) return refuse("the room has no body " + std::to_string(item.body.value));
   if (!tools_->find(item.tool)) return refuse("item.tool_hash is of no tool that the room knows");
   if (item.id != 0 && !items_.contains(item.id)) return refuse("item.item: the room has no item " + std::to_string(item.id));
   if (item.id == 0 && items_.size() >= kMostItems)

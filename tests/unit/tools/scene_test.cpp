@@ -56,6 +56,13 @@ TEST(SceneItem, EveryFieldCounts) {
   EXPECT_FALSE(a == b);
 }
 
+TEST(SetByRules, LeavesOnTheBoneOnlyWhatStandsThere) {
+  for (const Tool& tool : builtin_tools()) {
+    const bool stands = !tool.cuts() || tool.kind == ToolKind::pin || tool.kind == ToolKind::screw;
+    EXPECT_EQ(set_by_rules({}, nullptr, standing(tool, Pose{}), {}).has_value(), stands) << tool.name;
+  }
+}
+
 TEST(PlaceOnBone, FindsTheNearestPointAndItsNormal) {
   const BoneQuery ball = [](const Vec3& p) { return std::clamp((p - Vec3(5, -3, 2)).norm() - 20.0, -2.0, 2.0); };
   for (const Vec3& out : {Vec3(1, 0.2, -0.4), Vec3(-0.3, 0.9, 0.8), Vec3(0, 0, 1)})
