@@ -608,7 +608,8 @@ void RoomHost::Impl::run_pieces() {
       pieces_due = look_wanted = false;
       ++looks_begun;
     }
-    for (Separation& found : pieces.look()) ask_for_split(std::move(found));
+    if (rates_.pieces.count() > 0)
+      for (Separation& found : pieces.look()) ask_for_split(std::move(found));
     std::unique_lock lock(pieces_mutex);
     looks_done = looks_begun;
     pieces_wake.notify_all();
@@ -779,7 +780,8 @@ void RoomHost::stop() {
   if (impl_->piece_thread.joinable()) {
     impl_->piece_thread.join();
     // What the last cuts separated, so that the bone is left, and saved, in its pieces.
-    for (Separation& found : impl_->pieces.look()) (void)impl_->room.split(std::move(found));
+    if (impl_->rates_.pieces.count() > 0)
+      for (Separation& found : impl_->pieces.look()) (void)impl_->room.split(std::move(found));
     impl_->room_seq = impl_->room.room_seq().value;
     impl_->make_stale_blocks(false);
   }

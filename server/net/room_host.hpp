@@ -58,7 +58,7 @@ struct HostRates {
   std::chrono::nanoseconds tick{1'000'000'000 / 120};
   std::chrono::nanoseconds mesh{1'000'000'000 / 30};
   std::chrono::nanoseconds looks{250'000'000};   // at most so often the surface follows the looks of viewers and the tools
-  std::chrono::nanoseconds pieces{1'000'000'000 / 8};  // at most so often is looked for what has come apart
+  std::chrono::nanoseconds pieces{1'000'000'000 / 8};  // at most so often is looked for what has come apart; zero: never
 };
 
 struct HostHealth {

@@ -114,7 +114,8 @@ class FakeMesh final : public MeshSink {
 
 TEST(RoomHost, EverySinkEndsWithTheRoomsBoneAndSurface) {
   const Case bone = test::test_block();
-  RoomHost host(Room(bone), {.tick = 1ms, .mesh = 3ms}, {});
+  // Every event is a cut: random strokes now and then leave a crumb, which would be an event too.
+  RoomHost host(Room(bone), {.tick = 1ms, .mesh = 3ms, .pieces = 0ns}, {});
   std::vector<std::shared_ptr<FakeSession>> sessions;
   for (int i = 0; i < 3; ++i) {
     sessions.push_back(std::make_shared<FakeSession>(host.join(MemberKind::surgeon), bone));
@@ -176,7 +177,7 @@ TEST(RoomHost, EverySinkEndsWithTheRoomsBoneAndSurface) {
 // must be true of it all the same.
 TEST(RoomHost, CopiesOfTheBoneAreRightWhileItIsCut) {
   const Case bone = test::test_block();
-  RoomHost host(Room(bone), {.tick = 200us, .mesh = 50ms}, {});
+  RoomHost host(Room(bone), {.tick = 200us, .mesh = 50ms, .pieces = 0ns}, {});
   const auto hand = std::make_shared<FakeSession>(host.join(MemberKind::surgeon), bone);
   ASSERT_TRUE(host.open_session(hand));
   constexpr std::uint64_t kCuts = 60;
