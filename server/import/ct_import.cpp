@@ -2,24 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "common/imaging/islands.hpp"
 #include "common/imaging/resample.hpp"
+#include "server/import/import_steps.hpp"
 
 namespace osteon::import {
 namespace {
 
-// Samples of one import; 8 bytes each, and the sparse case besides, stay within 20 GB.
-constexpr double kLargestLattice = 1.0e9;
 // Shares of the time that the stages take, for one bar over all of them.
 constexpr double kIslandsEnd = 0.1;
 constexpr double kResampleEnd = 0.4;
 constexpr double kSurfaceEnd = 0.85;
-
-KeepGoing part(const KeepGoing& whole, double begin, double end) {
-  return [&whole, begin, end](double fraction) { return whole(begin + (end - begin) * fraction); };
-}
 
 // The bone's voxels, the cell around each, and the band beyond.
 CoordBox lattice_box(const imaging::HuVolume& volume, const imaging::IslandReport& bone, double pitch_mm) {
@@ -51,14 +45,7 @@ Result<Case> import_ct(CtScan scan, const CtOptions& options, const KeepGoing& k
   if (!bone) return tl::unexpected(bone.error());
 
   const CoordBox box = lattice_box(volume, *bone, pitch_mm);
-  const Coord dims = box.dims();
-  const double samples = static_cast<double>(dims.x) * dims.y * dims.z;
-  if (samples > kLargestLattice) {
-    char text[160];
-    std::snprintf(text, sizeof text, "a pitch of %.3g mm needs %.0f million samples, more than %.0f million; give a larger --pitch", pitch_mm,
-                  samples * 1e-6, kLargestLattice * 1e-6);
-    return failure(ErrorCode::invalid_input, text);
-  }
+  if (Result<void> fits = check_lattice(box, pitch_mm); !fits) return tl::unexpected(fits.error());
 
   auto hu = imaging::resample(volume, box, pitch_mm, part(keep_going, kIslandsEnd, kResampleEnd));
   if (!hu) return tl::unexpected(hu.error());

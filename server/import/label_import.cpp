@@ -4,19 +4,16 @@
 #include <cmath>
 #include <cstdio>
 
+#include "server/import/import_steps.hpp"
+
 namespace osteon::import {
 namespace {
 
-constexpr double kLargestLattice = 1.0e9;
 constexpr int kMargin = 5;  // samples beyond the bone: the band and the cell around it
 // Shares of the time that the stages take.
 constexpr double kSmoothEnd = 0.35;
 constexpr double kResampleEnd = 0.4;
 constexpr double kSurfaceEnd = 0.85;
-
-KeepGoing part(const KeepGoing& whole, double begin, double end) {
-  return [&whole, begin, end](double fraction) { return whole(begin + (end - begin) * fraction); };
-}
 
 DenseVolume<std::uint8_t> cropped(const DenseVolume<std::uint8_t>& from, const CoordBox& box) {
   DenseVolume<std::uint8_t> out;
@@ -87,14 +84,7 @@ Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, c
   if (voxels != all) volume.labels = cropped(volume.labels, voxels);
   const Box bone{position_mm(voxels.min, 1.0).cwiseProduct(spacing), position_mm(voxels.max, 1.0).cwiseProduct(spacing)};
   const CoordBox box = covering_samples(bone.grown(kMargin * pitch_mm), pitch_mm);
-  const Coord dims = box.dims();
-  const double samples = static_cast<double>(dims.x) * dims.y * dims.z;
-  if (samples > kLargestLattice) {
-    char text[160];
-    std::snprintf(text, sizeof text, "a pitch of %.3g mm needs %.0f million samples, more than %.0f million; give a larger --pitch", pitch_mm,
-                  samples * 1e-6, kLargestLattice * 1e-6);
-    return failure(ErrorCode::invalid_input, text);
-  }
+  if (Result<void> fits = check_lattice(box, pitch_mm); !fits) return tl::unexpected(fits.error());
 
   auto smooth = imaging::smooth_labels(volume, options.smoothing, part(keep_going, 0.0, kSmoothEnd));
   if (!smooth) return tl::unexpected(smooth.error());

@@ -8,13 +8,13 @@
 #include <numbers>
 
 #include "common/imaging/calibration.hpp"
+#include "server/import/import_steps.hpp"
 
 namespace osteon::import {
 namespace {
 
 constexpr double kDensest_g_cm3 = 3.0;   // enamel
 constexpr double kThickest_mm = 500.0;
-constexpr double kLargestLattice = 1.0e9;
 constexpr int kSubsamples = 16;          // along a voxel's edge, where the tube's circles cross it
 
 // Integral over depth from zero of a value given layer by layer; the outer layers go on beyond the ends.

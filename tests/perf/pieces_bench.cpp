@@ -29,37 +29,17 @@ void print(const char* name, std::vector<double> values) {
   std::printf("\"%s_p50\": %.4f, \"%s_max\": %.4f, ", name, values[values.size() / 2], name, values.back());
 }
 
-Result<Case> ball(double radius_mm) {
-  const auto fill = [&](const CoordBox& part, std::span<float> surface, std::span<float> density) {
-    const Vec3 low = position_mm(part.min, kPitch_mm), high = position_mm(part.max, kPitch_mm);
-    const double middle = (0.5 * (low + high)).norm() - radius_mm, reach = 0.5 * (high - low).norm() + (kBandVoxels + 1) * kPitch_mm;
-    if (middle > reach) return PartKind::outside;
-    std::ranges::fill(density, 1.9f);
-    if (middle < -reach) return PartKind::inside;
-    std::size_t i = 0;
-    for (std::int32_t x = part.min.x; x <= part.max.x; ++x)
-      for (std::int32_t y = part.min.y; y <= part.max.y; ++y)
-        for (std::int32_t z = part.min.z; z <= part.max.z; ++z, ++i)
-          surface[i] = static_cast<float>(position_mm({x, y, z}, kPitch_mm).norm() - radius_mm);
-    return PartKind::samples;
-  };
-  const Vec3 half = Vec3::Constant(radius_mm + (kBandVoxels + 1) * kPitch_mm);
-  return Case::build({.title = "Ball", .source = "closed form", .pitch_mm = kPitch_mm, .calibration = {}, .threshold_hu = 0.0},
-                     covering_samples({-half, half}, kPitch_mm), fill);
-}
-
 int run(int samples) {
   const double radius_mm = 0.5 * samples * kPitch_mm;
   auto start = std::chrono::steady_clock::now();
-  const auto built = ball(radius_mm);
-  OSTEON_CHECK(built.has_value());
+  const Case built = large_ball(radius_mm, kPitch_mm);
   const double build_ms = ms_since(start);
   rusage used{};
   ::getrusage(RUSAGE_SELF, &used);
   std::printf("{\"samples\": %d, \"build_ms\": %.1f, \"case_megabytes\": %.2f, \"peak_megabytes\": %.1f, ", samples, build_ms,
-              static_cast<double>(built->memory_bytes()) * 1e-6, static_cast<double>(used.ru_maxrss) * 1e-3);
+              static_cast<double>(built.memory_bytes()) * 1e-6, static_cast<double>(used.ru_maxrss) * 1e-3);
 
-  CutField field(*built, {});
+  CutField field(built, {});
   start = std::chrono::steady_clock::now();
   FragmentFinder finder(field);
   std::printf("\"label_ms\": %.1f, ", ms_since(start));
@@ -99,7 +79,7 @@ int run(int samples) {
           leaf.values[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(std::clamp(std::lround(mm * 1024.0), -long{band}, long{band}));
           cuts |= leaf.values[static_cast<std::size_t>(i)] < band;
         }
-        if (!cuts || !built->has_bone({shift_down({x, y, z}, 2), shift_down({x + 7, y + 7, z + 7}, 2)})) continue;
+        if (!cuts || !built.has_bone({shift_down({x, y, z}, 2), shift_down({x + 7, y + 7, z + 7}, 2)})) continue;
         field.restore(leaf);
         changed.push_back({x, y, z});
       }

@@ -25,25 +25,6 @@ double ms_since(std::chrono::steady_clock::time_point start) {
   return 1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-Result<Case> ball(double radius_mm) {
-  const auto fill = [&](const CoordBox& part, std::span<float> surface, std::span<float> density) {
-    const Vec3 low = position_mm(part.min, kPitch_mm), high = position_mm(part.max, kPitch_mm);
-    const double middle = (0.5 * (low + high)).norm() - radius_mm, reach = 0.5 * (high - low).norm() + (kBandVoxels + 1) * kPitch_mm;
-    if (middle > reach) return PartKind::outside;
-    std::ranges::fill(density, 1.9f);
-    if (middle < -reach) return PartKind::inside;
-    std::size_t i = 0;
-    for (std::int32_t x = part.min.x; x <= part.max.x; ++x)
-      for (std::int32_t y = part.min.y; y <= part.max.y; ++y)
-        for (std::int32_t z = part.min.z; z <= part.max.z; ++z, ++i)
-          surface[i] = static_cast<float>(position_mm({x, y, z}, kPitch_mm).norm() - radius_mm);
-    return PartKind::samples;
-  };
-  const Vec3 half = Vec3::Constant(radius_mm + (kBandVoxels + 1) * kPitch_mm);
-  return Case::build({.title = "Ball", .source = "closed form", .pitch_mm = kPitch_mm, .calibration = {}, .threshold_hu = 0.0},
-                     covering_samples({-half, half}, kPitch_mm), fill);
-}
-
 std::size_t bytes_of(const RoomEvent& event, double& ms) {
   const auto start = std::chrono::steady_clock::now();
   std::size_t bytes = 0;
@@ -60,9 +41,8 @@ double field_megabytes(const Room& room) {
 
 int run(int samples) {
   const double radius_mm = 0.5 * samples * kPitch_mm;
-  const auto built = ball(radius_mm);
-  OSTEON_CHECK(built.has_value());
-  Room room(*built);
+  const Case built = large_ball(radius_mm, kPitch_mm);
+  Room room(built);
   std::shared_mutex mutex;
   PieceWatch watch(room, mutex, [&](std::vector<FieldLeaf>& leaves) {
     for (FieldLeaf& leaf : leaves) room.find_field(leaf.body)->read(leaf);

@@ -24,6 +24,9 @@ struct Layer {
 // One density throughout, z from -thickness to 0.
 [[nodiscard]] Case plain_block(double width_mm, double thickness_mm, double pitch_mm, double density_g_cm3 = 1.9);
 
+// A ball about the origin, made part by part: however large, only its surface takes memory.
+[[nodiscard]] Case large_ball(double radius_mm, double pitch_mm, double density_g_cm3 = 1.9);
+
 // A drill or burr path as one cut, poses with the tool's axis along `axis`.
 [[nodiscard]] Cut straight_cut(const Tool& tool, const Vec3& from_tip_mm, const Vec3& to_tip_mm, const Vec3& axis,
                                std::uint64_t author_seq = 1);

@@ -8,7 +8,6 @@
 #include <iterator>
 #include <limits>
 
-#include "tests/support/shared_data.hpp"
 #include "tests/support/temp_dir.hpp"
 
 namespace osteon {
@@ -145,18 +144,6 @@ TEST(MeshFile, EveryBadStlIsRefusedWithItsNameAndARemedy) {
   }
   EXPECT_FALSE(read_stl(folder / "missing.stl"));
   EXPECT_FALSE(read_stl(folder.path()));
-}
-
-TEST(MeshFile, ARealFemurIsClosedAndHasAFemursVolume) {
-  const auto shared = test::find_shared();
-  if (!shared || !fs::exists(*shared / "data/bone-meshes/femur.stl")) GTEST_SKIP() << "bone-meshes/femur.stl is not there";
-  const auto femur = read_stl(*shared / "data/bone-meshes/femur.stl");
-  ASSERT_TRUE(femur) << femur.error().message;
-  EXPECT_EQ(femur->triangles.size(), 20308u);
-  EXPECT_EQ(open_edges(*femur), 0u);
-  // Euler: V − E + F = 2 for one closed surface without handles, E = 3 F / 2.
-  EXPECT_EQ(femur->positions_mm.size(), femur->triangles.size() / 2 + 2);
-  EXPECT_NEAR(enclosed_mm3(*femur), 399e3, 1e3);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Label volumes: stacks of PNG slices that the tests draw, and the temporal bone where it is there.
+// Label volumes: stacks of PNG slices that the tests draw.
 #include <png.h>
 
 #include <csignal>
@@ -9,7 +9,6 @@
 
 #include "server/import/label_import.hpp"
 #include "tests/support/process.hpp"
-#include "tests/support/shared_data.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/import/fixtures.hpp"
 
@@ -227,19 +226,6 @@ TEST_F(Labels, CtrlCLeavesNothing) {
     EXPECT_NE(process.err().find("osteon-import: stopped"), std::string::npos) << process.err();
     EXPECT_EQ(files_of(folder_.path()).size(), 1u);
   }
-}
-
-TEST(TemporalBone, KeepsItsVolumeAtItsOwnPitch) {
-  const auto shared = test::find_shared();
-  const fs::path folder = shared ? *shared / "data" / "temporal-bone-labels" : fs::path{};
-  if (!shared || !fs::exists(folder)) GTEST_SKIP() << "the label volume is not there";
-  auto stack = read_label_stack(folder, {}, Vec3::Constant(0.096), keep_going);
-  ASSERT_TRUE(stack) << stack.error().message;
-  EXPECT_EQ(stack->volume.dims, (std::array<int, 3>{512, 512, 505}));
-  const auto made = import_labels(std::move(*stack), {}, {}, keep_going);
-  ASSERT_TRUE(made) << made.error().message;
-  EXPECT_NEAR(made->labelled_mm3, 19.7e3, 0.1e3);  // the data's own README: 16.8 % of its voxels, 19.7 cm³
-  EXPECT_NEAR(made->bone.volume_mm3(), made->labelled_mm3, 0.01 * made->labelled_mm3);
 }
 
 }  // namespace

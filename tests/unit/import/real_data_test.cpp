@@ -1,7 +1,9 @@
 // Real scans: the skull of Debian's invesalius-examples and what lies in the shared data folder, where they are there.
+#include "common/geometry/mesh_file.hpp"
 #include "server/import/ct_import.hpp"
 #include "server/import/dicom_reader.hpp"
 #include "server/import/inv3_reader.hpp"
+#include "server/import/label_import.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/import/fixtures.hpp"
@@ -107,6 +109,26 @@ TEST_F(SharedScans, TibiaWithoutDicomPreamble) {
   const bool first = middle.x() > 85 && middle.x() < 127 && middle.y() > 290 && middle.y() < 337;
   const bool second = middle.x() > 342 && middle.x() < 388 && middle.y() > 297 && middle.y() < 342;
   EXPECT_TRUE(first || second) << middle.transpose();
+}
+
+TEST_F(SharedScans, TheTemporalBoneKeepsItsVolumeAtItsOwnPitch) {
+  auto stack = read_label_stack(data_ / "temporal-bone-labels", {}, Vec3::Constant(0.096), keep_going);
+  ASSERT_TRUE(stack) << stack.error().message;
+  EXPECT_EQ(stack->volume.dims, (std::array<int, 3>{512, 512, 505}));
+  const auto made = import_labels(std::move(*stack), {}, {}, keep_going);
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_NEAR(made->labelled_mm3, 19.7e3, 0.1e3);  // the data's own README: 16.8 % of its voxels, 19.7 cm³
+  EXPECT_NEAR(made->bone.volume_mm3(), made->labelled_mm3, 0.01 * made->labelled_mm3);
+}
+
+TEST_F(SharedScans, TheFemursMeshIsClosedAndHasAFemursVolume) {
+  const auto femur = read_stl(data_ / "bone-meshes" / "femur.stl");
+  ASSERT_TRUE(femur) << femur.error().message;
+  EXPECT_EQ(femur->triangles.size(), 20308u);
+  EXPECT_EQ(open_edges(*femur), 0u);
+  // Euler: V − E + F = 2 for one closed surface without handles, E = 3 F / 2.
+  EXPECT_EQ(femur->positions_mm.size(), femur->triangles.size() / 2 + 2);
+  EXPECT_NEAR(enclosed_mm3(*femur), 399e3, 1e3);
 }
 
 TEST_F(SharedScans, Jpeg2000InAnyFileOrder) {
