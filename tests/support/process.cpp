@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cerrno>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <map>
 #include <mutex>
@@ -194,6 +195,17 @@ std::string Process::err() const {
 bool Process::wait_for_out(std::string_view text, std::chrono::milliseconds patience) {
   return wait_until([&] { return out().find(text) != std::string::npos || !running(); }, patience) &&
          out().find(text) != std::string::npos;
+}
+
+bool Process::wait_for_percent(int percent, std::chrono::milliseconds patience) {
+  const auto reached = [&] {
+    const std::string text = err();
+    const auto sign = text.rfind(" %");
+    if (sign == std::string::npos) return false;
+    const auto before = text.find_last_not_of("0123456789", sign - 1);
+    return std::atoi(text.c_str() + before + 1) >= percent;
+  };
+  return wait_until([&] { return reached() || !running(); }, patience) && running();
 }
 
 std::optional<std::string> Process::read_line(std::chrono::milliseconds patience) {

@@ -39,6 +39,8 @@ class Process {
   [[nodiscard]] std::string err() const;
   // True as soon as standard output contains `text`.
   [[nodiscard]] bool wait_for_out(std::string_view text, std::chrono::milliseconds patience);
+  // True as soon as the last progress on standard error is at least `percent`; false when it ends or patience does before.
+  [[nodiscard]] bool wait_for_percent(int percent, std::chrono::milliseconds patience);
   // The next whole line of standard output, without its end.
   [[nodiscard]] std::optional<std::string> read_line(std::chrono::milliseconds patience);
   void write(std::string_view text);  // to standard input

@@ -3,7 +3,6 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
-#include <thread>
 
 #include "common/volume/case.hpp"
 #include "tests/support/process.hpp"
@@ -160,12 +159,10 @@ TEST_F(Program, InfoOfABrokenCaseIsOneSentence) {
 }
 
 // Starts a command, waits for the moment and presses Ctrl-C: 130, and only what was there before is there.
-void expect_stopped(const std::vector<std::string>& arguments, const std::string& at, const test::TempDir& folder) {
+void expect_stopped(const std::vector<std::string>& arguments, int percent, const test::TempDir& folder) {
   const auto before = files_of(folder.path());
   test::Process process(kProgram, arguments);
-  const auto end = std::chrono::steady_clock::now() + 60s;
-  while (process.err().find(at) == std::string::npos && process.running() && std::chrono::steady_clock::now() < end) std::this_thread::sleep_for(2ms);
-  ASSERT_TRUE(process.running()) << "too quick to be stopped: " << process.err();
+  ASSERT_TRUE(process.wait_for_percent(percent, 60s)) << "too quick to be stopped: " << process.err();
   process.signal(SIGINT);
   EXPECT_EQ(process.wait(60s), 130);
   EXPECT_NE(process.err().find("osteon-import: stopped"), std::string::npos) << process.err();
@@ -176,11 +173,11 @@ void expect_stopped(const std::vector<std::string>& arguments, const std::string
 TEST_F(Program, CtrlCLeavesNothing) {
   ASSERT_EQ(test::run(kProgram, {"phantom", "tube", "--layers", "4:1.9,6:0.9", "--width", "30", "--pitch", "0.4", "--out", path("case"), "--dicom", path("series")}).exit_code, 0);
   const std::vector<std::string> import{"ct", path("series"), "--out", path("imported"), "--threshold", "0", "--pitch", "0.12"};
-  expect_stopped(import, "20 %", folder_);
-  expect_stopped(import, "50 %", folder_);
+  expect_stopped(import, 20, folder_);
+  expect_stopped(import, 50, folder_);
   const std::vector<std::string> phantom{"phantom", "block", "--layers", "40:1.9", "--width", "50", "--pitch", "0.25", "--out", path("p"), "--dicom", path("d")};
-  expect_stopped(phantom, "10 %", folder_);
-  expect_stopped(phantom, "60 %", folder_);  // while it writes the DICOM files
+  expect_stopped(phantom, 10, folder_);
+  expect_stopped(phantom, 60, folder_);  // while it writes the DICOM files
 }
 
 }  // namespace
