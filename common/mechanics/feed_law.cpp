@@ -7,12 +7,18 @@ namespace osteon {
 
 double resistance_n(const FeedLaw& law, double feed_mm_per_s) noexcept {
   if (feed_mm_per_s <= 0.0) return 0.0;
-  return law.exponent == 1.0 ? law.scale_n * feed_mm_per_s : law.scale_n * std::pow(feed_mm_per_s, law.exponent);
+  return law.offset_n + law.scale_n * (law.exponent == 1.0 ? feed_mm_per_s : std::pow(feed_mm_per_s, law.exponent));
+}
+
+double feed_at_mm_per_s(const FeedLaw& law, double force_n) noexcept {
+  if (!(force_n > law.offset_n) || !(law.scale_n > 0.0)) return 0.0;
+  return std::pow((force_n - law.offset_n) / law.scale_n, 1.0 / law.exponent);
 }
 
 FeedSolution solve_feed(const FeedLaw& law, double stiffness_n_per_mm, double extension_mm, double dt_s) noexcept {
   const double available_n = stiffness_n_per_mm * extension_mm;
-  if (!(available_n > 0.0) || !(law.max_feed_mm_per_s > 0.0) || available_n < law.threshold_n)
+  if (!(available_n > 0.0) || !(law.max_feed_mm_per_s > 0.0) || available_n < law.threshold_n ||
+      available_n <= law.offset_n)
     return {.rubbing = available_n > 0.0};
 
   const auto surplus_n = [&](double feed) {
