@@ -24,6 +24,7 @@ void Proxy::place(const Pose& pose_bone_tool) noexcept {
   pose_ = pose_bone_tool;
   sweep_count_ = 0;
   sweeping_ = false;
+  cut_before_ = false;
 }
 
 bool Proxy::begin_sweep(const ToolModel& model) noexcept {
@@ -203,6 +204,10 @@ void Proxy::advance(const ToolModel& model, const Patch& patch, const Vec3& dire
     const bool engaged = now.engaged_mm2 > 1e-3 * now.area_mm2;
     double step_mm = 0.0;
     if (!engaged) {
+      if (report.cutting || cut_before_) {
+        report.breakthrough = true;
+        break;
+      }
       step_mm = std::min(free_mm, std::max(least_mm, 0.8 * now.nearest_mm));
       if (step_mm <= 0.0) break;
     } else {
@@ -227,6 +232,7 @@ void Proxy::advance(const ToolModel& model, const Patch& patch, const Vec3& dire
       left_s -= step_mm / solution.feed_mm_per_s;
       if (left_s < 1e-9) left_s = 0.0;
       cut_mm += step_mm;
+      report.cutting_work_mj += solution.cutting_n * step_mm;
     }
     // The shank blocks even where the cutting part goes on; walls no wider than what cuts cannot block along the axis.
     Vec3 by_mm = step_mm * direction;
@@ -282,6 +288,7 @@ ProxyStep Proxy::step(const ToolModel& model, const Patch& patch, const Pose& po
     }
   }
   update_sweep();
+  cut_before_ = report.cutting && !report.breakthrough;
 
   if (cuts && report.covered) {
     for (const ContactPoint& point : model.active) {

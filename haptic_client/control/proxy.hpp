@@ -24,6 +24,10 @@ struct ProxyStep {
   double engaged = 0;          // share of the leading projected area in bone
   double torque_nmm = 0;
   Vec3 cutting_force_n = Vec3::Zero();  // of the tool on the bone
+  double cutting_work_mj = 0;  // of the law's force over the way cut in this tick, its parts added; never negative
+  // What was being cut ended in this tick or with the one before: the tool has stopped there, its coupling still
+  // stretched; where it goes on is the loop's to say.
+  bool breakthrough = false;
   Vec3 moved_mm = Vec3::Zero();
 };
 
@@ -80,6 +84,7 @@ class Proxy {
   std::array<Sweep, kMostSweeps> sweeps_;
   int sweep_count_ = 0;
   bool sweeping_ = false;
+  bool cut_before_ = false;  // the last step ended cutting
 };
 
 }  // namespace osteon::haptic
