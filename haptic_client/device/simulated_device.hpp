@@ -11,7 +11,7 @@ namespace osteon::haptic {
 // Unless named otherwise, as strong as the drilling of bone, so that physical force is shown unscaled.
 struct SimulatedDeviceParams {
   std::string name = "simulated";
-  DeviceLimits limits{60.0, 30.0, 60.0, 120.0};
+  DeviceLimits limits{.peak_n = 60.0, .continuous_n = 30.0, .stiffness_n_per_mm = 60.0, .workspace_radius_mm = 120.0};
 };
 // The simulated devices by name. Error not_found: names them.
 [[nodiscard]] Result<SimulatedDeviceParams> find_simulated_device(std::string_view name);
@@ -23,7 +23,7 @@ class SimulatedDevice final : public HapticDevice {
   [[nodiscard]] std::string_view name() const override { return params_.name; }
   [[nodiscard]] DeviceLimits limits() const override { return params_.limits; }
   [[nodiscard]] DeviceReading read() noexcept override;
-  void write(const Vec3& force_n) noexcept override;
+  void write(const DeviceOutput& output) noexcept override;
 
   // [haptic] What the hand means to do from now on; device frame.
   void command(const HandCommand& command, const Eigen::Quaterniond& rotation_device_tool, std::uint32_t buttons) noexcept;

@@ -1,0 +1,73 @@
+// Between a device's own I/O thread and the haptic thread: readings one way, forces the other, neither ever waits.
+// A force whose writer falls silent ends by itself, and so does the trust in readings that no longer change.
+#pragma once
+#include <atomic>
+#include <chrono>
+
+#include "common/runtime/latest_value.hpp"
+#include "haptic_client/device/haptic_device.hpp"
+
+namespace osteon::haptic {
+
+class DeviceExchange {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+  static constexpr std::chrono::milliseconds kForceHeld{10};  // [A] ten missed ticks of the haptic thread
+  static constexpr int kReadsWithoutSample = 20;              // [A] then the device counts as silent
+
+  DeviceExchange() { go_absent(); }
+
+  // [I/O, or the connection thread while no I/O thread runs]
+  void publish(const DeviceReading& reading) noexcept {
+    last_ = reading;
+    last_.sample = ++samples_;
+    readings_.store(last_);
+  }
+  // [as publish] From now on the reading is absent or fault, where it was.
+  void go(DeviceStatus status) noexcept {
+    last_.status = status;
+    last_.buttons = 0;
+    last_.pedal = 0.0;
+    publish(last_);
+  }
+  void go_absent() noexcept { go(DeviceStatus::absent); }
+  // [I/O] The force that is wanted now; none when the haptic thread has written nothing for a while.
+  [[nodiscard]] DeviceOutput demanded(Time now) noexcept {
+    if (outputs_.refresh()) {
+      written_ = now;
+      any_written_ = true;
+    }
+    return any_written_ && now - written_ < kForceHeld ? outputs_.value() : DeviceOutput{};
+  }
+  // [I/O or connection thread, while no I/O thread runs] Nothing that was written before counts any more.
+  void forget_output() noexcept {
+    outputs_.refresh();
+    any_written_ = false;
+  }
+
+  // [haptic] The newest reading, with no buttons while it is not ok.
+  [[nodiscard]] DeviceReading read() noexcept {
+    if (readings_.refresh()) reads_since_ = 0;
+    else if (reads_since_ < kReadsWithoutSample) ++reads_since_;
+    DeviceReading reading = readings_.value();
+    if (reads_since_ >= kReadsWithoutSample && reading.status != DeviceStatus::absent) {
+      reading.status = DeviceStatus::fault;
+      reading.buttons = 0;
+      reading.pedal = 0.0;
+    }
+    return reading;
+  }
+  // [haptic]
+  void write(const DeviceOutput& output) noexcept { outputs_.store(output); }
+
+ private:
+  LatestValue<DeviceReading> readings_;
+  LatestValue<DeviceOutput> outputs_;
+  DeviceReading last_;             // I/O
+  std::uint64_t samples_ = 0;      // I/O
+  Time written_{};                 // I/O
+  bool any_written_ = false;       // I/O
+  int reads_since_ = 0;            // haptic
+};
+
+}  // namespace osteon::haptic
