@@ -46,6 +46,8 @@ SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok, int periods
   input.periods = periods;
   const std::vector<PlacedGuide>& own = surgeon_.plan().guides;
   const std::span<const PlacedGuide> guides = room_guides ? std::span(*room_guides) : std::span(own).first(surgeon_.guides_placed());
+  result.reading = reading;
+  result.commanded_rpm = input.spindle_rpm;
   result.report = last_ = loop_.tick(input, patch, guides);
   device_.write(result.report.force_device_n);
   return result;

@@ -7,6 +7,8 @@ namespace osteon::haptic {
 
 struct SessionTick {
   SurgeonOrder order;
+  DeviceReading reading;   // what the loop was given
+  double commanded_rpm = 0;
   LoopReport report;
 };
 

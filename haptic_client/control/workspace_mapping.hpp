@@ -31,6 +31,10 @@ class WorkspaceMapping {
   [[nodiscard]] Vec3 to_device(const Vec3& bone) const noexcept { return view_.conjugate() * bone; }
   [[nodiscard]] Vec3 to_bone(const Vec3& device) const noexcept { return view_ * device; }
   [[nodiscard]] double scale() const noexcept { return scale_; }
+  // What it is made of: align() with these gives the same mapping to the last bit.
+  [[nodiscard]] const Eigen::Quaterniond& view() const noexcept { return view_; }
+  [[nodiscard]] const Vec3& device_mm() const noexcept { return device_mm_; }
+  [[nodiscard]] const Vec3& bone_mm() const noexcept { return bone_mm_; }
 
  private:
   Eigen::Quaterniond view_ = Eigen::Quaterniond::Identity();
