@@ -19,6 +19,7 @@ find_package(VTK 9.1 REQUIRED COMPONENTS
 
 pkg_check_modules(grpc REQUIRED IMPORTED_TARGET grpc++)
 pkg_check_modules(sodium REQUIRED IMPORTED_TARGET libsodium)
+pkg_check_modules(hdf5 REQUIRED IMPORTED_TARGET hdf5-serial)
 pkg_check_modules(rtaudio REQUIRED IMPORTED_TARGET rtaudio)
 pkg_check_modules(sndfile REQUIRED IMPORTED_TARGET sndfile)
 pkg_check_modules(kissfft REQUIRED IMPORTED_TARGET kissfft-float)

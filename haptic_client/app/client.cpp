@@ -78,6 +78,7 @@ class Client {
 
   Result<ClientOutcome> run() {
     if (Result<void> opened = log_.open(options_.session_log); !opened) return tl::unexpected(opened.error());
+    if (Result<void> opened = recorder_.open(options_.record, recording_info()); !opened) return tl::unexpected(opened.error());
     open_room();
     std::thread replica([this] { replica_thread(); });
     std::thread reporter([this] { reporter_thread(); });
@@ -90,6 +91,7 @@ class Client {
     all_over_ = true;
     reporter.join();
     room_.close();
+    outcome_.recording = recorder_.finish({to_hex(replica_.hash()), replica_.room_seq().value, outcome_.rows_dropped});
     if (Result<void> written = log_.finish(); !written) return tl::unexpected(written.error());
     {
       const std::lock_guard lock(mutex_);
@@ -112,6 +114,20 @@ class Client {
   }
 
  private:
+  [[nodiscard]] RecordingInfo recording_info() {
+    RecordingInfo info;
+    info.device = session_.device().name();
+    info.device_info = session_.device().info();
+    info.limits = session_.device().limits();
+    info.loop = session_.loop().params();
+    info.case_hash = to_hex(room_.bone().hash());
+    info.case_title = room_.bone().info().title;
+    info.pitch_mm = room_.bone().pitch_mm();
+    info.author = room_.room().author.value;
+    for (const ToolModel& model : session_.surgeon().plan().tools) info.tools.push_back({model.tool.name, law_name(model), model.tool.diameter_mm});
+    return info;
+  }
+
   void open_room() {
     const auto pass = [this](FromRoom event) {
       std::unique_lock lock(mutex_);
@@ -188,6 +204,14 @@ class Client {
         row_.device_depth_mm = (now.report.pose_bone_device.position_mm - site_->entry_mm).dot(site_->axis);
       }
       row_.force_rendered_n = now.report.force_device_n.norm();
+      row_.reading = now.reading;
+      row_.commanded_rpm = now.commanded_rpm;
+      row_.rendered = now.report.force_device_n;
+      row_.take_up = now.order.take_up;
+      if (row_.take_up) {
+        row_.taken_up_at = {now.order.hand.target_mm, now.order.rotation};
+        row_.mapping = session_.loop().mapping();
+      }
       if (!rows_.try_push(row_)) ++outcome_.rows_dropped;
       timer.done(outcome_.ticks);
     }
@@ -342,6 +366,7 @@ class Client {
       while (rows_.try_pop(row)) {
         any = true;
         log_.write(row, tool_name(row));
+        recorder_.push(row);
       }
       if (any && link_ok_) room_.send(state_of(row));
       set_items();
@@ -404,6 +429,7 @@ class Client {
   Replica replica_;            // replica thread, until it is joined
   PatchBuilder builder_;       // replica thread
   SessionLog log_;             // reporter thread
+  Recorder recorder_;          // filled by the reporter thread
   std::vector<std::string> tool_names_;  // never changes
 
   LatestValue<Patch> patches_;     // replica → haptic

@@ -9,6 +9,7 @@
 #include "common/runtime/stop_signal.hpp"
 #include "common/runtime/tick_stats.hpp"
 #include "haptic_client/app/record.hpp"
+#include "haptic_client/app/recorder.hpp"
 #include "haptic_client/net/room_session.hpp"
 
 namespace osteon::haptic {
@@ -16,6 +17,7 @@ namespace osteon::haptic {
 struct ClientOptions {
   double force_scale = 0;  // 0: from the device
   std::filesystem::path session_log;
+  std::filesystem::path record;  // HDF5
   bool status = false;     // a line each second on standard output
 };
 
@@ -32,6 +34,7 @@ struct ClientOutcome {
   std::uint64_t rejected = 0, patches = 0, uncovered_ticks = 0, cuts_waiting_ticks = 0, rows_dropped = 0;
   std::uint64_t held_for_room_ticks = 0;  // in which spindle and force were down because the room did not follow
   double patch_p50_us = 0, patch_p99_us = 0;
+  Recorder::Outcome recording;
   DeviceLimits limits;
   LoopParams loop;
   double coupling_n_per_mm = 0, workspace_scale = 0;  // of the last step: K_c, and bone mm for each mm of the handle

@@ -106,6 +106,7 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, const std::
                        {"uncovered_ticks", outcome.uncovered_ticks}, {"cuts_waiting_ticks", outcome.cuts_waiting_ticks}}},
           {"held_for_room_ticks", outcome.held_for_room_ticks},
           {"rows_dropped", outcome.rows_dropped},
+          {"recording", {{"rows", outcome.recording.rows}, {"dropped", outcome.recording.dropped}, {"trouble", outcome.recording.trouble}}},
           {"cuts", outcome.cuts.size()},
           {"rejected", outcome.rejected},
           {"steps", steps},
@@ -123,6 +124,7 @@ Result<void> run(Options& options, const StopSignal& stop) {
     return failure(ErrorCode::invalid_input, "--scale must be a number above 0 and at most 1");
   if (!(options.patience_s >= 0.0 && options.patience_s <= 3600.0))
     return failure(ErrorCode::invalid_input, "--patience must be from 0 to 3600 seconds");
+  if (Result<void> usable = check_writable(options.client.record, "the recording", "--record"); !usable) return usable;
   const Result<std::vector<PlanStep>> plan = read_plan(options.plan);
   if (!plan) return tl::unexpected(plan.error());
 
@@ -154,6 +156,7 @@ int main(int argc, char** argv) {
   app.add_option("--device", options.device, "simulated, one as strong as the drilling of bone, or simulated-3.3N, a desktop one; both with a simulated hand")->capture_default_str();
   app.add_option("--scale", options.client.force_scale, "Rendered over physical force; by default the device's continuous force / 30 N");
   app.add_option("--session-log", options.client.session_log, "CSV with a row for each millisecond");
+  app.add_option("--record", options.client.record, "HDF5 file with a row for each millisecond: poses, wrenches, spindle, bone; --device recorded:FILE plays it");
   app.add_option("--cut-log", options.cut_log, "CSV with a row for each cut");
   app.add_option("--summary", options.summary, "JSON written at the end: steps, forces, loop times, field hash");
   app.add_option("--cache", options.room.cache, "Folder where fetched cases are kept")->capture_default_str();

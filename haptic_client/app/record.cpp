@@ -16,6 +16,13 @@ const char* name(CuttingPhase phase) {
   return "unknown";
 }
 
+std::string law_name(const ToolModel& model) { return model.axial ? "chi" : "milling"; }
+
+std::vector<std::string> event_names() {
+  return {"uncovered", "force limited", "slew limited", "cuts waiting", "missed ticks", "heel contact", "guided",
+          "stalled", "breakthrough", "bone returned", "energy limited", "ramping"};
+}
+
 Result<void> SessionLog::open(const std::filesystem::path& file) {
   path_ = file;
   if (file.empty()) return {};

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <string>
 #include <vector>
 
 #include "common/core/result.hpp"
@@ -19,6 +20,13 @@ struct TickRow {
   double force_rendered_n = 0;
   bool idle = false;  // no step was under way: waiting
   LoopReport report;
+  DeviceReading reading;
+  double commanded_rpm = 0;
+  DeviceOutput rendered;      // device frame
+  // In this tick the tool was taken up: where, and how the device lies in the bone's frame from then on.
+  bool take_up = false;
+  Pose taken_up_at;           // bone frame
+  WorkspaceMapping mapping;
 };
 
 struct CutRow {
@@ -27,6 +35,10 @@ struct CutRow {
 };
 
 [[nodiscard]] const char* name(CuttingPhase phase);
+// Of the law by which a tool cuts.
+[[nodiscard]] std::string law_name(const ToolModel& model);
+// Of the bits of LoopReport::events, the lowest first.
+[[nodiscard]] std::vector<std::string> event_names();
 
 // Rows are written as they come; a disk that is full shows at finish().
 class SessionLog {

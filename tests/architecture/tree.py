@@ -25,6 +25,7 @@ HEAVY = {
     "OpenVDB": (re.compile(r"^openvdb/"), ("common/volume",)),
     "VTK": (re.compile(r"^vtk"), ("viewer_client", "common/volume")),
     "gRPC": (re.compile(r"^grpc(pp)?/"), ("common/wire", "*/net")),
+    "HDF5": (re.compile(r"^hdf5"), ("haptic_client/app", "haptic_client/device")),
     "GDCM": (re.compile(r"^gdcm"), ("common/imaging", "server/import")),
 }
 GENERATED = re.compile(r"\.pb\.h$")

@@ -1,0 +1,63 @@
+// A session as an HDF5 file, laid out as recording_layout.hpp says: one row for each millisecond, in chunks, readable
+// while it grows and after the writer was killed (HDF5's single writer, many readers).
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/core/result.hpp"
+#include "haptic_client/app/record.hpp"
+
+namespace osteon::haptic {
+
+// What stays the same for a whole session.
+struct RecordingInfo {
+  std::string device;               // as --device named it
+  DeviceInfo device_info;
+  DeviceLimits limits;
+  LoopParams loop;
+  std::string case_hash, case_title;
+  double pitch_mm = 0;              // h of the case
+  std::uint64_t author = 0;
+  struct Item {
+    std::string name;
+    std::string law;                // by which it cuts
+    double diameter_mm = 0;
+  };
+  std::vector<Item> tools;          // by their place in the session
+};
+
+// Known when the session ends.
+struct RecordingEnd {
+  std::string field_hash;           // of the whole bone
+  std::uint64_t room_seq = 0;
+  std::uint64_t rows_dropped = 0;
+};
+
+class RecordFile {
+ public:
+  static constexpr std::size_t kChunkRows = 500;  // rows are written so many at a time; a killed writer loses fewer
+  static constexpr std::uint64_t kKeepFree_bytes = 16u << 20;  // of the disk; a recording ends before it fills the last of it
+
+  // Begins a recording; what was in the file is gone. Error internal: it cannot be made, and why.
+  [[nodiscard]] static Result<RecordFile> create(const std::filesystem::path& file, const RecordingInfo& info);
+  ~RecordFile();  // without finish(): what was written stays, and whole chunks of it can be read
+  RecordFile(RecordFile&&) noexcept;
+  RecordFile& operator=(RecordFile&&) noexcept;
+
+  // Rows in order. After an error there is nothing more to be done: the file stays readable up to its last whole chunk.
+  // Error internal: the disk is full or fails, with the system's reason.
+  [[nodiscard]] Result<void> append(std::span<const TickRow> rows);
+  [[nodiscard]] Result<void> finish(const RecordingEnd& end);
+  [[nodiscard]] std::uint64_t rows_written() const;
+
+ private:
+  struct Impl;
+  explicit RecordFile(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace osteon::haptic

@@ -1,0 +1,70 @@
+#include "haptic_client/app/recorder.hpp"
+
+#include "common/runtime/log.hpp"
+
+namespace osteon::haptic {
+
+Result<void> Recorder::open(const std::filesystem::path& file, const RecordingInfo& info) {
+  if (file.empty()) return {};
+  Result<RecordFile> made = RecordFile::create(file, info);
+  if (!made) return tl::unexpected(made.error());
+  file_ = std::move(*made);
+  thread_ = std::thread([this] { run(); });
+  return {};
+}
+
+void Recorder::push(const TickRow& row) {
+  if (!recording()) return;
+  const std::lock_guard lock(mutex_);
+  if (waiting_.size() >= kMostWaiting) {
+    ++dropped_;
+    return;
+  }
+  waiting_.push_back(row);
+  if (waiting_.size() == RecordFile::kChunkRows / 2) wake_.notify_one();
+}
+
+void Recorder::run() {
+  std::vector<TickRow> rows;
+  bool over = false;
+  while (!over) {
+    {
+      std::unique_lock lock(mutex_);
+      wake_.wait(lock, [this] { return over_ || waiting_.size() >= RecordFile::kChunkRows / 2; });
+      over = over_;
+      rows.swap(waiting_);
+    }
+    if (outcome_.trouble.empty()) {
+      if (Result<void> written = file_->append(rows); !written) {
+        outcome_.trouble = written.error().message;
+        outcome_.rows = file_->rows_written();
+        file_.reset();
+        log::warn("the recording has ended, the session goes on", {{"because", outcome_.trouble}});
+      }
+    }
+    rows.clear();
+  }
+}
+
+Recorder::Outcome Recorder::finish(const RecordingEnd& end) {
+  if (!recording()) return outcome_;
+  {
+    const std::lock_guard lock(mutex_);
+    over_ = true;
+    wake_.notify_one();
+  }
+  thread_.join();
+  outcome_.dropped = dropped_;
+  if (!file_) return outcome_;
+  RecordingEnd all = end;
+  all.rows_dropped += dropped_;
+  if (Result<void> written = file_->finish(all); !written) {
+    outcome_.trouble = written.error().message;
+    log::warn("the recording has no end", {{"because", outcome_.trouble}});
+  }
+  outcome_.rows = file_->rows_written();
+  file_.reset();
+  return outcome_;
+}
+
+}  // namespace osteon::haptic

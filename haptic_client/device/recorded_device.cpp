@@ -1,0 +1,222 @@
+#include "haptic_client/device/recorded_device.hpp"
+
+#include <hdf5.h>
+
+#include <cmath>
+#include <optional>
+
+#include "haptic_client/device/hdf5_handle.hpp"
+#include "haptic_client/device/recording_layout.hpp"
+
+namespace osteon::haptic {
+namespace {
+
+// A recording being read, and the sentence of the first thing that was wrong with it.
+class Reader {
+ public:
+  explicit Reader(const std::filesystem::path& file) : path_(file), name_("the recording " + file.string()) {}
+
+  bool open() {
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+    std::error_code none;
+    if (!std::filesystem::is_regular_file(path_, none)) return wrong(ErrorCode::not_found, "there is no file " + path_.string() + "; give one that --record wrote");
+    if (H5Fis_hdf5(path_.c_str()) <= 0) return wrong(ErrorCode::invalid_input, path_.string() + " is not an HDF5 file; give one that --record wrote");
+    // One that is being written, or whose writer was killed, opens only so; one of another program perhaps only otherwise.
+    file_ = Hdf5Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY | H5F_ACC_SWMR_READ, H5P_DEFAULT), H5Fclose);
+    if (!file_.ok()) file_ = Hdf5Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+    if (!file_.ok()) return wrong(ErrorCode::invalid_input, name_ + " cannot be opened: it is damaged, or another program has it open");
+    return true;
+  }
+
+  std::string text(const char* group, const char* name) {
+    const Hdf5Handle attribute = find(group, name);
+    if (!attribute.ok()) return {};
+    const Hdf5Handle type(H5Aget_type(attribute.id()), H5Tclose);
+    if (H5Tget_class(type.id()) != H5T_STRING || H5Tis_variable_str(type.id()) > 0) {
+      wrong(ErrorCode::invalid_input, name_ + ": the attribute \"" + name + "\" is not a text");
+      return {};
+    }
+    std::string value(H5Tget_size(type.id()), '\0');
+    if (H5Aread(attribute.id(), type.id(), value.data()) < 0) damaged(name);
+    value.resize(std::char_traits<char>::length(value.c_str()));
+    return value;
+  }
+
+  double number(const char* group, const char* name) {
+    const Hdf5Handle attribute = find(group, name);
+    double value = 0.0;
+    if (attribute.ok() && (H5Aread(attribute.id(), H5T_NATIVE_DOUBLE, &value) < 0 || !std::isfinite(value))) damaged(name);
+    return value;
+  }
+
+  [[nodiscard]] bool has(const char* name) const { return H5Aexists_by_name(file_.id(), ".", name, H5P_DEFAULT) > 0; }
+
+  // The rows that are complete: as many as have their time.
+  std::size_t rows() {
+    const Hdf5Handle dataset = find_dataset(recording::kTime);
+    if (!dataset.ok()) return 0;
+    const Hdf5Handle space(H5Dget_space(dataset.id()), H5Sclose);
+    const hssize_t count = H5Sget_simple_extent_npoints(space.id());
+    return count > 0 ? static_cast<std::size_t>(count) : 0;
+  }
+
+  // The first `rows` of a dataset with `width` values a row.
+  template <class T>
+  std::vector<T> values(const char* path, hid_t type, std::size_t rows, std::size_t width) {
+    const Hdf5Handle dataset = find_dataset(path);
+    if (!dataset.ok()) return {};
+    const Hdf5Handle space(H5Dget_space(dataset.id()), H5Sclose), stored(H5Dget_type(dataset.id()), H5Tclose);
+    hsize_t size[2] = {0, 1};
+    const int rank = H5Sget_simple_extent_ndims(space.id());
+    if (rank < 1 || rank > 2 || H5Sget_simple_extent_dims(space.id(), size, nullptr) != rank || size[1] != width) {
+      wrong(ErrorCode::invalid_input, name_ + ": the dataset \"" + path + "\" has not " + std::to_string(width) + " values in a row");
+      return {};
+    }
+    if (size[0] < rows) {
+      wrong(ErrorCode::invalid_input, name_ + ": the dataset \"" + path + "\" has fewer rows than \"" + recording::kTime + "\"");
+      return {};
+    }
+    const hsize_t from[] = {0, 0}, count[] = {rows, width};
+    const Hdf5Handle memory(H5Screate_simple(rank, count, nullptr), H5Sclose);
+    // Enumerations are stored as small integers under names; here they are wanted as integers.
+    const bool named = H5Tget_class(stored.id()) == H5T_ENUM;
+    std::vector<T> read(rows * width);
+    if (H5Sselect_hyperslab(space.id(), H5S_SELECT_SET, from, nullptr, count, nullptr) < 0 ||
+        H5Dread(dataset.id(), named ? stored.id() : type, memory.id(), space.id(), H5P_DEFAULT, read.data()) < 0 ||
+        (named && H5Tget_size(stored.id()) != sizeof(T)))
+      damaged(path);
+    return read;
+  }
+
+  bool wrong(ErrorCode code, const std::string& sentence) {
+    if (!error_) error_ = Error{code, sentence};
+    return false;
+  }
+  bool damaged(const char* what) { return wrong(ErrorCode::invalid_input, name_ + ": \"" + what + "\" cannot be read; the file is damaged"); }
+  [[nodiscard]] bool ok() const { return !error_; }
+  [[nodiscard]] const Error& error() const { return *error_; }
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] hid_t file() const { return file_.id(); }
+
+ private:
+  Hdf5Handle find(const char* group, const char* name) {
+    Hdf5Handle attribute(H5Aopen_by_name(file_.id(), group, name, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+    if (!attribute.ok())
+      wrong(ErrorCode::invalid_input, name_ + " has no attribute \"" + name + "\" of \"" + group + "\"; it is not what --record writes");
+    return attribute;
+  }
+  Hdf5Handle find_dataset(const char* path) {
+    Hdf5Handle dataset(H5Dopen2(file_.id(), path, H5P_DEFAULT), H5Dclose);
+    if (!dataset.ok()) wrong(ErrorCode::invalid_input, name_ + " has no dataset \"" + path + "\"; it is not what --record writes");
+    return dataset;
+  }
+
+  std::filesystem::path path_;
+  std::string name_;
+  Hdf5Handle file_;
+  std::optional<Error> error_;
+};
+
+DeviceLimits limits_of(Reader& reader) {
+  const char* g = recording::kMetadata;
+  DeviceLimits limits;
+  limits.peak_n = reader.number(g, recording::kPeak);
+  limits.continuous_n = reader.number(g, recording::kContinuous);
+  limits.stiffness_n_per_mm = reader.number(g, recording::kStiffness);
+  limits.workspace_radius_mm = reader.number(g, recording::kWorkspace);
+  limits.damping_n_s_per_mm = reader.number(g, recording::kDamping);
+  limits.peak_nmm = reader.number(g, recording::kPeakTorque);
+  limits.continuous_nmm = reader.number(g, recording::kContinuousTorque);
+  limits.workspace_middle_mm = {reader.number(g, recording::kMiddleX), reader.number(g, recording::kMiddleY), reader.number(g, recording::kMiddleZ)};
+  return limits;
+}
+
+// The readings tick by tick; a gap in the ticks' numbers is filled by what was read before it.
+std::vector<DeviceReading> readings_of(Reader& reader) {
+  const std::size_t rows = reader.rows();
+  const auto poses = reader.values<double>(recording::kHandlePose, H5T_NATIVE_DOUBLE, rows, 7);
+  const auto buttons = reader.values<std::uint32_t>(recording::kButtons, H5T_NATIVE_UINT32, rows, 1);
+  const auto pedal = reader.values<double>(recording::kPedal, H5T_NATIVE_DOUBLE, rows, 1);
+  const auto status = reader.values<std::uint8_t>(recording::kDeviceStatus, H5T_NATIVE_UINT8, rows, 1);
+  const auto calibration = reader.values<std::uint8_t>(recording::kCalibration, H5T_NATIVE_UINT8, rows, 1);
+  const auto ticks = reader.values<std::uint64_t>(recording::kTick, H5T_NATIVE_UINT64, rows, 1);
+  std::vector<DeviceReading> readings;
+  if (!reader.ok()) return readings;
+  if (rows == 0) reader.wrong(ErrorCode::invalid_input, reader.name() + " holds no complete row; its session ended too soon");
+  constexpr std::uint64_t kMostLost = 60'000;
+  for (std::size_t i = 0; i < rows && reader.ok(); ++i) {
+    const double* p = &poses[7 * i];
+    DeviceReading reading;
+    reading.pose_device_tool = {{p[0], p[1], p[2]}, {p[6], p[3], p[4], p[5]}};
+    reading.buttons = buttons[i];
+    reading.pedal = pedal[i];
+    reading.status = static_cast<DeviceStatus>(status[i]);
+    reading.calibration = static_cast<Calibration>(calibration[i]);
+    reading.sample = i + 1;
+    const bool well = reading.pose_device_tool.position_mm.allFinite() &&
+                      std::abs(reading.pose_device_tool.rotation.squaredNorm() - 1.0) < 1e-6 && pedal[i] >= 0.0 && pedal[i] <= 1.0 &&
+                      status[i] <= static_cast<int>(DeviceStatus::absent) && calibration[i] <= static_cast<int>(Calibration::pending) &&
+                      (i == 0 || (ticks[i] > ticks[i - 1] && ticks[i] - ticks[i - 1] < kMostLost));
+    if (!well) {
+      reader.wrong(ErrorCode::invalid_input, reader.name() + ": row " + std::to_string(i) + " is no reading of a device; the file is damaged");
+      break;
+    }
+    if (i > 0)
+      for (std::uint64_t lost = ticks[i] - ticks[i - 1]; lost > 1; --lost) readings.push_back(DeviceReading(readings.back()));
+    readings.push_back(reading);
+  }
+  return readings;
+}
+
+}  // namespace
+
+Result<RecordedSession> read_recording(const std::filesystem::path& file) {
+  Reader reader(file);
+  if (!reader.open()) return tl::unexpected(reader.error());
+  if (!reader.has(recording::kFormatName) || reader.text(".", recording::kFormatName) != recording::kFormat)
+    return failure(ErrorCode::invalid_input, file.string() + " is HDF5, but no recording of Osteon; give one that --record wrote");
+  const int version = static_cast<int>(reader.number(".", recording::kVersionName));
+  if (reader.ok() && version != recording::kVersion)
+    return failure(ErrorCode::unsupported, reader.name() + " is of version " + std::to_string(version) + " of the format; this program reads version " +
+                                               std::to_string(recording::kVersion));
+  RecordedSession session;
+  const char* g = recording::kMetadata;
+  session.device = reader.text(g, recording::kDevice);
+  session.device_model = reader.text(g, recording::kModel);
+  session.case_hash = reader.text(g, recording::kCaseHash);
+  session.force_scale = reader.number(g, recording::kForceScale);
+  session.limits = limits_of(reader);
+  session.info.model = "a recording of " + (session.device_model.empty() ? session.device : session.device_model);
+  session.info.force_axes = static_cast<int>(reader.number(g, recording::kForceAxes));
+  session.info.torque_axes = static_cast<int>(reader.number(g, recording::kTorqueAxes));
+  session.readings = readings_of(reader);
+  if (!reader.ok()) return tl::unexpected(reader.error());
+
+  const Hdf5Handle hash(H5Dopen2(reader.file(), recording::kFieldHash, H5P_DEFAULT), H5Dclose);
+  const Hdf5Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  char digits[65] = {};
+  H5Tset_size(type.id(), 64);
+  H5Tset_strpad(type.id(), H5T_STR_NULLPAD);
+  H5Tset_cset(type.id(), H5T_CSET_UTF8);
+  if (hash.ok() && H5Dread(hash.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, digits) >= 0) session.field_hash = digits;
+  return session;
+}
+
+RecordedDevice::RecordedDevice(std::string name, RecordedSession session) : name_(std::move(name)), session_(std::move(session)) {}
+
+DeviceReading RecordedDevice::read() noexcept {
+  if (!over()) return session_.readings[next_++];
+  DeviceReading last = session_.readings.back();
+  last.status = DeviceStatus::absent;
+  last.buttons = 0;
+  last.pedal = 0.0;
+  return last;
+}
+
+Result<std::unique_ptr<RecordedDevice>> make_recorded_device(const std::filesystem::path& file) {
+  Result<RecordedSession> session = read_recording(file);
+  if (!session) return tl::unexpected(session.error());
+  return std::make_unique<RecordedDevice>("recorded:" + file.string(), std::move(*session));
+}
+
+}  // namespace osteon::haptic

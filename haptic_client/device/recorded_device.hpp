@@ -1,0 +1,53 @@
+// A device that does again what another did: plays the handle's poses and buttons of a recording, a row for each tick.
+// Force goes nowhere. On the same bone with the same plan it makes the same cuts, bit for bit where time is virtual.
+#pragma once
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "haptic_client/device/haptic_device.hpp"
+
+namespace osteon::haptic {
+
+// What a recording says of the session that it is of.
+struct RecordedSession {
+  std::string device, device_model;
+  std::string case_hash;         // of the bone, in hexadecimal digits
+  std::string field_hash;        // of the bone as it was left; empty: the recording has no end
+  double force_scale = 0;        // s
+  DeviceLimits limits;
+  DeviceInfo info;
+  std::vector<DeviceReading> readings;  // one for each tick from the first row on; a lost row shows the one before
+};
+
+// Reads a recording, also one that goes on or whose writer was killed: as far as it is complete. Errors: not_found (no
+// such file), invalid_input (no HDF5 file, no recording, a dataset missing or of the wrong kind, no row, a number that
+// is none), unsupported (another version of the format).
+[[nodiscard]] Result<RecordedSession> read_recording(const std::filesystem::path& file);
+
+class RecordedDevice final : public HapticDevice {
+ public:
+  RecordedDevice(std::string name, RecordedSession session);
+
+  [[nodiscard]] std::string_view name() const override { return name_; }
+  [[nodiscard]] DeviceLimits limits() const override { return session_.limits; }  // of the device that was recorded
+  [[nodiscard]] DeviceInfo info() const override { return session_.info; }
+  // After the last row the device is absent, as if it had been unplugged there.
+  [[nodiscard]] DeviceReading read() noexcept override;
+  void write(const DeviceOutput&) noexcept override {}
+
+  [[nodiscard]] const RecordedSession& session() const { return session_; }
+  // [haptic]
+  [[nodiscard]] bool over() const noexcept { return next_ >= session_.readings.size(); }
+
+ private:
+  std::string name_;
+  RecordedSession session_;
+  std::size_t next_ = 0;     // haptic thread
+};
+
+// `recorded:FILE` after its colon. Errors: those of read_recording().
+[[nodiscard]] Result<std::unique_ptr<RecordedDevice>> make_recorded_device(const std::filesystem::path& file);
+
+}  // namespace osteon::haptic

@@ -1,0 +1,48 @@
+// Where things are in a recording: what haptic_client/app writes and the recorded device and h5py read.
+//
+// The groups are those of the recordings of FIVRS, the volumetric drilling simulator on AMBF (github.com/
+// LCSR-SICKKIDS/volumetric_drilling, its recording script and the description of its format): `metadata`, `data`,
+// `high_frequency_poses`, `drill_force_feedback`, `burr_change`, each sample with its `time_stamp`, poses as
+// [x, y, z, qx, qy, qz, qw], wrenches as [fx, fy, fz, tx, ty, tz]. Unlike there, lengths are millimetres; every array
+// names its unit and its frame. Bone that was removed is in the room's journal, so there is no `voxels_removed`.
+#pragma once
+
+namespace osteon::haptic::recording {
+
+// Attributes of the file.
+inline constexpr const char* kFormatName = "format";
+inline constexpr const char* kFormat = "osteon recording";
+inline constexpr const char* kVersionName = "version";
+inline constexpr int kVersion = 1;
+
+// One row for each millisecond.
+inline constexpr const char* kTime = "data/time";                    // written last: what it lacks is not complete
+inline constexpr const char* kTick = "data/state_seq";
+inline constexpr const char* kHandlePose = "high_frequency_poses/handle_pose/pose";
+inline constexpr const char* kButtons = "data/buttons";
+inline constexpr const char* kPedal = "data/pedal";
+inline constexpr const char* kDeviceStatus = "data/device_status";
+inline constexpr const char* kCalibration = "data/calibration";
+
+// Attributes of the group `metadata`: of the device as DeviceLimits and DeviceInfo have them.
+inline constexpr const char* kMetadata = "metadata";
+inline constexpr const char* kDevice = "device";
+inline constexpr const char* kModel = "device_model";
+inline constexpr const char* kCaseHash = "case_hash";
+inline constexpr const char* kForceScale = "force_scale";
+inline constexpr const char* kPeak = "device_peak_n";
+inline constexpr const char* kContinuous = "device_continuous_n";
+inline constexpr const char* kStiffness = "device_stiffness_n_per_mm";
+inline constexpr const char* kWorkspace = "device_workspace_radius_mm";
+inline constexpr const char* kDamping = "device_damping_n_s_per_mm";
+inline constexpr const char* kPeakTorque = "device_peak_nmm";
+inline constexpr const char* kContinuousTorque = "device_continuous_nmm";
+inline constexpr const char* kMiddleX = "device_workspace_middle_x_mm";
+inline constexpr const char* kMiddleY = "device_workspace_middle_y_mm";
+inline constexpr const char* kMiddleZ = "device_workspace_middle_z_mm";
+inline constexpr const char* kForceAxes = "device_force_axes";
+inline constexpr const char* kTorqueAxes = "device_torque_axes";
+// Set at the end.
+inline constexpr const char* kFieldHash = "metadata/field_hash";
+
+}  // namespace osteon::haptic::recording
