@@ -46,8 +46,8 @@ struct Span {
   double lowest = 0, highest = 0;
 };
 struct LawRange {
-  Span spindle_rpm, feed_mm_per_s, density_g_cm3, diameter_mm;
-  double most_um_per_tooth = 0, least_um_per_tooth = 0;  // saw: depth of cut
+  Span spindle_rpm = {}, feed_mm_per_s = {}, density_g_cm3 = {}, diameter_mm = {};
+  Span depth_um = {}, tooth_mm_per_s = {};  // saw: depth of cut of a tooth, mean speed of the teeth
 };
 
 struct ForceLaw {
@@ -58,9 +58,11 @@ struct ForceLaw {
   std::string_view source;    // who measured or derived it
   std::string_view inputs;    // with their units
   std::string_view constants; // with their units; [A] marks an assumption
+  std::string_view wear;      // how LawInputs::wear enters
   std::string_view range;     // in words
   std::string_view notes;
-  LawRange limits;
+  LawRange limits = {};
+  bool (*fits)(ToolKind kind) noexcept = nullptr;  // whether it can be chosen for such a tool
   double across = 0;          // force across the feed, out of the bone, for each newton of the resistance that cuts
   // [haptic] Any thread. A spindle that stands gives the law that does not cut: no feed at all.
   FeedLaw (*feed_law)(const LawTool& tool, const LawInputs& inputs) noexcept = nullptr;
@@ -72,11 +74,12 @@ struct ForceLaw {
 [[nodiscard]] const ForceLaw* find_force_law(std::string_view name);  // null: there is none of this name
 // The law of a tool for which none is chosen, by its kind. Of one that does not cut: one that nobody asks.
 [[nodiscard]] const ForceLaw& default_law(const Tool& tool);
-// The law of that name for that tool, its default where the name is empty. Errors name the laws there are.
-[[nodiscard]] Result<const ForceLaw*> choose_law(const Tool& tool, std::string_view name);
+// The law that the tool's own definition names (Tool::law), its default where it names none. `name`: instead of that, if
+// it is not empty. Errors name the laws that fit.
+[[nodiscard]] Result<const ForceLaw*> choose_law(const Tool& tool, std::string_view name = {});
 
 // [haptic] Outside of which of its limits a law is used, as bits; zero: within all.
-enum class OutOfRange : std::uint8_t { speed = 1, feed = 2, density = 4, diameter = 8, depth_of_cut = 16 };
+enum class OutOfRange : std::uint8_t { speed = 1, feed = 2, density = 4, diameter = 8, depth_of_cut = 16, tooth_speed = 32 };
 [[nodiscard]] unsigned out_of_range(const ForceLaw& law, const LawTool& tool, const LawInputs& inputs,
                                     double feed_mm_per_s) noexcept;
 [[nodiscard]] std::string out_of_range_sentence(const ForceLaw& law, unsigned bits);  // "" for zero

@@ -4,11 +4,22 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/mechanics/bone_strength.hpp"
 #include "common/mechanics/drilling.hpp"
 
 namespace osteon {
 namespace {
-double relative_strength(double density_g_cm3) noexcept { return std::pow(std::max(0.0, density_g_cm3) / 1.9, 1.1841); }
+
+double edge_force_n(const MillingParams& p, const MilledFace& face) noexcept {
+  return p.wear * p.edge_n_per_mm * face.edge_length_mm * relative_strength(face.density.value());
+}
+
+// N·s/mm.
+double face_resistance(const MillingParams& p, RevolutionsPerMinute speed, const MilledFace& face) noexcept {
+  return milling_resistance(p, face.area_mm2, face.axis_distance_mm, face.density.value()) /
+         (speed.value() * 2.0 * std::numbers::pi / 60.0);
+}
+
 }  // namespace
 
 double milling_resistance(const MillingParams& params, double projected_area_mm2, double axis_distance_mm,
@@ -29,6 +40,24 @@ FeedLaw milling_law(const MillingParams& params, RevolutionsPerMinute speed, dou
 
 NewtonMillimetres milling_torque(const MillingParams& params, Newtons tangential) noexcept {
   return NewtonMillimetres{tangential.value() * 0.5 * params.diameter_mm};
+}
+
+Newtons milling_tangential(const MillingParams& params, RevolutionsPerMinute speed, MillimetresPerSecond feed,
+                           const MilledFace& face) noexcept {
+  if (speed.value() < kMinCuttingRpm || !(feed.value() > 0.0)) return Newtons{0.0};
+  return Newtons{edge_force_n(params, face) + face_resistance(params, speed, face) * feed.value()};
+}
+
+MillimetresPerSecond milling_feed(const MillingParams& params, RevolutionsPerMinute speed, Newtons tangential,
+                                  const MilledFace& face) noexcept {
+  const double cutting_n = tangential.value() - edge_force_n(params, face);
+  if (speed.value() < kMinCuttingRpm || !(cutting_n > 0.0)) return MillimetresPerSecond{0.0};
+  const double resistance = face_resistance(params, speed, face);
+  return MillimetresPerSecond{resistance > 0.0 ? cutting_n / resistance : 0.0};
+}
+
+Newtons milling_radial(const MillingParams& params, Newtons tangential_that_cuts) noexcept {
+  return params.radial_ratio * tangential_that_cuts;
 }
 
 }  // namespace osteon

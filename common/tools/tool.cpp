@@ -142,6 +142,8 @@ Digest Tool::hash() const {
       hasher.integer(static_cast<std::uint32_t>(value));
     for (const std::int16_t value : mesh->values) hasher.integer(static_cast<std::uint16_t>(value));
   }
+  // Only where it is given: definitions from before there was a choice keep their hash, and so their rooms.
+  if (!law.empty()) hasher.text(law);
   return hasher.finish();
 }
 

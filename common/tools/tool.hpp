@@ -63,6 +63,7 @@ struct Tool {
   int teeth = 0;                   // flutes, teeth
   double feed_mm_per_rev = 0;      // what it is made to advance in a turn or stroke
   int cut_level = 2;               // the level its cuts go to: pitch h / 2^level
+  std::string law = {};            // name of the force law by which it resists, for who renders force; empty: its kind's
   // Kind mesh: shared by all copies of the definition, immutable, up to megabytes. Else null.
   std::shared_ptr<const SampledDistance> mesh = nullptr;
 

@@ -139,6 +139,11 @@ Tool read(const YAML::Node& root, const MeshLoader& load_mesh) {
       tool.title = scalar(entry.second, field);
       continue;
     }
+    if (field == "law" && tool.cuts()) {
+      tool.law = scalar(entry.second, field);
+      if (tool.law.empty()) throw Fault{"\"law\" is empty; name a force law, or remove the line"};
+      continue;
+    }
     if (field == "cut_level" && tool.cuts()) {
       tool.cut_level = static_cast<int>(whole(entry.second, field, 0, kLevels - 1));
       has_level = true;
@@ -160,7 +165,7 @@ Tool read(const YAML::Node& root, const MeshLoader& load_mesh) {
       for (const FieldRule& r : rules)
         names += (names.empty() ? "" : ", ") + (r.name.ends_with("_rad") ? in_degrees(r.name) : std::string(r.name));
       throw Fault{"\"" + field + "\" is not a field of a " + kind + "; remove it or choose one of name, title, kind, " + names +
-                  (tool.cuts() ? ", cut_level" : "")};
+                  (tool.cuts() ? ", cut_level, law" : "")};
     }
     if (std::ranges::find(given, &*rule) != given.end()) throw Fault{"\"" + field + "\" is there twice; remove one"};
     const bool degrees = field != rule->name;
@@ -228,6 +233,7 @@ std::string to_yaml(const Tool& tool) {
         << shortest(degrees ? *degrees : value);
   }
   if (tool.cuts()) out << YAML::Key << "cut_level" << YAML::Value << tool.cut_level;
+  if (!tool.law.empty()) out << YAML::Key << "law" << YAML::Value << tool.law;
   if (tool.mesh) {
     const CoordBox& box = tool.mesh->box;
     std::vector<unsigned char> bytes;

@@ -6,6 +6,7 @@
 //   diameter_mm: 5
 //   ...
 //   cut_level: 2        # its cuts go to pitch h / 2^2
+//   law: agus           # how it resists, see `osteon-haptic laws`; without this line as tools of its kind do
 //
 // Angles are in degrees (`point_angle_deg`). Two lengths are not written: a round bur's cutting length is its diameter,
 // a sphere reamer's the half of it.

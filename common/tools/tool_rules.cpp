@@ -373,6 +373,8 @@ std::optional<std::string> tool_fault(const Tool& tool) {
     if (auto fault = value_fault(rule, get_field(tool, rule))) return fault;
   if (tool.cut_level < 0 || tool.cut_level >= kLevels)
     return "\"cut_level\" is " + std::to_string(tool.cut_level) + "; choose 0, 1 or 2";
+  if (!tool.law.empty() && (!good_name(tool.law) || !tool.cuts()))
+    return "\"law\" is \"" + tool.law + "\"; write the name of a force law such as chi, for a tool that cuts";
   if (tool.kind == ToolKind::mesh && !tool.mesh) return "\"mesh\" is missing; name the STL file of its solid";
   return fit_fault(tool);
 }

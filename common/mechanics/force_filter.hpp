@@ -1,0 +1,32 @@
+// Exponentially weighted moving average, equation (7.15): F_i = E_i (1 - alpha) + F_(i-1) alpha. For the cutting force only:
+// in the coupling that holds the hand a filter makes energy (5 ms of it some joules in 10 s of stroking).
+#pragma once
+#include <cmath>
+
+namespace osteon {
+
+inline constexpr double kCuttingFilter_s = 2e-3;  // tau
+
+// `T`: double, or a vector with + and *. The factor follows from the tick, alpha = exp(-dt/tau), so that what is felt does
+// not depend on the loop's rate.
+template <class T>
+class ForceFilter {
+ public:
+  explicit ForceFilter(const T& start, double tau_s = kCuttingFilter_s) noexcept : value_(start), tau_s_(tau_s) {}
+
+  // [haptic] One tick; a tau of zero passes everything.
+  const T& step(const T& sample, double dt_s) noexcept {
+    const double alpha = tau_s_ > 0.0 ? std::exp(-dt_s / tau_s_) : 0.0;
+    value_ = sample * (1.0 - alpha) + value_ * alpha;
+    return value_;
+  }
+  // [haptic] For a safety zero, or on taking up a tool.
+  void reset(const T& value) noexcept { value_ = value; }
+  [[nodiscard]] const T& value() const noexcept { return value_; }
+
+ private:
+  T value_;
+  double tau_s_;
+};
+
+}  // namespace osteon
