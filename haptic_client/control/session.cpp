@@ -35,7 +35,7 @@ SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok, int periods
     device_.step(dt_s);
   }
 
-  const DeviceReading reading = device_.read();
+  const DeviceReading reading = played_ ? played_->read() : device_.read();
   LoopInput input;
   input.pose_device_tool = reading.pose_device_tool;
   input.clutch = (reading.buttons & kClutchButton) != 0;
@@ -49,7 +49,8 @@ SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok, int periods
   result.reading = reading;
   result.commanded_rpm = input.spindle_rpm;
   result.report = last_ = loop_.tick(input, patch, guides);
-  device_.write(result.report.force_device_n);
+  if (played_) played_->write(result.report.force_device_n);
+  else device_.write(result.report.force_device_n);
   return result;
 }
 

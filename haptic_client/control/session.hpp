@@ -21,6 +21,9 @@ class SimulatedSession {
   // `room_guides`: those of the room's scene. Null: the plan's own, from the step on that places them.
   SessionTick tick(const Patch& patch, bool link_ok, int periods = 1, const std::vector<PlacedGuide>* room_guides = nullptr) noexcept;
   [[nodiscard]] bool done() const noexcept { return surgeon_.done(); }
+  // Before the first tick: the handle moves as this device says, and the simulated hand lets go. The plan still says
+  // which tools are taken up when; with a recording of the same plan on the same bone everything happens again.
+  void play(HapticDevice& device) noexcept { played_ = &device; }
 
   [[nodiscard]] HapticLoop& loop() noexcept { return loop_; }
   [[nodiscard]] const Surgeon& surgeon() const noexcept { return surgeon_; }
@@ -31,6 +34,7 @@ class SimulatedSession {
   SimulatedDevice device_;
   HapticLoop loop_;
   LoopReport last_;
+  HapticDevice* played_ = nullptr;
 };
 
 }  // namespace osteon::haptic
