@@ -71,7 +71,7 @@ struct DeviceOutput {
   DeviceOutput(const Vec3& force, const Vec3& torque = Vec3::Zero()) : force_n(force), torque_nmm(torque) {}
 };
 
-// Known once open() has succeeded.
+// Known once open() has succeeded; what kind of device it is (places, turns, pedals, axes) as far as possible before.
 struct DeviceInfo {
   std::string model, serial, driver;   // as the device and its library name themselves; empty: it does not
   bool places = true, turns = true;    // what it reads: position, rotation

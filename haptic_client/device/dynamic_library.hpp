@@ -1,0 +1,40 @@
+// A vendor's library that is loaded when it is needed and never unloaded: some of them cannot be loaded twice.
+#pragma once
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "common/core/result.hpp"
+
+namespace osteon::haptic {
+
+// How a library is looked for, and what to tell the user who does not have it.
+struct LibraryWanted {
+  std::string what;                        // e.g. "OpenHaptics"
+  std::filesystem::path file;              // given by the user; empty: `names` are tried in order
+  std::span<const char* const> names;      // as the dynamic linker knows them
+  std::string remedy;                      // e.g. "install the vendor's OpenHaptics for Linux"
+};
+
+class DynamicLibrary {
+ public:
+  DynamicLibrary() = default;
+  // Errors: not_found (no such library), unsupported (it is there but is no library for this machine, or needs another
+  // one that is missing). Sentences with the remedy.
+  [[nodiscard]] static Result<DynamicLibrary> load(const LibraryWanted& wanted);
+
+  // Sets `function` to a function of the library; false where the library has none of that name.
+  template <class F>
+  [[nodiscard]] bool find(const char* name, F*& function) const noexcept {
+    function = reinterpret_cast<F*>(symbol(name));
+    return function != nullptr;
+  }
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+
+ private:
+  [[nodiscard]] void* symbol(const char* name) const noexcept;
+  void* handle_ = nullptr;  // never closed
+  std::string name_;
+};
+
+}  // namespace osteon::haptic

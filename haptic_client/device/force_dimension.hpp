@@ -1,0 +1,29 @@
+// Force Dimension's devices (omega, sigma, delta) through the vendor's libdhd, loaded at run time. The library's calls
+// wait for the device, so a thread of its own makes them; the haptic thread meets it in a DeviceExchange only.
+#pragma once
+#include <chrono>
+#include <filesystem>
+#include <memory>
+
+#include "haptic_client/device/haptic_device.hpp"
+
+namespace osteon::haptic {
+
+struct ForceDimensionOptions {
+  std::filesystem::path library;          // empty: libdhd.so where the dynamic linker finds it
+  int number = 0;                         // of the devices that are connected
+  std::chrono::microseconds period{1000}; // of its thread; 0: as fast as the device answers
+};
+
+[[nodiscard]] std::unique_ptr<HapticDevice> make_force_dimension(const ForceDimensionOptions& options);
+// Opens each device that is free for a moment, without its motors.
+[[nodiscard]] DeviceFinding look_for_force_dimension(const ForceDimensionOptions& options);
+
+// The sentence for an error of the library, with the remedy.
+[[nodiscard]] Error force_dimension_error(int code, const char* vendors_text);
+
+// Device coordinates of the vendor (x to the user, y right, z up) in ours; also forces and torques, in any unit.
+[[nodiscard]] inline Vec3 from_force_dimension(const Vec3& v) { return {v.y(), v.z(), v.x()}; }
+[[nodiscard]] inline Vec3 to_force_dimension(const Vec3& v) { return {v.z(), v.x(), v.y()}; }
+
+}  // namespace osteon::haptic
