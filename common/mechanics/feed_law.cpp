@@ -15,6 +15,14 @@ double feed_at_mm_per_s(const FeedLaw& law, double force_n) noexcept {
   return std::pow((force_n - law.offset_n) / law.scale_n, 1.0 / law.exponent);
 }
 
+FeedLaw scaled(const FeedLaw& law, double factor) noexcept {
+  FeedLaw out = law;
+  out.offset_n *= factor;
+  out.scale_n *= factor;
+  out.threshold_n *= factor;
+  return out;
+}
+
 FeedSolution solve_feed(const FeedLaw& law, double stiffness_n_per_mm, double extension_mm, double dt_s) noexcept {
   const double available_n = stiffness_n_per_mm * extension_mm;
   if (!(available_n > 0.0) || !(law.max_feed_mm_per_s > 0.0) || available_n < law.threshold_n ||

@@ -18,6 +18,9 @@ struct FeedLaw {
 // The feed at which the law resists with that force, not capped: the law inverted. Zero up to its offset.
 [[nodiscard]] double feed_at_mm_per_s(const FeedLaw& law, double force_n) noexcept;
 
+// A law `factor` times as strong at every feed, with the same cap.
+[[nodiscard]] FeedLaw scaled(const FeedLaw& law, double factor) noexcept;
+
 struct FeedSolution {
   double feed_mm_per_s = 0;
   double cutting_n = 0;  // the law's share of the force; the rest is borne by the heel or by rubbing

@@ -1,0 +1,170 @@
+#include "common/mechanics/cutting_effects.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "common/mechanics/force_law.hpp"
+
+namespace osteon {
+namespace {
+
+constexpr double kTurn = 2.0 * std::numbers::pi;
+
+double fraction(double x) noexcept { return x - std::floor(x); }
+
+// Amplitude and frequency of a trembling that the hand may be shown.
+double shown(double amplitude_n, double& hz, double most_hz) noexcept {
+  if (hz <= most_hz) return amplitude_n;
+  const double ratio = most_hz / hz;
+  hz = most_hz;
+  return amplitude_n * ratio * ratio;
+}
+
+}  // namespace
+
+void Bluntness::step(const BluntnessParams& params, double torque_nmm, double rpm, double dt_s) noexcept {
+  const double work_j = 1e-3 * torque_nmm * rpm * kTurn / 60.0 * dt_s;
+  if (!(work_j > 0.0) || wear_ >= params.blunt) return;
+  wear_ = params.blunt - (params.blunt - wear_) * std::exp(-work_j / params.work_j);
+}
+
+void FluteClogging::step(const CloggingParams& params, double diameter_mm, double cut_mm, double engaged,
+                         double back_mm) noexcept {
+  level_ += engaged * cut_mm / (params.capacity_diameters * diameter_mm) - back_mm / (params.cleared_diameters * diameter_mm);
+  level_ = std::clamp(level_, 0.0, 1.0);
+}
+
+bool has_flutes(ToolKind kind) noexcept {
+  return kind == ToolKind::drill || kind == ToolKind::end_drill || kind == ToolKind::cylinder_reamer;
+}
+
+void BreakthroughGrab::step(const GrabParams& params, double engaged, bool cutting, double cutting_n,
+                            bool drawn_back) noexcept {
+  engaged_ = engaged;
+  if (drawn_back || engaged <= params.gone) {
+    phase_ = Phase::outside;
+  } else if (engaged >= params.whole) {
+    if (cutting) {
+      phase_ = Phase::whole;
+      whole_n_ = cutting_n;
+    }
+  } else if (phase_ == Phase::whole) {
+    phase_ = Phase::breaking;
+  }
+}
+
+double BreakthroughGrab::pull_n(const GrabParams& params) const noexcept { return params.ratio * whole_n_ * rim(); }
+
+double BreakthroughGrab::torque_factor(const GrabParams& params) const noexcept { return 1.0 + params.torque_gain * rim(); }
+
+double kerf_play_rad(double set_mm, double depth_mm) noexcept {
+  return depth_mm > 0.0 ? std::atan(set_mm / depth_mm) : 0.5 * std::numbers::pi;
+}
+
+double kerf_pressure_n(const BindingParams& params, double twist_rad, double set_mm, double depth_mm) noexcept {
+  const double beyond_rad = std::abs(twist_rad) - kerf_play_rad(set_mm, depth_mm);
+  return beyond_rad > 0.0 ? params.side_n_per_mm * depth_mm * beyond_rad : 0.0;
+}
+
+void SawBinding::step(const BindingParams& params, double pressure_n) noexcept {
+  pressure_n_ = std::max(0.0, pressure_n);
+  jammed_ = jammed_ ? pressure_n_ > params.release * params.jam_n : pressure_n_ >= params.jam_n;
+}
+
+double BroachDrive::step(const BlowParams& params, double blows_per_minute, double engaged_area_mm2, double density_g_cm3,
+                         double held_n, double dt_s) noexcept {
+  const bool struck = blows_per_minute > 0.0 && held_n > 0.0;
+  until_blow_s_ -= dt_s;
+  if (!struck) until_blow_s_ = std::max(0.0, until_blow_s_);
+  if (struck && until_blow_s_ <= 0.5 * dt_s) {
+    until_blow_s_ += 60.0 / blows_per_minute;
+    ++blows_;
+    const double advance_mm = blow_advance_mm(params.law, engaged_area_mm2, GramsPerCm3{density_g_cm3});
+    seated_ = !(advance_mm > 0.0);
+    left_mm_ = advance_mm * std::min(1.0, held_n / params.law.hold_n);
+    speed_mm_per_s_ = left_mm_ / params.contact_s;
+  }
+  const double go_mm = std::min(left_mm_, speed_mm_per_s_ * dt_s);
+  left_mm_ -= go_mm;
+  return go_mm;
+}
+
+double ToolVibration::step(const VibrationParams& params, double rpm, double teeth, double cutting_n, double bound_n,
+                           double dt_s) noexcept {
+  double turn_hz = rpm / 60.0, tooth_hz = turn_hz * teeth;
+  const double turn_n = shown(params.run_out * cutting_n, turn_hz, params.most_hz);
+  const double tooth_n = shown(params.teeth * cutting_n, tooth_hz, params.most_hz);
+  turn_phase_ = fraction(turn_phase_ + turn_hz * dt_s);
+  tooth_phase_ = fraction(tooth_phase_ + tooth_hz * dt_s);
+  const double sum_n = turn_n * std::sin(kTurn * turn_phase_) + tooth_n * std::sin(kTurn * tooth_phase_);
+  return std::clamp(sum_n, -bound_n, bound_n);
+}
+
+SpindleParams motor_of(const Tool& tool) noexcept {
+  SpindleParams motor;
+  if (!(tool.spindle_rpm > 0.0)) return motor;
+  const bool strong = tool.kind == ToolKind::oscillating_saw || tool.kind == ToolKind::reciprocating_saw ||
+                      tool.kind == ToolKind::sphere_reamer || tool.kind == ToolKind::cylinder_reamer ||
+                      tool.kind == ToolKind::outside_reamer;
+  const double ratio = tool.spindle_rpm / motor.full_rpm, power = strong ? 4.0 : 1.0;
+  motor.droop_rpm_per_nmm *= ratio * ratio / power;
+  motor.most_nmm *= power / ratio;
+  motor.full_rpm = tool.spindle_rpm;
+  return motor;
+}
+
+CuttingEffects::CuttingEffects(const Tool& tool, double wear) noexcept
+    : flutes_(has_flutes(tool.kind)),
+      drills_(tool.kind == ToolKind::drill || tool.kind == ToolKind::end_drill),
+      saws_(tool.kind == ToolKind::oscillating_saw || tool.kind == ToolKind::reciprocating_saw),
+      broaches_(tool.kind == ToolKind::broach),
+      diameter_mm_(law_tool(tool).diameter_mm),
+      // The teeth of a saw pass in a blur; what trembles is its stroke.
+      teeth_(saws_ ? 1.0 : std::max(1, tool.teeth)),
+      stroke_mm_(law_tool(tool).stroke_mm),
+      bluntness_(wear) {}
+
+FeedLaw CuttingEffects::felt(const FeedLaw& law) const noexcept {
+  FeedLaw out = law;
+  if (flutes_) out = scaled(law, clogging_.thrust_factor(clogging_params));
+  if (saws_) {
+    out.offset_n += binding_.drag_n(binding_params);
+    if (binding_.jammed()) out.max_feed_mm_per_s = 0.0;
+  }
+  if (broaches_) out.max_feed_mm_per_s = may_go_mm_per_s_;
+  return out;
+}
+
+double CuttingEffects::torque_nmm(double law_torque_nmm) const noexcept {
+  double torque = law_torque_nmm;
+  if (flutes_) torque *= clogging_.torque_factor(clogging_params);
+  if (drills_) torque *= grab_.torque_factor(grab_params);
+  if (saws_) torque += binding_.drag_n(binding_params) * stroke_mm_ / std::numbers::pi;
+  return torque;
+}
+
+void CuttingEffects::step(const EffectMoment& moment, double dt_s) noexcept {
+  last_ = moment;
+  const double cut_mm = moment.cutting ? std::max(0.0, moment.advance_mm) : 0.0;
+  const double back_mm = std::max(0.0, -moment.advance_mm);
+  if (moment.cutting) bluntness_.step(bluntness_params, moment.torque_nmm, moment.spindle_rpm, dt_s);
+  if (flutes_) clogging_.step(clogging_params, diameter_mm_, cut_mm, moment.engaged, back_mm);
+  if (drills_) grab_.step(grab_params, moment.engaged, moment.cutting, moment.cutting_n, back_mm > 0.0);
+  if (saws_) binding_.step(binding_params, moment.kerf_pressure_n);
+  if (broaches_) {
+    const double held_n = moment.engaged > 0.0 ? moment.push_n : 0.0;  // in the air nobody strikes
+    const double may_go_mm =
+        drive_.step(blow_params, moment.spindle_rpm, moment.engaged_area_mm2, moment.density_g_cm3, held_n, dt_s);
+    may_go_mm_per_s_ = may_go_mm / dt_s;
+  }
+}
+
+double CuttingEffects::motor_n(double bound_n, double dt_s) noexcept {
+  const double pull_n = drills_ ? grab_.pull_n(grab_params) : 0.0;
+  const double trembling_n = vibration_.step(vibration_params, last_.spindle_rpm, teeth_, last_.cutting ? last_.cutting_n : 0.0,
+                                             bound_n, dt_s);
+  return std::clamp(pull_n + trembling_n, -bound_n, bound_n);
+}
+
+}  // namespace osteon

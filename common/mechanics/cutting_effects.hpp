@@ -1,0 +1,197 @@
+// What a surgeon misses at once if it is not there: bluntness, clogged flutes, the grab at breakthrough, a saw that binds,
+// a broach that goes by blows, the motor's trembling. Small state machines, each stepped by what the tool did in a tick;
+// their sums do not depend on the tick's length. All [haptic]: no allocation, clock or random number in any of them.
+//
+// Those that resist (bluntness, clogging, binding, blows) change the law that the proxy solves. Those that act on the hand
+// by themselves (grab, vibration) are a port of their own, which its user bounds and switches off; see motor_n().
+#pragma once
+#include <cstdint>
+
+#include "common/mechanics/broaching.hpp"
+#include "common/mechanics/feed_law.hpp"
+#include "common/mechanics/spindle.hpp"
+#include "common/tools/tool.hpp"
+
+namespace osteon {
+
+// An edge loses its sharpness by the work of cutting: wear' = (blunt - wear) · power / work, so a blunt tool needs
+// `blunt` times the force and never more. 1000 J are about thirty bicortical holes of 3.2 mm [A].
+struct BluntnessParams {
+  double blunt = 2.0;
+  double work_j = 1000.0;
+};
+class Bluntness {
+ public:
+  explicit Bluntness(double wear = 1.0) noexcept : wear_(wear) {}
+  void step(const BluntnessParams& params, double torque_nmm, double rpm, double dt_s) noexcept;
+  [[nodiscard]] double wear() const noexcept { return wear_; }
+
+ private:
+  double wear_;
+};
+
+// Flutes fill with chips by the depth drilled in one go, and empty as the drill is drawn back. Full ones need more
+// torque, and some more thrust [A].
+struct CloggingParams {
+  double capacity_diameters = 6.0;  // depth until they are full
+  double cleared_diameters = 1.5;   // way back until full ones are empty
+  double torque_gain = 1.5;         // torque of full flutes over that of empty ones, less one
+  double thrust_gain = 0.3;
+};
+class FluteClogging {
+ public:
+  // `cut_mm`: advance into bone; `back_mm`: withdrawal; both of this tick and not negative. `engaged`: share of the point
+  // that took bone.
+  void step(const CloggingParams& params, double diameter_mm, double cut_mm, double engaged, double back_mm) noexcept;
+  [[nodiscard]] double level() const noexcept { return level_; }  // 0 empty, 1 full
+  [[nodiscard]] double torque_factor(const CloggingParams& p) const noexcept { return 1.0 + p.torque_gain * level_; }
+  [[nodiscard]] double thrust_factor(const CloggingParams& p) const noexcept { return 1.0 + p.thrust_gain * level_; }
+
+ private:
+  double level_ = 0;
+};
+[[nodiscard]] bool has_flutes(ToolKind kind) noexcept;
+
+// When the point comes out on the far side, the lips catch the rim that is left and the flutes screw the drill forward:
+// a pull of ratio · (the last whole thrust) · 4 e (1 - e) with the engaged share e, and as much more torque. Only after the
+// whole point was in bone: going in, it does nothing.
+struct GrabParams {
+  double whole = 0.9;         // share from which the point counts as whole
+  double gone = 0.02;         // and below which as out
+  double ratio = 0.3;         // of the thrust; no more than friction could hold [A]
+  double torque_gain = 1.0;   // [A]
+};
+class BreakthroughGrab {
+ public:
+  void step(const GrabParams& params, double engaged, bool cutting, double cutting_n, bool drawn_back) noexcept;
+  [[nodiscard]] bool grabbing() const noexcept { return phase_ == Phase::breaking; }
+  [[nodiscard]] double pull_n(const GrabParams& params) const noexcept;         // along the feed, on the tool
+  [[nodiscard]] double torque_factor(const GrabParams& params) const noexcept;
+
+ private:
+  enum class Phase : std::uint8_t { outside, whole, breaking };
+  [[nodiscard]] double rim() const noexcept { return grabbing() ? 4.0 * engaged_ * (1.0 - engaged_) : 0.0; }
+  Phase phase_ = Phase::outside;
+  double engaged_ = 0, whole_n_ = 0;
+};
+
+// A blade that is turned in its kerf beyond the set of its teeth presses on the walls: friction drags, and from jam_n on
+// it stands until the pressure is down to `release` of that. A kerf that closes does the same.
+struct BindingParams {
+  double friction = 0.3;           // [A]
+  double side_n_per_mm = 40.0;     // plate against the kerf [A]
+  double jam_n = 30.0;             // [A]
+  double release = 0.5;            // [A]
+};
+// Play of a blade `depth_mm` deep: the angle at which its plate touches both walls.
+[[nodiscard]] double kerf_play_rad(double set_mm, double depth_mm) noexcept;
+// Pressure on the walls, both sides together, at a twist in the kerf.
+[[nodiscard]] double kerf_pressure_n(const BindingParams& params, double twist_rad, double set_mm, double depth_mm) noexcept;
+class SawBinding {
+ public:
+  void step(const BindingParams& params, double pressure_n) noexcept;
+  [[nodiscard]] bool jammed() const noexcept { return jammed_; }
+  [[nodiscard]] double drag_n(const BindingParams& params) const noexcept { return params.friction * pressure_n_; }
+
+ private:
+  double pressure_n_ = 0;
+  bool jammed_ = false;
+};
+
+// Blows at the rate of the handpiece or mallet, the first at once; each drives the broach over `contact_s` as far as
+// broaching.hpp says. One that would drive it less than `seated_mm` leaves it where it is: it is seated.
+struct BlowParams {
+  BroachingParams law;
+  double contact_s = 5e-3;  // [A]
+};
+class BroachDrive {
+ public:
+  // `held_n`: push of the hand; a loosely held broach bounces and advances in proportion. Returns how far it may go in
+  // this tick, mm.
+  double step(const BlowParams& params, double blows_per_minute, double engaged_area_mm2, double density_g_cm3, double held_n,
+              double dt_s) noexcept;
+  [[nodiscard]] bool seated() const noexcept { return seated_; }
+  [[nodiscard]] int blows() const noexcept { return blows_; }
+
+ private:
+  double until_blow_s_ = 0, left_mm_ = 0, speed_mm_per_s_ = 0;
+  int blows_ = 0;
+  bool seated_ = false;
+};
+
+// Trembling of the tool: once a turn by its run-out, and with every tooth that bites, each a share of the cutting force
+// [A]. Above most_hz a hand feels no more and a 1 kHz loop shows something else, so the frequency is held there and the
+// amplitude falls with its square, as a mass moves. Never more than the bound.
+struct VibrationParams {
+  double run_out = 0.03;   // of the cutting force [A]
+  double teeth = 0.05;     // [A]
+  double most_hz = 300.0;
+};
+class ToolVibration {
+ public:
+  // Force along the feed, N, of this tick.
+  double step(const VibrationParams& params, double rpm, double teeth, double cutting_n, double bound_n, double dt_s) noexcept;
+
+ private:
+  double turn_phase_ = 0, tooth_phase_ = 0;  // of 1
+};
+
+// The motor that drives a tool of this kind, by the power of such handpieces [A]: small ones as a drill of 1000 rpm,
+// saws and reamers four times that. Constant power: torque and droop follow from the tool's speed.
+[[nodiscard]] SpindleParams motor_of(const Tool& tool) noexcept;
+
+// What the tool did in a tick.
+struct EffectMoment {
+  double spindle_rpm = 0;
+  double engaged = 0;
+  double engaged_area_mm2 = 0;
+  double density_g_cm3 = 0;
+  bool cutting = false;
+  double cutting_n = 0;      // of the tool on the bone, along the feed
+  double torque_nmm = 0;     // as felt, see CuttingEffects::torque_nmm()
+  double advance_mm = 0;     // along the feed, negative when drawn back
+  double push_n = 0;         // of the hand along the feed
+  double kerf_pressure_n = 0;
+};
+
+// All of them for one tool. Order in a tick: felt() and torque_nmm() for the proxy, then step().
+class CuttingEffects {
+ public:
+  explicit CuttingEffects(const Tool& tool, double wear = 1.0) noexcept;
+
+  // For LawInputs::wear.
+  [[nodiscard]] double wear() const noexcept { return bluntness_.wear(); }
+  // The law as clogging, binding and blows change it.
+  [[nodiscard]] FeedLaw felt(const FeedLaw& law) const noexcept;
+  [[nodiscard]] double torque_nmm(double law_torque_nmm) const noexcept;
+  void step(const EffectMoment& moment, double dt_s) noexcept;
+  // The active port: force on the tool along the feed, grab and vibration, at most `bound_n` either way. Call it once a
+  // tick, after step().
+  [[nodiscard]] double motor_n(double bound_n, double dt_s) noexcept;
+
+  [[nodiscard]] const FluteClogging& clogging() const noexcept { return clogging_; }
+  [[nodiscard]] const BreakthroughGrab& grab() const noexcept { return grab_; }
+  [[nodiscard]] const SawBinding& binding() const noexcept { return binding_; }
+  [[nodiscard]] const BroachDrive& drive() const noexcept { return drive_; }
+
+  BluntnessParams bluntness_params;
+  CloggingParams clogging_params;
+  GrabParams grab_params;
+  BindingParams binding_params;
+  BlowParams blow_params;
+  VibrationParams vibration_params;
+
+ private:
+  bool flutes_, drills_, saws_, broaches_;
+  double diameter_mm_, teeth_, stroke_mm_;
+  Bluntness bluntness_;
+  FluteClogging clogging_;
+  BreakthroughGrab grab_;
+  SawBinding binding_;
+  BroachDrive drive_;
+  ToolVibration vibration_;
+  EffectMoment last_;
+  double may_go_mm_per_s_ = 0;  // broach: of the next tick
+};
+
+}  // namespace osteon
