@@ -231,6 +231,8 @@ Surgeon::Surgeon(ReadyPlan plan) : plan_(std::move(plan)), results_(plan_.steps.
 HandParams Surgeon::hand_for(const PlanStep& plan) {
   HandParams hand = plan.hand == HandKind::novice ? novice_hand() : expert_hand();
   hand.push_n = plan.push_n;
+  if (plan.hand_stiffness_n_per_mm > 0.0) hand.stiffness_n_per_mm = plan.hand_stiffness_n_per_mm;
+  if (plan.hand_damping_n_s_per_mm > 0.0) hand.damping_n_s_per_mm = plan.hand_damping_n_s_per_mm;
   return hand;
 }
 
