@@ -2,11 +2,16 @@
 
 namespace osteon::haptic {
 
-SimulatedSession::SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale)
-    : surgeon_(std::move(plan)),
-      device_(device),
-      loop_(loop_params(device.limits.peak_n, device.limits.continuous_n, device.limits.stiffness_n_per_mm, force_scale),
-            surgeon_.plan().tools) {}
+namespace {
+LoopParams params_of(const DeviceLimits& limits, double force_scale, double dt_s) {
+  LoopParams params = loop_params(limits.peak_n, limits.continuous_n, limits.stiffness_n_per_mm, force_scale);
+  params.dt_s = dt_s;
+  return params;
+}
+}  // namespace
+
+SimulatedSession::SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale, double dt_s)
+    : surgeon_(std::move(plan)), device_(device), loop_(params_of(device.limits, force_scale, dt_s), surgeon_.plan().tools) {}
 
 SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok, int periods, const std::vector<PlacedGuide>* room_guides) noexcept {
   const double dt_s = loop_.params().dt_s;
@@ -40,7 +45,7 @@ SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok, int periods
   input.pose_device_tool = reading.pose_device_tool;
   input.clutch = (reading.buttons & kClutchButton) != 0;
   input.spindle_rpm = reading.buttons & kSpindlePedal ? result.order.spindle_rpm : 0.0;
-  input.device_ok = reading.status != DeviceStatus::fault;
+  input.device_ok = reading.usable();
   input.device_warm = reading.status == DeviceStatus::warm;
   input.link_ok = link_ok;
   input.periods = periods;

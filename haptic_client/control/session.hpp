@@ -14,7 +14,8 @@ struct SessionTick {
 
 class SimulatedSession {
  public:
-  SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale);
+  // `dt_s`: of a tick.
+  SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale, double dt_s = 1e-3);
 
   // [haptic] `link_ok` false ends force and spindle; `periods`: of 1 ms since the last tick, 1 when on time. The
   // simulated hand lives on these ticks: while none comes, as when the machine stalls, no time passes for it.
