@@ -7,12 +7,12 @@
 
 namespace osteon::haptic::test {
 
-Case block_case(double width_mm) {
+Case block_case(double width_mm, double pitch_mm) {
   CaseInfo info;
   info.title = "block";
   info.source = "phantom";
-  info.pitch_mm = 0.5;
-  const int half = static_cast<int>(std::lround(0.5 * width_mm / info.pitch_mm)), deep = 60, border = 6;
+  info.pitch_mm = pitch_mm;
+  const int half = static_cast<int>(std::lround(0.5 * width_mm / pitch_mm)), deep = static_cast<int>(std::lround(30.0 / pitch_mm)), border = 6;
   const CoordBox box{{-half - border, -half - border, -border}, {half + border, half + border, deep + border}};
   DenseVolume<float> surface(box, 0.0f), density(box, 0.0f);
   for (int x = box.min.x; x <= box.max.x; ++x)
@@ -39,11 +39,11 @@ ReadyPlan ready(const std::vector<PlanStep>& plan, const Case& bone) {
 }  // namespace
 
 Bench::Bench(const Case& bone, const std::vector<PlanStep>& plan, const SimulatedDeviceParams& device, double force_scale,
-             const BenchDelays& delays)
-    : Bench(bone, ready(plan, bone), device, force_scale, delays) {}
+             const BenchDelays& delays, double dt_s)
+    : Bench(bone, ready(plan, bone), device, force_scale, delays, dt_s) {}
 
-Bench::Bench(const Case& bone, ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale, const BenchDelays& delays)
-    : delays_(delays), session_(std::move(plan), device, force_scale), replica_(bone, BodyId{}) {}
+Bench::Bench(const Case& bone, ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale, const BenchDelays& delays, double dt_s)
+    : delays_(delays), session_(std::move(plan), device, force_scale, dt_s), replica_(bone, BodyId{}) {}
 
 SessionTick Bench::tick() {
   last_ = session_.tick(patch_, true);

@@ -11,8 +11,8 @@
 
 namespace osteon::haptic::test {
 
-// A block across z = 0 … 30 mm: layers 5/20/5 mm at 1.9/0.3/1.9 g/cm³, h = 0.5 mm. It is entered along +z.
-[[nodiscard]] Case block_case(double width_mm = 12.0);
+// A block across z = 0 … 30 mm: layers 5/20/5 mm at 1.9/0.3/1.9 g/cm³. It is entered along +z. `pitch_mm`: h, a part of 5 mm.
+[[nodiscard]] Case block_case(double width_mm = 12.0, double pitch_mm = 0.5);
 
 struct BenchDelays {
   int patch_ticks = 12;   // between two patches
@@ -22,11 +22,11 @@ struct BenchDelays {
 class Bench {
  public:
   Bench(const Case& bone, const std::vector<PlanStep>& plan, const SimulatedDeviceParams& device = {}, double force_scale = 0.0,
-        const BenchDelays& delays = {});
+        const BenchDelays& delays = {}, double dt_s = 1e-3);
   Bench(const Case& bone, ReadyPlan plan, const SimulatedDeviceParams& device = {}, double force_scale = 0.0,
-        const BenchDelays& delays = {});
+        const BenchDelays& delays = {}, double dt_s = 1e-3);
 
-  // One millisecond; `after_tick` sees it before replica and patches follow.
+  // One tick of `dt_s`; `after_tick` sees it before replica and patches follow.
   SessionTick tick();
   // Until the plan is done and every cut confirmed.
   void run(const std::function<void(const SessionTick&)>& after_tick = {});

@@ -1,0 +1,458 @@
+// What a recording holds, that it survives killed writers and full disks, and that Python reads it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <fstream>
+#include <thread>
+
+#include "haptic_client/app/recorder.hpp"
+#include "haptic_client/device/recorded_device.hpp"
+#include "tests/support/process.hpp"
+#include "tests/support/scenes/random.hpp"
+#include "tests/support/temp_dir.hpp"
+
+namespace osteon::haptic::test {
+namespace {
+
+using osteon::test::Random;
+using osteon::test::TempDir;
+
+RecordingInfo info_of_a_session() {
+  RecordingInfo info;
+  info.device = "simulated";
+  info.device_info.model = "a hand of numbers";
+  info.limits = {.peak_n = 8.5, .continuous_n = 1.4, .stiffness_n_per_mm = 0.8, .workspace_radius_mm = 120.0, .damping_n_s_per_mm = 0.002,
+                 .workspace_middle_mm = {1, 2, 3}};
+  info.loop.force_scale = 0.0466;
+  info.case_hash = std::string(64, 'c');
+  info.case_title = "block";
+  info.pitch_mm = 0.5;
+  info.author = 7;
+  info.tools = {{"drill-3.2", "chi", 3.2}, {"burr-round-5", "milling", 5.0}};
+  return info;
+}
+
+Vec3 vector(Random& random, double most) { return {random.between(-most, most), random.between(-most, most), random.between(-most, most)}; }
+
+Pose pose(Random& random) {
+  const Vec3 v = vector(random, 1.0);
+  return {vector(random, 100.0), Eigen::Quaterniond(random.between(0.1, 1.0), v.x(), v.y(), v.z()).normalized()};
+}
+
+// Numbers that no two rows share; row i is tick i + 1.
+TickRow row(std::uint64_t i) {
+  Random random(i);
+  TickRow row;
+  row.mono_ns = static_cast<std::int64_t>(1'000'000'000 + 1'000'000 * i);
+  row.phase = SurgeonPhase::push;
+  row.step = static_cast<std::uint32_t>(i / 1000);
+  row.depth_mm = random.between(-5, 30);
+  row.report.state_seq = i + 1;
+  row.report.pose_bone_proxy = pose(random);
+  row.report.pose_bone_device = pose(random);
+  row.report.force_physical_n = vector(random, 30.0);
+  row.report.torque_nmm = random.between(0, 40);
+  row.report.spindle_rpm = random.between(0, 1000);
+  row.report.density_g_cm3 = random.between(0, 2);
+  row.report.feed_mm_per_s = random.between(0, 20);
+  row.report.phase = i % 2 ? CuttingPhase::cutting : CuttingPhase::free;
+  row.report.tool = static_cast<int>(i / 700 % 2);
+  row.reading.pose_device_tool = pose(random);
+  row.reading.buttons = static_cast<std::uint32_t>(i % 4);
+  row.reading.pedal = random.between(0, 1);
+  row.reading.status = i % 97 == 0 ? DeviceStatus::warm : DeviceStatus::ok;
+  row.commanded_rpm = 1000;
+  row.rendered = DeviceOutput(vector(random, 3.3));
+  row.take_up = i % 700 == 0;
+  row.taken_up_at = pose(random);
+  row.mapping.align(pose(random).rotation, 1.5, vector(random, 10), vector(random, 10));
+  return row;
+}
+
+void write_rows(const std::filesystem::path& file, std::uint64_t count) {
+  Result<RecordFile> recording = RecordFile::create(file, info_of_a_session());
+  ASSERT_TRUE(recording) << recording.error().message;
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const TickRow one = row(i);
+    ASSERT_TRUE(recording->append({&one, 1}));
+  }
+  ASSERT_TRUE(recording->finish({std::string(64, 'f'), 321, 0}));
+  EXPECT_EQ(recording->rows_written(), count);
+}
+
+// Runs Debian's Python on a script that sees the file as sys.argv[1].
+osteon::test::RunResult python(const std::string& script, const std::filesystem::path& file) {
+  return osteon::test::run(OSTEON_PYTHON, {"-c", script, file});
+}
+
+void expect_same(const DeviceReading& a, const DeviceReading& b) {
+  EXPECT_EQ(a.pose_device_tool.position_mm, b.pose_device_tool.position_mm);
+  EXPECT_EQ(a.pose_device_tool.rotation.coeffs(), b.pose_device_tool.rotation.coeffs());
+  EXPECT_EQ(a.buttons, b.buttons);
+  EXPECT_EQ(a.pedal, b.pedal);
+  EXPECT_EQ(a.status, b.status);
+}
+
+TEST(Recording, GivesTheDeviceBackBitForBit) {
+  const TempDir temp;
+  write_rows(temp / "a.h5", 1234);
+  const auto device = make_recorded_device(temp / "a.h5");
+  ASSERT_TRUE(device) << device.error().message;
+  RecordedDevice& recorded = **device;
+  for (std::uint64_t i = 0; i < 1234; ++i) {
+    ASSERT_FALSE(recorded.over());
+    expect_same(recorded.read(), row(i).reading);
+  }
+  EXPECT_TRUE(recorded.over());
+  EXPECT_EQ(recorded.read().status, DeviceStatus::absent);
+  EXPECT_FALSE(recorded.read().usable());
+  const RecordingInfo info = info_of_a_session();
+  EXPECT_EQ(recorded.session().case_hash, info.case_hash);
+  EXPECT_EQ(recorded.session().field_hash, std::string(64, 'f'));
+  EXPECT_EQ(recorded.session().force_scale, info.loop.force_scale);
+  EXPECT_EQ(recorded.limits().peak_n, info.limits.peak_n);
+  EXPECT_EQ(recorded.limits().damping_n_s_per_mm, info.limits.damping_n_s_per_mm);
+  EXPECT_EQ(recorded.limits().workspace_middle_mm, info.limits.workspace_middle_mm);
+  EXPECT_EQ(recorded.name(), "recorded:" + (temp / "a.h5").string());
+}
+
+// A row that was lost is a tick that saw what the one before it saw: later rows keep their time.
+TEST(Recording, LostRowsDoNotShiftTheRest) {
+  const TempDir temp;
+  {
+    Result<RecordFile> recording = RecordFile::create(temp / "a.h5", info_of_a_session());
+    ASSERT_TRUE(recording);
+    for (const std::uint64_t i : {0, 1, 2, 6, 7}) {
+      const TickRow one = row(i);
+      ASSERT_TRUE(recording->append({&one, 1}));
+    }
+    ASSERT_TRUE(recording->finish({}));
+  }
+  const auto session = read_recording(temp / "a.h5");
+  ASSERT_TRUE(session) << session.error().message;
+  const int shown[] = {0, 1, 2, 2, 2, 2, 6, 7};
+  ASSERT_EQ(session->readings.size(), std::size(shown));
+  for (std::size_t i = 0; i < std::size(shown); ++i) expect_same(session->readings[i], row(static_cast<std::uint64_t>(shown[i])).reading);
+}
+
+// The lines of the README, word for word apart from the file's name.
+TEST(Recording, ThreeLinesOfPythonReadIt) {
+  const TempDir temp;
+  write_rows(temp / "session.h5", 600);
+  const std::string lines = R"(
+import h5py
+session = h5py.File("session.h5", "r", swmr=True)
+print(session["data/time"][:], session["drill_force_physical/wrench"][:, :3])
+)";
+  osteon::test::ProcessOptions options;
+  options.folder = temp.path();
+  const auto read = osteon::test::run(OSTEON_PYTHON, {"-c", lines}, std::chrono::seconds{60}, options);
+  EXPECT_EQ(read.exit_code, 0) << read.err;
+  EXPECT_THAT(read.out, ::testing::HasSubstr("[["));
+}
+
+// Every array says its unit, its frame where it has one, and what it is; all have a row for each time; the groups are
+// those of the volumetric drilling simulator; numbers come out as they went in.
+TEST(Recording, IsLaidOutAsItSays) {
+  const TempDir temp;
+  write_rows(temp / "a.h5", 1300);
+  const TickRow some = row(1234);
+  char expected[256];
+  std::snprintf(expected, sizeof expected, "%.6f,%.6f,%.6f,%.6f,%.6f", some.report.pose_bone_proxy.position_mm.x(),
+                some.report.pose_bone_proxy.rotation.w(), some.report.force_physical_n.z(), some.rendered.force_n.y(), some.report.density_g_cm3);
+  const auto read = python(R"(
+import sys, h5py, numpy as np
+f = h5py.File(sys.argv[1], "r")
+assert {"metadata", "data", "high_frequency_poses", "drill_force_feedback", "burr_change"} <= set(f), list(f)
+poses = {"handle_pose": "device", "device_pose": "bone", "drill_pose": "bone"}
+for name, frame in poses.items():
+    pose = f["high_frequency_poses"][name]["pose"]
+    assert pose.shape == (1300, 7) and pose.attrs["frame"] == frame and pose.attrs["units"].startswith("mm"), name
+    assert np.allclose(np.linalg.norm(pose[:, 3:], axis=1), 1)
+    assert (f["high_frequency_poses"][name]["time_stamp"][:] == f["data/time"][:]).all()
+for group, frame in {"drill_force_feedback": "device", "drill_force_physical": "bone"}.items():
+    wrench = f[group]["wrench"]
+    assert wrench.shape == (1300, 6) and wrench.attrs["frame"] == frame and wrench.attrs["units"].startswith("N, N, N, N.mm"), group
+    assert len(f[group]["time_stamp"]) == 1300
+rows = []
+def look(name, item):
+    if isinstance(item, h5py.Dataset) and not name.startswith("metadata"):
+        assert item.attrs["meaning"], name
+        assert item.attrs.get("units") or h5py.check_enum_dtype(item.dtype), name
+        rows.append(len(item))
+f.visititems(look)
+assert set(rows) == {1300, 2}, rows
+for name in "spindle_rpm feed density law state tool force_scale torque".split():
+    assert len(f["data"][name]) == 1300, name
+assert h5py.check_enum_dtype(f["data/state"].dtype)["cutting"] == f["data/state"][1]
+assert np.allclose(np.diff(f["data/time"][:]), 1e-3, atol=2e-6) and f["data/time"][0] > 1.7e9
+assert [t.decode() for t in f["metadata/tools"][:]] == ["drill-3.2", "burr-round-5"]
+assert [t.decode() for t in f["metadata/laws"][:]] == ["chi", "milling"]
+assert f["data/law"][699] == 0 and f["data/law"][700] == 1 and f["burr_change/burr_size"][:].tolist() == [3.2, 5.0]
+assert f["burr_change/row"][:].tolist() == [0, 700] and f["burr_change/scale"][0] == 1.5
+assert f["metadata/voxel_volume"][()] == 0.125 and f["metadata"].attrs["force_scale"] == 0.0466 and b"bone" in f["metadata/README"][()]
+assert f["metadata/field_hash"][()].decode() == 64 * "f" and f["metadata/room_seq"][()] == 321 and f["metadata/finished"][()] == 1
+# The torque of the bone on the tool is along its axis and against the spindle.
+q = f["high_frequency_poses/drill_pose/pose"][5, 3:]
+axis = np.array([2 * (q[0] * q[2] + q[3] * q[1]), 2 * (q[1] * q[2] - q[3] * q[0]), 1 - 2 * (q[0] ** 2 + q[1] ** 2)])
+assert np.allclose(f["drill_force_physical/wrench"][5, 3:], -axis * f["data/torque"][5], atol=1e-4)
+i = 1234
+print("%.6f,%.6f,%.6f,%.6f,%.6f" % (f["high_frequency_poses/drill_pose/pose"][i, 0], f["data/pose_drill"][i, 6],
+      f["drill_force_physical/wrench"][i, 2], f["drill_force_feedback/wrench"][i, 1], f["data/density"][i]))
+)", temp / "a.h5");
+  ASSERT_EQ(read.exit_code, 0) << read.err;
+  double got[5], want[5];
+  ASSERT_EQ(std::sscanf(read.out.c_str(), "%lf,%lf,%lf,%lf,%lf", &got[0], &got[1], &got[2], &got[3], &got[4]), 5);
+  ASSERT_EQ(std::sscanf(expected, "%lf,%lf,%lf,%lf,%lf", &want[0], &want[1], &want[2], &want[3], &want[4]), 5);
+  for (int i = 0; i < 5; ++i) EXPECT_NEAR(got[i], want[i], i < 2 ? 1e-6 : 4e-6) << i;  // poses are doubles, forces floats
+}
+
+// A child that records as fast as it can, saying after each chunk how many rows it has written.
+class Writer {
+ public:
+  explicit Writer(const std::filesystem::path& file) {
+    int ends[2];
+    if (pipe(ends) != 0) return;
+    pid_ = fork();
+    if (pid_ == 0) {
+      Result<RecordFile> recording = RecordFile::create(file, info_of_a_session());
+      for (std::uint64_t i = 0; recording; ++i) {
+        const TickRow one = row(i);
+        if (!recording->append({&one, 1})) break;
+        const std::uint64_t rows = recording->rows_written();
+        if (rows == i + 1 && write(ends[1], &rows, sizeof rows) < 0) break;
+      }
+      _exit(1);
+    }
+    close(ends[1]);
+    from_ = ends[0];
+  }
+  ~Writer() {
+    kill();
+    close(from_);
+  }
+  // The next number of rows that are surely written.
+  std::uint64_t rows() {
+    std::uint64_t rows = 0;
+    return read(from_, &rows, sizeof rows) == sizeof rows ? rows : 0;
+  }
+  void kill() {
+    if (pid_ <= 0) return;
+    ::kill(pid_, SIGKILL);
+    waitpid(pid_, nullptr, 0);
+    pid_ = -1;
+    for (std::uint64_t last; (last = rows()) != 0;) written_ = last;
+  }
+  [[nodiscard]] std::uint64_t written() const { return written_; }
+
+ private:
+  pid_t pid_ = -1;
+  int from_ = -1;
+  std::uint64_t written_ = 0;
+};
+
+// Killed at any moment, a writer leaves every whole chunk; the next reader needs nothing but the file.
+TEST(Recording, AKilledWriterLeavesWhatItWrote) {
+  const TempDir temp;
+  Random random(7);
+  std::uint64_t most = 0;
+  for (int trial = 0; trial < 25; ++trial) {
+    const auto file = temp / ("killed-" + std::to_string(trial) + ".h5");
+    Writer writer(file);
+    ASSERT_GT(writer.rows(), 0u);
+    std::this_thread::sleep_for(std::chrono::microseconds(static_cast<int>(random.between(0, 60'000))));
+    writer.kill();
+    const auto session = read_recording(file);
+    ASSERT_TRUE(session) << session.error().message;
+    const std::size_t rows = session->readings.size();
+    EXPECT_GE(rows, writer.written());
+    EXPECT_LE(rows, writer.written() + RecordFile::kChunkRows);  // one may be written whose number was not said
+    EXPECT_EQ(rows % RecordFile::kChunkRows, 0u);
+    for (std::size_t i = 0; i < rows; i += 97) expect_same(session->readings[i], row(i).reading);
+    EXPECT_EQ(session->field_hash, "");
+    most = std::max(most, static_cast<std::uint64_t>(rows));
+    if (trial != 0) continue;
+    const auto read = python("import sys, h5py\nf = h5py.File(sys.argv[1], 'r', swmr=True)\n"
+                             "n = len(f['data/time'])\nassert n >= 500\n"
+                             "assert (f['data/state_seq'][:n] == range(1, n + 1)).all() and f['metadata/finished'][()] == 0\n", file);
+    EXPECT_EQ(read.exit_code, 0) << read.err;
+  }
+  EXPECT_GT(most, 500u);
+}
+
+TEST(Recording, CanBeReadWhileItGrows) {
+  const TempDir temp;
+  Writer writer(temp / "a.h5");
+  ASSERT_GT(writer.rows(), 0u);
+  const auto read = python("import sys, time, h5py\nf = h5py.File(sys.argv[1], 'r', swmr=True)\nt = f['data/time']\n"
+                           "first, until = len(t), time.time() + 20\n"
+                           "while len(t) <= first and time.time() < until:\n  time.sleep(0.01)\n  t.refresh()\n"
+                           "print(first, len(t))\nassert len(t) > first\n", temp / "a.h5");
+  EXPECT_EQ(read.exit_code, 0) << read.err;
+}
+
+// Nothing more can be written at some size of a file, as when the disk is full.
+class SizeLimit {
+ public:
+  explicit SizeLimit(rlim_t bytes) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    rlimit limit = before_;
+    limit.rlim_cur = bytes;
+    setrlimit(RLIMIT_FSIZE, &limit);
+    handler_ = std::signal(SIGXFSZ, SIG_IGN);
+  }
+  ~SizeLimit() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int) = nullptr;
+};
+
+TEST(Recording, AFullDiskIsSaidInASentenceAndLeavesWhatWasWritten) {
+  for (const rlim_t bytes : {400'000u, 555'555u, 700'001u}) {
+    const TempDir temp;
+    std::uint64_t fitted = 0;
+    {
+      const SizeLimit full(bytes);
+      Result<RecordFile> recording = RecordFile::create(temp / "a.h5", info_of_a_session());
+      ASSERT_TRUE(recording) << recording.error().message;
+      Result<void> appended;
+      for (std::uint64_t i = 0; appended && i < 20'000; ++i) {
+        const TickRow one = row(i);
+        appended = recording->append({&one, 1});
+      }
+      ASSERT_FALSE(appended);
+      EXPECT_EQ(appended.error().message, "the recording " + (temp / "a.h5").string() + " cannot be continued: the disk is full (File too large)");
+      fitted = recording->rows_written();
+    }
+    const auto session = read_recording(temp / "a.h5");
+    ASSERT_TRUE(session) << session.error().message;
+    EXPECT_EQ(session->readings.size(), fitted);
+    EXPECT_GE(fitted, RecordFile::kChunkRows);
+    for (std::size_t i = 0; i < fitted; i += 97) expect_same(session->readings[i], row(i).reading);
+  }
+}
+
+// The recorder's thread meets the full disk; who pushes rows never hears of it.
+TEST(Recorder, EndsTheRecordingAndNothingElse) {
+  const TempDir temp;
+  Recorder recorder;
+  const SizeLimit full(500'000);
+  ASSERT_TRUE(recorder.open(temp / "a.h5", info_of_a_session()));
+  for (std::uint64_t i = 0; i < 10'000; ++i) recorder.push(row(i));
+  const Recorder::Outcome outcome = recorder.finish({});
+  EXPECT_THAT(outcome.trouble, ::testing::HasSubstr("the disk is full"));
+  EXPECT_GE(outcome.rows, RecordFile::kChunkRows);
+  EXPECT_LT(outcome.rows, 10'000u);
+  EXPECT_EQ(outcome.dropped, 0u);
+  const auto session = read_recording(temp / "a.h5");
+  ASSERT_TRUE(session) << session.error().message;
+  EXPECT_EQ(session->readings.size(), outcome.rows);
+}
+
+TEST(Recorder, WritesAllThatWasPushed) {
+  const TempDir temp;
+  Recorder recorder;
+  EXPECT_FALSE(recorder.recording());
+  ASSERT_TRUE(recorder.open({}, info_of_a_session()));  // nothing is asked for
+  EXPECT_FALSE(recorder.recording());
+  ASSERT_TRUE(recorder.open(temp / "a.h5", info_of_a_session()));
+  for (std::uint64_t i = 0; i < 3333; ++i) recorder.push(row(i));
+  const Recorder::Outcome outcome = recorder.finish({std::string(64, 'e'), 5, 0});
+  EXPECT_EQ(outcome.trouble, "");
+  EXPECT_EQ(outcome.rows, 3333u);
+  const auto session = read_recording(temp / "a.h5");
+  ASSERT_TRUE(session) << session.error().message;
+  EXPECT_EQ(session->readings.size(), 3333u);
+  EXPECT_EQ(session->field_hash, std::string(64, 'e'));
+}
+
+TEST(Recording, APlaceThatCannotBeWrittenIsAnError) {
+  const auto made = RecordFile::create("/nowhere/at/all.h5", info_of_a_session());
+  ASSERT_FALSE(made);
+  EXPECT_EQ(made.error().message, "the recording /nowhere/at/all.h5 cannot be made: No such file or directory");
+}
+
+// One sentence each, that names the file and what is wrong with it.
+class WrongFile : public ::testing::Test {
+ protected:
+  void expect(ErrorCode code, const std::string& part, std::string name = "a.h5") {
+    const auto device = make_recorded_device(temp_ / name);
+    ASSERT_FALSE(device) << part;
+    const std::string& message = device.error().message;
+    EXPECT_EQ(device.error().code, code) << message;
+    EXPECT_THAT(message, ::testing::HasSubstr(part));
+    EXPECT_THAT(message, ::testing::HasSubstr((temp_ / name).string()));
+    EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+    std::printf("  %s\n", message.c_str());
+  }
+  // A good recording after Python has done something to it as `f`.
+  void spoil(const std::string& how) {
+    write_rows(temp_ / "a.h5", 600);
+    const auto done = python("import sys, h5py\nf = h5py.File(sys.argv[1], 'r+')\n" + how + "\nf.close()", temp_ / "a.h5");
+    ASSERT_EQ(done.exit_code, 0) << done.err;
+  }
+  TempDir temp_;
+};
+
+TEST_F(WrongFile, IsNotThere) { expect(ErrorCode::not_found, "there is no file", "none.h5"); }
+TEST_F(WrongFile, IsAFolder) {
+  std::filesystem::create_directory(temp_ / "folder");
+  expect(ErrorCode::not_found, "there is no file", "folder");
+}
+TEST_F(WrongFile, IsNoHdf5) {
+  std::ofstream(temp_ / "a.h5") << "time_s,mono_ns\n1,2\n";
+  expect(ErrorCode::invalid_input, "is not an HDF5 file");
+}
+TEST_F(WrongFile, IsOfAnotherProgram) {
+  const auto made = python("import sys, h5py\nf = h5py.File(sys.argv[1], 'w')\nf['drill_force_feedback/wrench'] = [[0.0] * 6]", temp_ / "a.h5");
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  expect(ErrorCode::invalid_input, "no recording of Osteon");
+}
+TEST_F(WrongFile, IsCutOff) {
+  write_rows(temp_ / "a.h5", 600);
+  std::filesystem::resize_file(temp_ / "a.h5", 5000);
+  expect(ErrorCode::invalid_input, "");
+}
+TEST_F(WrongFile, IsOfAnotherVersion) {
+  spoil("f.attrs['version'] = 2");
+  expect(ErrorCode::unsupported, "is of version 2 of the format; this program reads version 1");
+}
+TEST_F(WrongFile, LacksADataset) {
+  spoil("del f['high_frequency_poses/handle_pose/pose']");
+  expect(ErrorCode::invalid_input, "has no dataset \"high_frequency_poses/handle_pose/pose\"");
+}
+TEST_F(WrongFile, LacksAnAttribute) {
+  spoil("del f['metadata'].attrs['device_peak_n']");
+  expect(ErrorCode::invalid_input, "has no attribute \"device_peak_n\"");
+}
+TEST_F(WrongFile, HasADatasetOfAnotherShape) {
+  spoil("del f['data/pedal']\nf['data/pedal'] = [[0.0, 0.0]] * 600");
+  expect(ErrorCode::invalid_input, "\"data/pedal\" has not 1 values in a row");
+}
+TEST_F(WrongFile, HasADatasetThatIsTooShort) {
+  spoil("f['data/buttons'].resize((599,))");
+  expect(ErrorCode::invalid_input, "\"data/buttons\" has fewer rows");
+}
+TEST_F(WrongFile, HasANumberThatIsNone) {
+  spoil("f['high_frequency_poses/handle_pose/pose'][17, 1] = float('nan')");
+  expect(ErrorCode::invalid_input, "row 17 is no reading");
+}
+TEST_F(WrongFile, HasARotationThatIsNone) {
+  spoil("f['high_frequency_poses/handle_pose/pose'][18, 6] = 3.0");
+  expect(ErrorCode::invalid_input, "row 18 is no reading");
+}
+TEST_F(WrongFile, HoldsNoRow) {
+  write_rows(temp_ / "a.h5", 0);
+  expect(ErrorCode::invalid_input, "holds no complete row");
+}
+
+}  // namespace
+}  // namespace osteon::haptic::test
