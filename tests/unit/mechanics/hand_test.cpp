@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/mechanics/spindle.hpp"
-
 namespace osteon {
 namespace {
 
@@ -72,17 +70,6 @@ TEST(Hand, ARigGoesExactlyWhereItIsTold) {
   Hand hand(expert_hand(), Vec3::Zero());
   hand.step({HandMode::rig, {1, 2, 3}, Vec3::UnitX()}, {-1000, 0, 0}, kDt);
   EXPECT_EQ(hand.position_mm(), Vec3(1, 2, 3));
-}
-
-TEST(Spindle, RunsUpInItsTimeAndDroopsUnderLoad) {
-  Spindle spindle;
-  const SpindleParams params{.full_rpm = 1000, .run_up_s = 0.3, .droop_rpm_per_nmm = 0.2};
-  for (int i = 0; i < 150; ++i) spindle.step(params, 1000, 0, kDt);
-  EXPECT_NEAR(spindle.rpm, 500.0, 5.0);
-  for (int i = 0; i < 200; ++i) spindle.step(params, 1000, 0, kDt);
-  EXPECT_EQ(spindle.rpm, 1000.0);
-  spindle.step(params, 1000, 27.0, kDt);
-  EXPECT_NEAR(spindle.rpm, 994.6, 0.01);
 }
 
 }  // namespace
