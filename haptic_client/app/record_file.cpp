@@ -35,18 +35,23 @@ constexpr const char* kReadme =
 constexpr const char* kBone = "bone";
 constexpr const char* kDevice = "device";
 
+// HDF5 would print its own account of what the callers say in a sentence; it does so for each thread.
+void be_quiet() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+
 Hdf5Handle text_type(std::size_t size) {
   Hdf5Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
   H5Tset_size(type.id(), std::max<std::size_t>(size, 1));
-  H5Tset_strpad(type.id(), H5T_STR_NULLPAD);
+  if (size != H5T_VARIABLE) H5Tset_strpad(type.id(), H5T_STR_NULLPAD);
   H5Tset_cset(type.id(), H5T_CSET_UTF8);
   return type;
 }
 
+// As a text of variable length, which Python's readers give as a str.
 bool set_text(hid_t object, const char* name, const std::string& text) {
-  const Hdf5Handle type = text_type(text.size()), space(H5Screate(H5S_SCALAR), H5Sclose);
+  const Hdf5Handle type = text_type(H5T_VARIABLE), space(H5Screate(H5S_SCALAR), H5Sclose);
   const Hdf5Handle attribute(H5Acreate2(object, name, type.id(), space.id(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
-  return attribute.ok() && H5Awrite(attribute.id(), type.id(), text.empty() ? " " : text.c_str()) >= 0;
+  const char* chars = text.c_str();
+  return attribute.ok() && H5Awrite(attribute.id(), type.id(), &chars) >= 0;
 }
 
 bool set_number(hid_t object, const char* name, double value) {
@@ -377,10 +382,9 @@ bool RecordFile::Impl::make_links() {
 }
 
 Result<void> RecordFile::Impl::create() {
-  // HDF5 would print its own account of what the callers say in a sentence, and at the end of the process would try for
-  // ever to close what a full disk keeps open.
+  // At the end of the process HDF5 would try for ever to close what a full disk keeps open.
   H5dont_atexit();
-  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  be_quiet();
   errno = 0;
   const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   H5Pset_libver_bounds(access.id(), H5F_LIBVER_V110, H5F_LIBVER_V110);
@@ -402,6 +406,7 @@ Result<void> RecordFile::Impl::create() {
 }
 
 bool RecordFile::Impl::write_all() {
+  be_quiet();
   errno = 0;
   for (Column<TakeUp>& made : take_ups)
     if (!write_column(made)) return false;

@@ -32,13 +32,17 @@ class Reader {
     const Hdf5Handle attribute = find(group, name);
     if (!attribute.ok()) return {};
     const Hdf5Handle type(H5Aget_type(attribute.id()), H5Tclose);
-    if (H5Tget_class(type.id()) != H5T_STRING || H5Tis_variable_str(type.id()) > 0) {
+    if (H5Tget_class(type.id()) != H5T_STRING || H5Tis_variable_str(type.id()) <= 0) {
       wrong(ErrorCode::invalid_input, name_ + ": the attribute \"" + name + "\" is not a text");
       return {};
     }
-    std::string value(H5Tget_size(type.id()), '\0');
-    if (H5Aread(attribute.id(), type.id(), value.data()) < 0) damaged(name);
-    value.resize(std::char_traits<char>::length(value.c_str()));
+    char* read = nullptr;
+    if (H5Aread(attribute.id(), type.id(), &read) < 0 || !read) {
+      damaged(name);
+      return {};
+    }
+    const std::string value = read;
+    H5free_memory(read);
     return value;
   }
 

@@ -114,12 +114,12 @@ TEST(Replay, MakesTheSameCutsAndForces) {
 TEST(Replay, AnotherRecordingMakesAnotherBone) {
   const osteon::test::TempDir temp;
   const Case bone = block_case();
-  const std::vector<PlanStep> fast{drill(HandKind::rig, {0.1, -0.2, 0})};
-  std::vector<PlanStep> slow = fast;
-  slow[0].beyond_mm = 4;
-  const Session one = record(bone, fast, {}, temp / "a.h5"), other = record(bone, slow, {}, temp / "b.h5");
+  const std::vector<PlanStep> through{drill(HandKind::rig, {0.1, -0.2, 0})};
+  std::vector<PlanStep> half = through;
+  half[0].to_mm = 7;
+  const Session one = record(bone, through, {}, temp / "a.h5"), other = record(bone, half, {}, temp / "b.h5");
   EXPECT_NE(one.field_hash, other.field_hash);
-  EXPECT_EQ(replay(bone, slow, temp / "b.h5").field_hash, other.field_hash);
+  EXPECT_EQ(replay(bone, half, temp / "b.h5").field_hash, other.field_hash);
 }
 
 }  // namespace
