@@ -64,6 +64,9 @@ class TheRules(unittest.TestCase):
         self.assertTrue(self.faults("common/volume/case.hpp", "openvdb/openvdb.h"))
         self.assertTrue(self.faults("viewer_client/render/x.hpp", "vtkActor.h"))
         self.assertTrue(self.faults("server/room/room.cpp", "grpcpp/grpcpp.h"))
+        self.assertTrue(self.faults("haptic_client/app/record_file.hpp", "hdf5.h"))
+        self.assertTrue(self.faults("haptic_client/control/session.cpp", "hdf5.h"))
+        self.assertFalse(self.faults("haptic_client/app/record_file.cpp", "hdf5.h"))
         self.assertFalse(self.faults("common/volume/case.cpp", "openvdb/openvdb.h"))
 
     def test_product_code_does_not_see_tests(self):
