@@ -26,6 +26,8 @@ HEAVY = {
     "VTK": (re.compile(r"^vtk"), ("viewer_client", "common/volume")),
     "gRPC": (re.compile(r"^grpc(pp)?/"), ("common/wire", "*/net")),
     "HDF5": (re.compile(r"^hdf5"), ("haptic_client/app", "haptic_client/device")),
+    "libusb": (re.compile(r"^libusb"), ("haptic_client/device",)),
+    "hidapi": (re.compile(r"^hidapi/"), ("haptic_client/device",)),
     "GDCM": (re.compile(r"^gdcm"), ("common/imaging", "server/import")),
 }
 GENERATED = re.compile(r"\.pb\.h$")

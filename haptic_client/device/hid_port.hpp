@@ -1,0 +1,77 @@
+// HID devices by hidapi: what is there, and one of them with a thread that reads it.
+#pragma once
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "common/core/result.hpp"
+
+namespace osteon::haptic {
+
+struct HidFound {
+  std::string path, product, serial;
+  std::uint16_t vendor = 0, model = 0;         // USB ids
+  std::uint16_t usage_page = 0, usage = 0;     // of the collection: 1/8 a multi-axis controller, 1/4 a joystick
+};
+
+// Any thread.
+[[nodiscard]] std::vector<HidFound> list_hid_devices();
+
+class HidPort {
+ public:
+  // `what` names the device in sentences, e.g. "the SpaceMouse". Error: unavailable.
+  [[nodiscard]] static Result<HidPort> open(const HidFound& found, std::string what);
+  HidPort(HidPort&&) noexcept;
+  HidPort& operator=(HidPort&&) noexcept;
+  ~HidPort();
+
+  // The next report; 0 bytes when there is none within `patience`. Error: unavailable (it went away).
+  [[nodiscard]] Result<std::size_t> read(std::span<std::uint8_t> into, std::chrono::milliseconds patience);
+  // An output report, id first. Error: unavailable.
+  [[nodiscard]] Result<void> write(std::span<const std::uint8_t> report);
+  // How its reports are built; empty where the system does not tell.
+  [[nodiscard]] std::vector<std::uint8_t> descriptor() const;
+
+ private:
+  struct Handle;
+  explicit HidPort(std::unique_ptr<Handle> handle) noexcept;
+  std::unique_ptr<Handle> handle_;
+};
+
+// Reads a port on a thread of its own.
+class HidReader {
+ public:
+  // Called on the reading thread with each report, and with an empty one after each pause without any.
+  using Take = std::function<void(std::span<const std::uint8_t>)>;
+  ~HidReader() { stop(); }
+
+  // `at_end` is called on the reading thread when the device has gone, `before_close` when it is stopped and still there.
+  struct Calls {
+    Take take;
+    std::function<void()> at_end;
+    std::function<void(HidPort&)> before_close;
+  };
+  void start(HidPort port, std::chrono::milliseconds pause, Calls calls);
+  void stop() noexcept;
+  // Why it stopped reading, if it did by itself.
+  [[nodiscard]] Result<void> health() const;
+
+ private:
+  void run(std::chrono::milliseconds pause);
+
+  std::unique_ptr<HidPort> port_;
+  Calls calls_;
+  std::thread thread_;
+  std::atomic<bool> stopping_{false}, ended_{false};
+  mutable std::mutex mutex_;
+  Error why_ended_;
+};
+
+}  // namespace osteon::haptic

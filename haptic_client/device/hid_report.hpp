@@ -1,0 +1,32 @@
+// Where a HID device keeps a value in its reports, as its own report descriptor tells (USB HID 1.11, section 6.2.2).
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace osteon::haptic {
+
+struct HidField {
+  std::uint16_t page = 0, usage = 0;
+  std::uint8_t report = 0;          // its id; 0: the device numbers no reports
+  std::uint32_t bit = 0;            // from the report's first byte, behind the id if there is one
+  std::uint32_t bits = 0;
+  std::int32_t lowest = 0, highest = 0;
+
+  // Of a report as it was read, id included where there is one; empty when it is another report or too short.
+  [[nodiscard]] std::optional<std::int32_t> value(std::span<const std::uint8_t> read) const noexcept;
+  // The same as a part of its range, 0 … 1.
+  [[nodiscard]] std::optional<double> share(std::span<const std::uint8_t> read) const noexcept;
+};
+
+// Every variable input field of a descriptor; none of what is damaged or not understood.
+[[nodiscard]] std::vector<HidField> hid_input_fields(std::span<const std::uint8_t> descriptor);
+
+// The field of the first of these usages that the device has, e.g. of an axis.
+struct HidUsage {
+  std::uint16_t page, usage;
+};
+[[nodiscard]] std::optional<HidField> find_field(std::span<const HidField> fields, std::span<const HidUsage> usages);
+
+}  // namespace osteon::haptic

@@ -1,0 +1,120 @@
+#include "tests/support/usb/mock_node.hpp"
+
+#include <fcntl.h>
+#include <pty.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+
+namespace osteon::test {
+namespace {
+
+[[noreturn]] void give_up(const char* what) {
+  std::perror(what);
+  std::exit(2);
+}
+
+}  // namespace
+
+MockNode::MockNode(UMockdevTestbed* testbed, const std::string& path) : testbed_(testbed), path_(path), base_(umockdev_ioctl_base_new()) {
+  char name[128];
+  termios raw{};
+  cfmakeraw(&raw);
+  if (openpty(&master_, &slave_, name, &raw, nullptr) != 0) give_up("openpty");
+  for (const int fd : {master_, slave_}) fcntl(fd, F_SETFD, FD_CLOEXEC);
+  fcntl(slave_, F_SETFL, O_NONBLOCK);
+  let_write(false);
+
+  gchar* root = umockdev_testbed_get_root_dir(testbed);
+  node_ = std::string(root) + path;
+  g_free(root);
+  std::filesystem::remove(node_);
+  std::filesystem::create_symlink(name, node_);
+
+  g_signal_connect(base_, "handle-ioctl", G_CALLBACK(&MockNode::handle_ioctl), this);
+  g_signal_connect(base_, "handle-read", G_CALLBACK(&MockNode::handle_read), this);
+  g_signal_connect(base_, "handle-write", G_CALLBACK(&MockNode::handle_write), this);
+  GError* error = nullptr;
+  if (!umockdev_testbed_attach_ioctl(testbed, path.c_str(), base_, &error)) {
+    std::fprintf(stderr, "attaching to %s: %s\n", path.c_str(), error->message);
+    std::exit(2);
+  }
+}
+
+MockNode::~MockNode() {
+  umockdev_testbed_detach_ioctl(testbed_, path_.c_str(), nullptr);
+  g_signal_handlers_disconnect_by_data(base_, this);
+  // Clients that are still there are told that the device is gone.
+  const auto gone = +[](UMockdevIoctlBase*, Call* call, gpointer) -> gboolean {
+    complete(call, -1, ENODEV);
+    return TRUE;
+  };
+  for (const char* signal : {"handle-ioctl", "handle-read", "handle-write"}) g_signal_connect(base_, signal, G_CALLBACK(gone), nullptr);
+  // The handler stays as long as clients use it: it is left to the process' end.
+  close(master_);
+  close(slave_);
+  std::error_code ignored;
+  std::filesystem::remove(node_, ignored);
+}
+
+void MockNode::let_write(bool ready) { tcflow(slave_, ready ? TCOON : TCOOFF); }
+
+void MockNode::add_readable() {
+  if (write(master_, "x", 1) != 1) give_up("pseudo terminal");
+}
+
+void MockNode::take_readable() {
+  char byte;
+  if (read(slave_, &byte, 1) != 1 && errno != EAGAIN) give_up("pseudo terminal");
+}
+
+gboolean MockNode::handle_ioctl(UMockdevIoctlBase*, Call* call, gpointer self) {
+  auto* node = static_cast<MockNode*>(self);
+  if (!node->on_ioctl) return FALSE;
+  node->on_ioctl(call);
+  return TRUE;
+}
+
+gboolean MockNode::handle_read(UMockdevIoctlBase*, Call* call, gpointer self) {
+  auto* node = static_cast<MockNode*>(self);
+  if (!node->on_read) return FALSE;
+  node->on_read(call);
+  return TRUE;
+}
+
+gboolean MockNode::handle_write(UMockdevIoctlBase*, Call* call, gpointer self) {
+  auto* node = static_cast<MockNode*>(self);
+  if (!node->on_write) return FALSE;
+  node->on_write(call);
+  return TRUE;
+}
+
+void complete(Call* call, long result, int error) {
+  g_object_ref(call);
+  umockdev_ioctl_client_complete(call, result, error);
+  g_object_unref(call);
+}
+
+void unplug(UMockdevTestbed* testbed, const std::string& path) {
+  namespace fs = std::filesystem;
+  umockdev_testbed_remove_device(testbed, path.c_str());
+  gchar* folder = umockdev_testbed_get_root_dir(testbed);
+  const fs::path root = folder;
+  g_free(folder);
+  std::error_code ignored;
+  fs::remove_all(root / path.substr(1), ignored);
+  // What pointed to it, or to a device below it, points nowhere now.
+  std::vector<fs::path> dangling;
+  for (const char* place : {"sys/bus", "sys/class", "sys/dev"}) {
+    if (!fs::exists(root / place)) continue;
+    for (const auto& entry : fs::recursive_directory_iterator(root / place))
+      if (entry.is_symlink() && !fs::exists(entry.path(), ignored)) dangling.push_back(entry.path());
+  }
+  for (const fs::path& link : dangling) fs::remove(link, ignored);
+}
+
+}  // namespace osteon::test
