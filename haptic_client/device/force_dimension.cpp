@@ -3,6 +3,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -31,11 +32,9 @@ struct Library {
 
 Result<const Library*> load(const std::filesystem::path& file) {
   static std::mutex mutex;
-  static std::optional<Library> loaded;
-  static std::filesystem::path loaded_file;
+  static std::map<std::filesystem::path, Library> loaded;  // nodes stay where they are
   const std::lock_guard lock(mutex);
-  if (loaded && loaded_file == file) return &*loaded;
-  if (loaded) return failure(ErrorCode::exists, "libdhd is already loaded from " + loaded->library.name() + "; start the program again to use another");
+  if (const auto known = loaded.find(file); known != loaded.end()) return &known->second;
   Result<DynamicLibrary> library = DynamicLibrary::load({"Force Dimension's libdhd", file, kNames, kRemedy});
   if (!library) return tl::unexpected(library.error());
   Library result{*library, {}};
@@ -63,9 +62,7 @@ Result<const Library*> load(const std::filesystem::path& file) {
   need("dhdErrorGetLast", c.last_error);
   need("dhdErrorGetStr", c.error_text);
   if (missing) return failure(ErrorCode::unsupported, library->name() + " is not a Force Dimension library of version 3: it has no " + missing + "; " + kRemedy);
-  loaded = result;
-  loaded_file = file;
-  return &*loaded;
+  return &(loaded[file] = result);
 }
 
 // The library does not tell a device's limits; these are the vendor's figures for its kinds, as published programs use
@@ -202,9 +199,9 @@ class ForceDimension final : public HapticDevice {
   }
 
   void cycle_thread() {
-    try_realtime(kPriority);
     TickStats stats;
     const bool paced = options_.period.count() > 0;
+    if (paced) try_realtime(kPriority);  // one that never sleeps would take the core for itself
     PeriodicTimer timer(paced ? std::chrono::nanoseconds(options_.period) : 1ms);
     int bad = 0;
     for (std::uint64_t cycle = 0; !stopping_; ++cycle) {

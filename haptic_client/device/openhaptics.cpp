@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -34,11 +35,9 @@ struct Library {
 // Loaded once for the process and kept: the vendor's library must not be unloaded and loaded again.
 Result<const Library*> load(const std::filesystem::path& file) {
   static std::mutex mutex;
-  static std::optional<Library> loaded;
-  static std::filesystem::path loaded_file;
+  static std::map<std::filesystem::path, Library> loaded;  // nodes stay where they are
   const std::lock_guard lock(mutex);
-  if (loaded && loaded_file == file) return &*loaded;
-  if (loaded) return failure(ErrorCode::exists, "OpenHaptics is already loaded from " + loaded->library.name() + "; start the program again to use another");
+  if (const auto known = loaded.find(file); known != loaded.end()) return &known->second;
   Result<DynamicLibrary> library = DynamicLibrary::load({"OpenHaptics (libHD.so)", file, kNames, kRemedy});
   if (!library) return tl::unexpected(library.error());
   Library result{*library, {}};
@@ -68,9 +67,7 @@ Result<const Library*> load(const std::filesystem::path& file) {
   need("hdUnschedule", c.unschedule);
   if (missing)
     return failure(ErrorCode::unsupported, library->name() + " is not OpenHaptics' libHD: it has no " + missing + "; " + kRemedy);
-  loaded = result;
-  loaded_file = file;
-  return &*loaded;
+  return &(loaded[file] = result);
 }
 
 // The library's errors, newest first; the first that is not kNoError is the one to tell.

@@ -1,0 +1,109 @@
+#include "haptic_client/device/device_list.hpp"
+
+#include <array>
+#include <charconv>
+
+#include "haptic_client/device/falcon.hpp"
+#include "haptic_client/device/foot_pedal.hpp"
+#include "haptic_client/device/force_dimension.hpp"
+#include "haptic_client/device/openhaptics.hpp"
+#include "haptic_client/device/recorded_device.hpp"
+#include "haptic_client/device/simulated_device.hpp"
+#include "haptic_client/device/space_mouse.hpp"
+
+namespace osteon::haptic {
+namespace {
+
+using Made = Result<std::unique_ptr<HapticDevice>>;
+
+struct Kind {
+  std::string_view name, what;
+  std::string_view argument;  // what may follow a colon; empty: nothing
+  Made (*make)(const std::string& argument, const DeviceOptions& options);
+  DeviceFinding (*look)(const DeviceOptions& options);
+};
+
+Made make_numbered_force_dimension(const std::string& argument, const DeviceOptions& options) {
+  int number = 0;
+  const auto [end, wrong] = std::from_chars(argument.data(), argument.data() + argument.size(), number);
+  if (!argument.empty() && (wrong != std::errc{} || end != argument.data() + argument.size() || number < 0 || number > 15))
+    return failure(ErrorCode::invalid_input, "--device force-dimension:" + argument + ": the number of the device must be from 0 to 15");
+  return make_force_dimension({.library = options.libdhd, .number = number});
+}
+
+Made make_recorded(const std::string& argument, const DeviceOptions&) {
+  if (argument.empty()) return failure(ErrorCode::invalid_input, "--device recorded needs a file: recorded:FILE");
+  Result<std::unique_ptr<RecordedDevice>> device = make_recorded_device(argument);
+  if (!device) return tl::unexpected(device.error());
+  return Made(std::move(*device));
+}
+
+constexpr std::array<Kind, 7> kKinds{{
+    {"phantom", "PHANToM Omni, Touch, Desktop, Premium (OpenHaptics)", "NAME of the vendor's setup",
+     [](const std::string& argument, const DeviceOptions& options) -> Made { return make_openhaptics({options.libhd, argument}); },
+     [](const DeviceOptions& options) { return look_for_openhaptics({options.libhd, {}}); }},
+    {"force-dimension", "omega, sigma, delta (libdhd)", "NUMBER", make_numbered_force_dimension,
+     [](const DeviceOptions& options) { return look_for_force_dimension({.library = options.libdhd}); }},
+    {"falcon", "Novint Falcon (USB)", "",
+     [](const std::string&, const DeviceOptions& options) -> Made { return make_falcon({.firmware = options.falcon_firmware}); },
+     [](const DeviceOptions&) { return look_for_falcon(); }},
+    {"spacemouse", "SpaceMouse: six degrees of freedom without force, or the rotation for another", "",
+     [](const std::string&, const DeviceOptions&) -> Made { return make_space_mouse(); }, [](const DeviceOptions&) { return look_for_space_mouse(); }},
+    {"pedal", "foot pedal, a switch for the spindle", "", [](const std::string&, const DeviceOptions&) -> Made { return make_foot_pedal(); },
+     [](const DeviceOptions&) { return look_for_foot_pedals(); }},
+    {"pedal-axis", "a joystick's axis as a proportional pedal for the spindle", "",
+     [](const std::string&, const DeviceOptions&) -> Made {
+       FootPedalOptions pedal;
+       pedal.proportional = true;
+       return make_foot_pedal(pedal);
+     },
+     nullptr},
+    {"recorded", "a recording, played again", "FILE", make_recorded, nullptr},
+}};
+
+std::string all_names() {
+  std::string names = "simulated, simulated-3.3N";
+  for (const Kind& kind : kKinds) names += ", " + std::string(kind.name) + (kind.argument.empty() ? "" : "[:" + std::string(kind.argument) + ']');
+  return names;
+}
+
+Made make_one(std::string_view text, const DeviceOptions& options) {
+  const std::size_t colon = text.find(':');
+  const std::string_view name = text.substr(0, colon);
+  const std::string argument(colon == std::string_view::npos ? std::string_view{} : text.substr(colon + 1));
+  for (const Kind& kind : kKinds) {
+    if (kind.name != name) continue;
+    if (kind.argument.empty() && colon != std::string_view::npos)
+      return failure(ErrorCode::invalid_input, "--device " + std::string(text) + ": nothing may follow " + std::string(name) + "; leave out the colon");
+    return kind.make(argument, options);
+  }
+  return failure(ErrorCode::not_found, "there is no device \"" + std::string(name) + "\"; choose among " + all_names() + ", joined by \"+\"");
+}
+
+}  // namespace
+
+Result<std::unique_ptr<CombinedDevice>> make_devices(std::string_view names, const DeviceOptions& options) {
+  std::vector<std::unique_ptr<HapticDevice>> parts;
+  // A recording's path may hold any letter, so it stands alone.
+  const bool alone = names.starts_with("recorded:");
+  while (true) {
+    const std::size_t plus = alone ? std::string_view::npos : names.find('+');
+    Made part = make_one(names.substr(0, plus), options);
+    if (!part) return tl::unexpected(part.error());
+    parts.push_back(std::move(*part));
+    if (plus == std::string_view::npos) break;
+    names.remove_prefix(plus + 1);
+  }
+  return CombinedDevice::make(std::move(parts));
+}
+
+std::vector<DeviceLine> look_for_devices(const DeviceOptions& options) {
+  std::vector<DeviceLine> lines;
+  lines.push_back({"simulated", "a hand of our own making, as strong as the drilling of bone; needs a plan", {{"always there"}, ""}});
+  lines.push_back({"simulated-3.3N", "the same at a desktop device's force", {{"always there"}, ""}});
+  for (const Kind& kind : kKinds)
+    if (kind.look) lines.push_back({kind.name, kind.what, kind.look(options)});
+  return lines;
+}
+
+}  // namespace osteon::haptic

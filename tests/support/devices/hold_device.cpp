@@ -1,0 +1,44 @@
+// A program that holds a haptic device with force on it and then ends in the way it is told: for tests of what becomes of
+// the motors. hold_device phantom|force-dimension LIBRARY wait|exit|abort|crash|check
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <thread>
+
+#include "common/core/check.hpp"
+#include "common/runtime/stop_signal.hpp"
+#include "haptic_client/device/connection.hpp"
+#include "haptic_client/device/force_dimension.hpp"
+#include "haptic_client/device/openhaptics.hpp"
+
+int main(int argc, char** argv) {
+  using namespace osteon;
+  using namespace osteon::haptic;
+  using namespace std::chrono_literals;
+  if (argc != 4) return 2;
+  const std::string kind = argv[1], end = argv[3];
+  std::unique_ptr<HapticDevice> device;
+  if (kind == "phantom") device = make_openhaptics({argv[2], {}});
+  else device = make_force_dimension({.library = argv[2]});
+  const StopSignal stop;
+  DeviceConnection connection(*device, [](DeviceEvent, std::string_view, const std::string&) {});
+  if (const Result<void> started = connection.start(); !started) {
+    std::fprintf(stderr, "%s\n", started.error().message.c_str());
+    return 1;
+  }
+  for (int i = 0; !stop.requested(); ++i) {
+    (void)device->read();
+    device->write({Vec3(1.0, 0.0, 0.0), Vec3::Zero()});
+    if (i == 300) std::puts("holding"), std::fflush(stdout);
+    if (i > 300) {
+      if (end == "exit") std::exit(0);
+      if (end == "abort") std::abort();
+      if (end == "check") OSTEON_CHECK(kind.empty());
+      if (end == "crash") std::raise(SIGSEGV);
+    }
+    std::this_thread::sleep_for(1ms);
+  }
+  return 0;
+}
