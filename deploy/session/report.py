@@ -169,7 +169,9 @@ Picture: {text(numbers['picture'])}{drawn_by}.</p>
 <h2>Everything else</h2>
 <p>Field hash of the server: <code>{text((agreement['field_hash_server'] or '–')[:16])}…</code>, of the haptic client:
 <code>{text((agreement['field_hash_haptic'] or '–')[:16])}…</code>. The complete numbers are in
-<a href="session.json">session.json</a>; the 1 kHz record is <a href="session.csv">session.csv</a>.</p>
+<a href="session.json">session.json</a>; the 1 kHz record is
+<a href="session.h5">session.h5</a> (HDF5, which <code>--device recorded:session.h5</code> plays again), and as a shorter
+table <a href="session.csv">session.csv</a>.</p>
 {program_tables(numbers)}
 <details><summary>What the surgeon was told to do</summary><pre>{text(json.dumps(numbers['plan'], indent=2))}</pre></details>
 </main></body></html>

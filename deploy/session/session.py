@@ -126,7 +126,7 @@ class Session:
         cache.mkdir(parents=True, exist_ok=True)
         haptic = self.household.start("osteon-haptic", [
             self.programs / "osteon-haptic", "--server", address, "--plan", plan_file, "--device", self.device,
-            "--session-log", self.out / "session.csv", "--cut-log", self.out / "cuts.csv",
+            "--session-log", self.out / "session.csv", "--record", self.out / "session.h5", "--cut-log", self.out / "cuts.csv",
             "--summary", self.out / "haptic.json", "--cache", cache, "--status"])
         haptic.may_end = True
         began = time.monotonic()
