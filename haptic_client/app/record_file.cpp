@@ -232,6 +232,7 @@ struct RecordFile::Impl {
   std::size_t waiting = 0;
   std::uint64_t rows = 0, seen = 0;
   double epoch_minus_mono_s = 0;
+  std::uint64_t keep_free_bytes = 0;
 
   Result<void> create();
   void make_columns();
@@ -423,10 +424,11 @@ RecordFile::RecordFile(RecordFile&&) noexcept = default;
 RecordFile& RecordFile::operator=(RecordFile&&) noexcept = default;
 std::uint64_t RecordFile::rows_written() const { return impl_->rows; }
 
-Result<RecordFile> RecordFile::create(const std::filesystem::path& file, const RecordingInfo& info) {
+Result<RecordFile> RecordFile::create(const std::filesystem::path& file, const RecordingInfo& info, std::uint64_t keep_free_bytes) {
   auto impl = std::make_unique<Impl>();
   impl->path = file;
   impl->info = info;
+  impl->keep_free_bytes = keep_free_bytes;
   if (Result<void> made = impl->create(); !made) return tl::unexpected(made.error());
   return RecordFile(std::move(impl));
 }
@@ -445,7 +447,7 @@ Result<void> RecordFile::append(std::span<const TickRow> rows) {
     if (++impl.waiting < kChunkRows) continue;
     // Stopped in time, the file can still be closed as it should be, and others have a little left.
     struct statvfs disk {};
-    if (statvfs(impl.path.c_str(), &disk) == 0 && static_cast<std::uint64_t>(disk.f_bavail) * disk.f_frsize < kKeepFree_bytes)
+    if (statvfs(impl.path.c_str(), &disk) == 0 && static_cast<std::uint64_t>(disk.f_bavail) * disk.f_frsize < impl.keep_free_bytes)
       return failure(ErrorCode::internal, "the recording " + impl.path.string() + " ends here: the disk is all but full");
     if (!impl.write_all()) return impl.failed("continued");
   }

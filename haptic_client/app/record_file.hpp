@@ -43,7 +43,8 @@ class RecordFile {
   static constexpr std::uint64_t kKeepFree_bytes = 16u << 20;  // of the disk; a recording ends before it fills the last of it
 
   // Begins a recording; what was in the file is gone. Error internal: it cannot be made, and why.
-  [[nodiscard]] static Result<RecordFile> create(const std::filesystem::path& file, const RecordingInfo& info);
+  [[nodiscard]] static Result<RecordFile> create(const std::filesystem::path& file, const RecordingInfo& info,
+                                                 std::uint64_t keep_free_bytes = kKeepFree_bytes);
   ~RecordFile();  // without finish(): what was written stays, and whole chunks of it can be read
   RecordFile(RecordFile&&) noexcept;
   RecordFile& operator=(RecordFile&&) noexcept;

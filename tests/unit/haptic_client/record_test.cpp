@@ -340,6 +340,26 @@ TEST(Recording, AFullDiskIsSaidInASentenceAndLeavesWhatWasWritten) {
   }
 }
 
+// It stops before the disk is full, with a file that is closed as it should be: any reader opens it.
+TEST(Recording, LeavesALittleOfTheDisk) {
+  const TempDir temp;
+  {
+    Result<RecordFile> recording = RecordFile::create(temp / "a.h5", info_of_a_session(), std::uint64_t{1} << 60);
+    ASSERT_TRUE(recording) << recording.error().message;
+    Result<void> appended;
+    std::uint64_t i = 0;
+    for (; appended && i < 2000; ++i) {
+      const TickRow one = row(i);
+      appended = recording->append({&one, 1});
+    }
+    ASSERT_FALSE(appended);
+    EXPECT_EQ(i, RecordFile::kChunkRows);
+    EXPECT_EQ(appended.error().message, "the recording " + (temp / "a.h5").string() + " ends here: the disk is all but full");
+  }
+  const auto read = python("import sys, h5py\nf = h5py.File(sys.argv[1], 'r')\nassert len(f['data/time']) == 0 and f['metadata/finished'][()] == 0", temp / "a.h5");
+  EXPECT_EQ(read.exit_code, 0) << read.err;
+}
+
 // The recorder's thread meets the full disk; who pushes rows never hears of it.
 TEST(Recorder, EndsTheRecordingAndNothingElse) {
   const TempDir temp;
