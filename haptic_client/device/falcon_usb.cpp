@@ -165,12 +165,9 @@ struct FalconUsb::Wire {
     return have;
   }
 
-  // A failed transfer now and then is the cable's; several in a row, or the device gone, are told.
+  // A failed transfer now and then is the cable's; several without a frame in between, or the device gone, are told.
   Result<void> check(const std::string& doing, int code) {
-    if (code == 0) {
-      failures = 0;
-      return {};
-    }
+    if (code == 0) return {};
     if (code == LIBUSB_ERROR_PIPE) {
       libusb_clear_halt(handle, kOut);
       libusb_clear_halt(handle, kIn);
@@ -316,6 +313,7 @@ Result<std::optional<FalconState>> FalconUsb::exchange(const FalconCommand& comm
       if (wire.in.raw->status == LIBUSB_TRANSFER_COMPLETED)
         if (const auto state = wire.reader.take(without_modem_status(std::span(wire.in.bytes).first(size)))) newest = state;
     }
+    if (newest) wire.failures = 0;
     if (newest && !wire.out.pending) return newest;
   }
 }

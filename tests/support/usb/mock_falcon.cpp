@@ -58,7 +58,6 @@ MockFalcon::MockFalcon(UMockdevTestbed* testbed, bool loaded) : model(loaded), t
 
 MockFalcon::~MockFalcon() {
   g_source_remove(timer_);
-  umockdev_testbed_uevent(testbed_, kSysPath, "remove");
   node_.reset();
   unplug(testbed_, kSysPath);
 }
@@ -179,6 +178,7 @@ void MockFalcon::discard(Call* call) {
 }
 
 gboolean MockFalcon::latency_passed(gpointer self) {
+  const std::lock_guard lock(node_lock());
   static_cast<MockFalcon*>(self)->answer_reads(true);
   return G_SOURCE_CONTINUE;
 }

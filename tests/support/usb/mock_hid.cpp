@@ -34,15 +34,15 @@ MockHid::MockHid(UMockdevTestbed* testbed, const HidKind& kind) : testbed_(testb
   all += "P: " + interface + "/" + id + "\nE: SUBSYSTEM=hid\n";
   all += text("E: HID_ID=0003:%08X:%08X\nE: HID_NAME=%s\nE: HID_UNIQ=\n", kind.vendor, kind.model, kind.name.c_str());
   all += "H: report_descriptor=" + hex + "\n\n";
-  all += "P: " + interface + "/" + id + text("/hidraw/hidraw%d\nN: hidraw%d\n", kind.port, kind.port);
-  all += text("E: SUBSYSTEM=hidraw\nE: DEVNAME=/dev/hidraw%d\nE: MAJOR=244\nE: MINOR=%d\nL: device=../../../", kind.port, kind.port) + id + "\n\n";
+  all += "P: " + interface + "/" + id + text("/hidraw/hidraw%d\nN: hidraw%d\n", kind.node, kind.node);
+  all += text("E: SUBSYSTEM=hidraw\nE: DEVNAME=/dev/hidraw%d\nE: MAJOR=244\nE: MINOR=%d\nL: device=../../../", kind.node, kind.node) + id + "\n\n";
   usb_path_ = "/sys" + usb;
   GError* error = nullptr;
   if (!umockdev_testbed_add_from_string(testbed, all.c_str(), &error)) {
     std::fprintf(stderr, "adding %s: %s\n", kind.name.c_str(), error->message);
     std::exit(2);
   }
-  node_ = std::make_unique<MockNode>(testbed, text("/dev/hidraw%d", kind.port));
+  node_ = std::make_unique<MockNode>(testbed, text("/dev/hidraw%d", kind.node));
   node_->let_write(true);
   node_->on_ioctl = [this](Call* call) { ioctl(call); };
   node_->on_read = [this](Call* call) { read(call); };

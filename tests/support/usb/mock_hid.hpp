@@ -14,7 +14,8 @@ struct HidKind {
   std::uint16_t vendor = 0, model = 0;
   std::string name;
   std::vector<std::uint8_t> descriptor;
-  int port = 0;  // where it is plugged in, which is also the number of its node
+  int port = 0;  // where it is plugged in
+  int node = 0;  // N of /dev/hidrawN; a testbed takes each but once
 };
 
 class MockHid {

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <set>
 
 namespace osteon::test {
 namespace {
@@ -18,9 +19,33 @@ namespace {
   std::exit(2);
 }
 
+// A call may be on its way in while its node goes.
+std::set<void*>& nodes() {
+  static std::set<void*> all;
+  return all;
+}
+
+gboolean answer(std::function<void(Call*)> MockNode::*how, Call* call, gpointer self) {
+  const std::lock_guard lock(node_lock());
+  if (!nodes().contains(self)) {
+    complete(call, -1, ENODEV);
+    return TRUE;
+  }
+  const auto& call_it = static_cast<MockNode*>(self)->*how;
+  if (!call_it) return FALSE;
+  call_it(call);
+  return TRUE;
+}
+
 }  // namespace
 
+std::recursive_mutex& node_lock() {
+  static std::recursive_mutex mutex;
+  return mutex;
+}
+
 MockNode::MockNode(UMockdevTestbed* testbed, const std::string& path) : testbed_(testbed), path_(path), base_(umockdev_ioctl_base_new()) {
+  nodes().insert(this);
   char name[128];
   termios raw{};
   cfmakeraw(&raw);
@@ -30,10 +55,10 @@ MockNode::MockNode(UMockdevTestbed* testbed, const std::string& path) : testbed_
   let_write(false);
 
   gchar* root = umockdev_testbed_get_root_dir(testbed);
-  node_ = std::string(root) + path;
+  const std::filesystem::path node = std::string(root) + path;
   g_free(root);
-  std::filesystem::remove(node_);
-  std::filesystem::create_symlink(name, node_);
+  std::filesystem::remove(node);
+  std::filesystem::create_symlink(name, node);
 
   g_signal_connect(base_, "handle-ioctl", G_CALLBACK(&MockNode::handle_ioctl), this);
   g_signal_connect(base_, "handle-read", G_CALLBACK(&MockNode::handle_read), this);
@@ -46,6 +71,7 @@ MockNode::MockNode(UMockdevTestbed* testbed, const std::string& path) : testbed_
 }
 
 MockNode::~MockNode() {
+  nodes().erase(this);
   umockdev_testbed_detach_ioctl(testbed_, path_.c_str(), nullptr);
   g_signal_handlers_disconnect_by_data(base_, this);
   // Clients that are still there are told that the device is gone.
@@ -57,8 +83,6 @@ MockNode::~MockNode() {
   // The handler stays as long as clients use it: it is left to the process' end.
   close(master_);
   close(slave_);
-  std::error_code ignored;
-  std::filesystem::remove(node_, ignored);
 }
 
 void MockNode::let_write(bool ready) { tcflow(slave_, ready ? TCOON : TCOOFF); }
@@ -72,26 +96,9 @@ void MockNode::take_readable() {
   if (read(slave_, &byte, 1) != 1 && errno != EAGAIN) give_up("pseudo terminal");
 }
 
-gboolean MockNode::handle_ioctl(UMockdevIoctlBase*, Call* call, gpointer self) {
-  auto* node = static_cast<MockNode*>(self);
-  if (!node->on_ioctl) return FALSE;
-  node->on_ioctl(call);
-  return TRUE;
-}
-
-gboolean MockNode::handle_read(UMockdevIoctlBase*, Call* call, gpointer self) {
-  auto* node = static_cast<MockNode*>(self);
-  if (!node->on_read) return FALSE;
-  node->on_read(call);
-  return TRUE;
-}
-
-gboolean MockNode::handle_write(UMockdevIoctlBase*, Call* call, gpointer self) {
-  auto* node = static_cast<MockNode*>(self);
-  if (!node->on_write) return FALSE;
-  node->on_write(call);
-  return TRUE;
-}
+gboolean MockNode::handle_ioctl(UMockdevIoctlBase*, Call* call, gpointer self) { return answer(&MockNode::on_ioctl, call, self); }
+gboolean MockNode::handle_read(UMockdevIoctlBase*, Call* call, gpointer self) { return answer(&MockNode::on_read, call, self); }
+gboolean MockNode::handle_write(UMockdevIoctlBase*, Call* call, gpointer self) { return answer(&MockNode::on_write, call, self); }
 
 void complete(Call* call, long result, int error) {
   g_object_ref(call);

@@ -1,18 +1,23 @@
 // A device node that a program under libumockdev-preload opens: a pseudo terminal, so that its poll() sleeps until we let it
-// go on, and every ioctl, read and write of it answered here. Single-threaded, on GLib's main loop.
+// go on, and every ioctl, read and write of it answered here. They come on a thread of umockdev's own: whoever else touches
+// a node, or what its answers use, holds the lock of all nodes.
 #pragma once
 #include <umockdev.h>
 
 #include <cstdint>
 #include <functional>
+#include <mutex>
 #include <span>
 #include <string>
 #include <vector>
 
 namespace osteon::test {
 
-// Reads and writes of 64-bit client pointers inside a piece of its memory.
+// One ioctl, read or write of the client, until it is completed.
 using Call = UMockdevIoctlClient;
+
+// The lock of all nodes; their answers are called with it.
+[[nodiscard]] std::recursive_mutex& node_lock();
 
 class MockNode {
  public:
@@ -36,7 +41,7 @@ class MockNode {
   static gboolean handle_write(UMockdevIoctlBase*, Call* call, gpointer self);
 
   UMockdevTestbed* testbed_;
-  std::string path_, node_;
+  std::string path_;
   UMockdevIoctlBase* base_;
   int master_ = -1, slave_ = -1;
 };

@@ -94,6 +94,7 @@ class Host {
       kind.vendor = static_cast<std::uint16_t>(vendor);
       kind.model = static_cast<std::uint16_t>(model);
     }
+    kind.node = nodes_++;
     hids_.erase(device);
     hids_.emplace(device, std::make_unique<MockHid>(testbed_, kind));
     return "ok";
@@ -138,6 +139,7 @@ class Host {
   UMockdevTestbed* testbed_;
   std::unique_ptr<MockFalcon> falcon_;
   std::map<std::string, std::unique_ptr<MockHid>> hids_;
+  int nodes_ = 0;
 };
 
 struct Session {
@@ -154,7 +156,10 @@ gboolean heard(GIOChannel* input, GIOCondition, gpointer data) {
     g_main_loop_quit(session->loop);
     return G_SOURCE_REMOVE;
   }
-  std::cout << session->host.answer(std::string(line, end)) << std::endl;
+  {
+    const std::lock_guard lock(node_lock());
+    std::cout << session->host.answer(std::string(line, end)) << std::endl;
+  }
   g_free(line);
   return G_SOURCE_CONTINUE;
 }

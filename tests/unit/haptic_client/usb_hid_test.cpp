@@ -46,11 +46,12 @@ TEST_F(HidOnUsb, EveryKnownSpaceMouseIsFound) {
   const char* const kIds[] = {"046d c603", "046d c605", "046d c606", "046d c621", "046d c623", "046d c625", "046d c626", "046d c627",
                               "046d c628", "046d c629", "046d c62b", "046d c640", "256f c62e", "256f c62f", "256f c631", "256f c632",
                               "256f c633", "256f c635", "256f c636", "256f c638", "256f c63a", "256f c652"};
+  int round = 0;
   for (const char* id : kIds) {
     ASSERT_EQ(usb_.command(std::string("plug spacemouse ") + id), "ok");
     const DeviceFinding finding = look_for_space_mouse();
     ASSERT_EQ(finding.found.size(), 1u) << id;
-    EXPECT_EQ(finding.found[0], "SpaceMouse Compact, /dev/hidraw4");
+    EXPECT_EQ(finding.found[0], "SpaceMouse Compact, /dev/hidraw" + std::to_string(round++));
     usb_.command("unplug spacemouse");
   }
   usb_.command("plug spacemouse 046d c52b");  // a receiver of mice
@@ -117,7 +118,7 @@ TEST_F(HidOnUsb, TheCameraReadsTheCapItself) {
 
 TEST_F(HidOnUsb, ASwitchTurnsTheSpindle) {
   usb_.command("plug switch");
-  ASSERT_EQ(look_for_foot_pedals().found, std::vector<std::string>{"VEC Footpedal (foot pedal), /dev/hidraw6"});
+  ASSERT_EQ(look_for_foot_pedals().found, std::vector<std::string>{"VEC Footpedal (foot pedal), /dev/hidraw0"});
   const auto pedal = make_foot_pedal({.switches = 2});
   ASSERT_EQ(why(pedal->open()), "");
   EXPECT_TRUE(pedal->info().pedals);
@@ -130,7 +131,7 @@ TEST_F(HidOnUsb, ASwitchTurnsTheSpindle) {
 
 TEST_F(HidOnUsb, AJoysticksAxisTurnsItAsFastAsItIsDown) {
   usb_.command("plug joystick");
-  ASSERT_EQ(look_for_foot_pedals().found, std::vector<std::string>{"Emulated Pedals (joystick, for pedal-axis), /dev/hidraw7"});
+  ASSERT_EQ(look_for_foot_pedals().found, std::vector<std::string>{"Emulated Pedals (joystick, for pedal-axis), /dev/hidraw0"});
   const auto pedal = make_foot_pedal({.proportional = true, .axis = {.play = 0.0}});
   ASSERT_EQ(why(pedal->open()), "");
   usb_.report("joystick", {0, 0, 0xff, 0x03});  // down already
