@@ -63,26 +63,28 @@ int main(int argc, char** argv) {
   Counted counted;
   std::uint64_t frames = 0, bad = 0, with_force = 0, samples = 0;
   double seconds = 0.0;
+  double angle = 0.0;
+  const auto go_round = [&] {
+    angle += 0.1;
+    usb.command(encoders_of({kReach_m * std::cos(angle), kReach_m * std::sin(angle), kFalconOriginZ_m}));
+  };
   for (int round = 0; round <= unplugs; ++round) {
     usb.command("plug falcon loaded");
+    go_round();
     if (const Result<void> opened = falcon->open(); !opened) return fail(opened.error().message);
     if (!until([&] { return falcon->read().usable(); })) return fail("it does not become ready");
     if (usb.falcon_told().with_force > 0) ++counted.force_after_loss;
     const auto begun = Clock::now();
     const std::uint64_t first = falcon->read().sample, wanted = cycles / static_cast<std::uint64_t>(unplugs + 1);
     // The haptic thread: reads and writes a thousand times a second. The grip goes round meanwhile.
-    double angle = 0.0;
     std::uint64_t last = first;
     while (last < first + wanted) {
-      if (counted.reads % 200 == 0) {
-        angle += 0.1;
-        usb.command(encoders_of({kReach_m * std::cos(angle), kReach_m * std::sin(angle), kFalconOriginZ_m}));
-      }
+      if (counted.reads % 200 == 0) go_round();
       const DeviceReading reading = falcon->read();
       ++counted.reads;
       if (reading.usable()) ++counted.usable;
       const double radius = std::hypot(reading.pose_device_tool.position_mm.x(), reading.pose_device_tool.position_mm.y());
-      if (counted.reads > 1000 && std::abs(radius - 1e3 * kReach_m) > 0.2) ++counted.wrong_places;
+      if (std::abs(radius - 1e3 * kReach_m) > 0.2) ++counted.wrong_places;
       falcon->write(Vec3(0.0, 0.0, 2.0));
       last = reading.sample;
       if (const Result<void> well = falcon->tend(); !well) return fail(well.error().message);

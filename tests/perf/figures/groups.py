@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+import devices
 import feel
 import kernels
 import registry
@@ -223,4 +224,4 @@ def novice(run):
 
 
 # In the order in which they run: agreement is counted after every session.
-GROUPS = {**kernels.GROUPS, **feel.GROUPS, "expert": expert, "novice": novice, "rig": rig}
+GROUPS = {**kernels.GROUPS, **devices.GROUPS, **feel.GROUPS, "expert": expert, "novice": novice, "rig": rig}

@@ -209,6 +209,13 @@ FIGURES = [
     Figure("collision_distance_gain", "ratio", "error of cells with the nearest voxel over that of the distance field",
            "collision", (">=", 1.0)),
     Figure("collision_cells_memory", "ratio", "memory of the cells over that of the distance field's samples", "collision"),
+    # Devices on an emulated USB.
+    Figure("falcon_cycles", "count", "frames each way with an emulated Falcon", "falcon_cycles", (">=", 100000), full=True),
+    Figure("falcon_cycle_faults", "count", "of them, spoilt ones and those that gave another place than the grip's",
+           "falcon_cycles", ("==", 0), full=True),
+    Figure("falcon_unplug_faults", "count", "of ten unpluggings in between, those unnoticed or followed by force once it was "
+           "there again", "falcon_cycles", ("==", 0), full=True),
+    Figure("falcon_cycle_rate", "per_s", "cycles a second that the emulation gives", "falcon_cycles", full=True),
     # Bones from real images, burred in frames of 33 cuts.
     *[figure for name, what in (("temporal", "a temporal bone at its own 0.096 mm"),
                                 ("skull", "a skull, cuts at a quarter of its pitch")) for figure in (
