@@ -22,12 +22,12 @@ double agus_depth_mm(const AgusParams& params, Newtons force) noexcept {
 Newtons agus_friction(const AgusParams& params, Newtons normal, double axis_distance_mm) noexcept {
   const double contact_mm = std::sqrt(agus_depth_mm(params, normal) * params.radius_mm);  // Hertz: a^2 = h R
   if (!(contact_mm > 0.0)) return Newtons{0.0};
-  // The share of the pressure's friction that points along omega x r at the contact's middle, over rings of the disc
-  // weighted by Hertz's pressure, sqrt(1 - (s/a)^2). With t = 1 - (s/a)^2 the load is sqrt(t) dt.
-  constexpr int kRings = 12, kPlaces = 24;
+  // The share of the pressure's friction that points along omega x r at the contact's middle, over rings s of the disc, each
+  // weighted by its length and Hertz's pressure, sqrt(1 - (s/a)^2).
+  constexpr int kRings = 24, kPlaces = 32;
   double sum = 0.0, weights = 0.0;
   for (int i = 0; i < kRings; ++i) {
-    const double t = (i + 0.5) / kRings, s = contact_mm * std::sqrt(1.0 - t), weight = std::sqrt(t);
+    const double u = (i + 0.5) / kRings, s = contact_mm * u, weight = u * std::sqrt(1.0 - u * u);
     for (int k = 0; k < kPlaces; ++k) {
       const double angle = 2.0 * std::numbers::pi * (k + 0.5) / kPlaces;
       const double x = axis_distance_mm + s * std::cos(angle), y = s * std::sin(angle), r = std::hypot(x, y);

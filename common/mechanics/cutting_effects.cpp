@@ -4,22 +4,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/mechanics/bone_strength.hpp"
 #include "common/mechanics/force_law.hpp"
 
 namespace osteon {
 namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
-
-double fraction(double x) noexcept { return x - std::floor(x); }
-
-// Amplitude and frequency of a trembling that the hand may be shown.
-double shown(double amplitude_n, double& hz, double most_hz) noexcept {
-  if (hz <= most_hz) return amplitude_n;
-  const double ratio = most_hz / hz;
-  hz = most_hz;
-  return amplitude_n * ratio * ratio;
-}
 
 }  // namespace
 
@@ -30,8 +21,9 @@ void Bluntness::step(const BluntnessParams& params, double torque_nmm, double rp
 }
 
 void FluteClogging::step(const CloggingParams& params, double diameter_mm, double cut_mm, double engaged,
-                         double back_mm) noexcept {
-  level_ += engaged * cut_mm / (params.capacity_diameters * diameter_mm) - back_mm / (params.cleared_diameters * diameter_mm);
+                         double density_g_cm3, double back_mm) noexcept {
+  level_ += engaged * density_g_cm3 / kCorticalDensity * cut_mm / (params.capacity_diameters * diameter_mm);
+  level_ -= back_mm / (params.cleared_diameters * diameter_mm);
   level_ = std::clamp(level_, 0.0, 1.0);
 }
 
@@ -73,10 +65,12 @@ void SawBinding::step(const BindingParams& params, double pressure_n) noexcept {
 }
 
 double BroachDrive::step(const BlowParams& params, double blows_per_minute, double engaged_area_mm2, double density_g_cm3,
-                         double held_n, double dt_s) noexcept {
+                         double held_n, double gone_mm, double dt_s) noexcept {
+  left_mm_ = std::max(0.0, left_mm_ - std::max(0.0, gone_mm));
   const bool struck = blows_per_minute > 0.0 && held_n > 0.0;
   until_blow_s_ -= dt_s;
-  if (!struck) until_blow_s_ = std::max(0.0, until_blow_s_);
+  if (!struck || !striking_) until_blow_s_ = std::max(0.0, until_blow_s_);  // pauses are not made up for
+  striking_ = struck;
   if (struck && until_blow_s_ <= 0.5 * dt_s) {
     until_blow_s_ += 60.0 / blows_per_minute;
     ++blows_;
@@ -85,29 +79,15 @@ double BroachDrive::step(const BlowParams& params, double blows_per_minute, doub
     left_mm_ = advance_mm * std::min(1.0, held_n / params.law.hold_n);
     speed_mm_per_s_ = left_mm_ / params.contact_s;
   }
-  const double go_mm = std::min(left_mm_, speed_mm_per_s_ * dt_s);
-  left_mm_ -= go_mm;
-  return go_mm;
-}
-
-double ToolVibration::step(const VibrationParams& params, double rpm, double teeth, double cutting_n, double bound_n,
-                           double dt_s) noexcept {
-  double turn_hz = rpm / 60.0, tooth_hz = turn_hz * teeth;
-  const double turn_n = shown(params.run_out * cutting_n, turn_hz, params.most_hz);
-  const double tooth_n = shown(params.teeth * cutting_n, tooth_hz, params.most_hz);
-  turn_phase_ = fraction(turn_phase_ + turn_hz * dt_s);
-  tooth_phase_ = fraction(tooth_phase_ + tooth_hz * dt_s);
-  const double sum_n = turn_n * std::sin(kTurn * turn_phase_) + tooth_n * std::sin(kTurn * tooth_phase_);
-  return std::clamp(sum_n, -bound_n, bound_n);
+  return std::min(left_mm_, speed_mm_per_s_ * dt_s);
 }
 
 SpindleParams motor_of(const Tool& tool) noexcept {
   SpindleParams motor;
   if (!(tool.spindle_rpm > 0.0)) return motor;
-  const bool strong = tool.kind == ToolKind::oscillating_saw || tool.kind == ToolKind::reciprocating_saw ||
-                      tool.kind == ToolKind::sphere_reamer || tool.kind == ToolKind::cylinder_reamer ||
-                      tool.kind == ToolKind::outside_reamer;
-  const double ratio = tool.spindle_rpm / motor.full_rpm, power = strong ? 4.0 : 1.0;
+  const bool drives = tool.kind == ToolKind::drill || tool.kind == ToolKind::end_drill || tool.kind == ToolKind::pin ||
+                      tool.kind == ToolKind::screw;
+  const double ratio = tool.spindle_rpm / motor.full_rpm, power = drives ? 1.0 : 4.0;
   motor.droop_rpm_per_nmm *= ratio * ratio / power;
   motor.most_nmm *= power / ratio;
   motor.full_rpm = tool.spindle_rpm;
@@ -120,8 +100,6 @@ CuttingEffects::CuttingEffects(const Tool& tool, double wear) noexcept
       saws_(tool.kind == ToolKind::oscillating_saw || tool.kind == ToolKind::reciprocating_saw),
       broaches_(tool.kind == ToolKind::broach),
       diameter_mm_(law_tool(tool).diameter_mm),
-      // The teeth of a saw pass in a blur; what trembles is its stroke.
-      teeth_(saws_ ? 1.0 : std::max(1, tool.teeth)),
       stroke_mm_(law_tool(tool).stroke_mm),
       bluntness_(wear) {}
 
@@ -132,7 +110,8 @@ FeedLaw CuttingEffects::felt(const FeedLaw& law) const noexcept {
     out.offset_n += binding_.drag_n(binding_params);
     if (binding_.jammed()) out.max_feed_mm_per_s = 0.0;
   }
-  if (broaches_) out.max_feed_mm_per_s = may_go_mm_per_s_;
+  // The blow does the work, not the hand.
+  if (broaches_) out = {0.0, 0.0, 1.0, may_go_mm_per_s_, 0.0};
   return out;
 }
 
@@ -144,27 +123,27 @@ double CuttingEffects::torque_nmm(double law_torque_nmm) const noexcept {
   return torque;
 }
 
+void CuttingEffects::take_up() noexcept {
+  clogging_ = {};
+  grab_ = {};
+  binding_ = {};
+  drive_ = {};
+  may_go_mm_per_s_ = 0.0;
+}
+
 void CuttingEffects::step(const EffectMoment& moment, double dt_s) noexcept {
-  last_ = moment;
   const double cut_mm = moment.cutting ? std::max(0.0, moment.advance_mm) : 0.0;
   const double back_mm = std::max(0.0, -moment.advance_mm);
   if (moment.cutting) bluntness_.step(bluntness_params, moment.torque_nmm, moment.spindle_rpm, dt_s);
-  if (flutes_) clogging_.step(clogging_params, diameter_mm_, cut_mm, moment.engaged, back_mm);
+  if (flutes_) clogging_.step(clogging_params, diameter_mm_, cut_mm, moment.engaged, moment.density_g_cm3, back_mm);
   if (drills_) grab_.step(grab_params, moment.engaged, moment.cutting, moment.cutting_n, back_mm > 0.0);
   if (saws_) binding_.step(binding_params, moment.kerf_pressure_n);
   if (broaches_) {
     const double held_n = moment.engaged > 0.0 ? moment.push_n : 0.0;  // in the air nobody strikes
-    const double may_go_mm =
-        drive_.step(blow_params, moment.spindle_rpm, moment.engaged_area_mm2, moment.density_g_cm3, held_n, dt_s);
+    const double may_go_mm = drive_.step(blow_params, moment.spindle_rpm, moment.engaged_area_mm2, moment.density_g_cm3,
+                                         held_n, moment.advance_mm, dt_s);
     may_go_mm_per_s_ = may_go_mm / dt_s;
   }
-}
-
-double CuttingEffects::motor_n(double bound_n, double dt_s) noexcept {
-  const double pull_n = drills_ ? grab_.pull_n(grab_params) : 0.0;
-  const double trembling_n = vibration_.step(vibration_params, last_.spindle_rpm, teeth_, last_.cutting ? last_.cutting_n : 0.0,
-                                             bound_n, dt_s);
-  return std::clamp(pull_n + trembling_n, -bound_n, bound_n);
 }
 
 }  // namespace osteon

@@ -1,9 +1,9 @@
 // What a surgeon misses at once if it is not there: bluntness, clogged flutes, the grab at breakthrough, a saw that binds,
-// a broach that goes by blows, the motor's trembling. Small state machines, each stepped by what the tool did in a tick;
-// their sums do not depend on the tick's length. All [haptic]: no allocation, clock or random number in any of them.
+// a broach that goes by blows. Small state machines, each stepped by what the tool did in a tick; their sums do not depend
+// on the tick's length. All [haptic]: no allocation, clock or random number in any of them.
 //
-// Those that resist (bluntness, clogging, binding, blows) change the law that the proxy solves. Those that act on the hand
-// by themselves (grab, vibration) are a port of their own, which its user bounds and switches off; see motor_n().
+// Those that resist (bluntness, clogging, binding, blows) change the law that the proxy solves. The grab pulls by itself: it
+// belongs to the port of the motor's forces, which bounds it and shuts it with the pedal.
 #pragma once
 #include <cstdint>
 
@@ -15,10 +15,11 @@
 namespace osteon {
 
 // An edge loses its sharpness by the work of cutting: wear' = (blunt - wear) · power / work, so a blunt tool needs
-// `blunt` times the force and never more. 1000 J are about thirty bicortical holes of 3.2 mm [A].
+// `blunt` times the force and never more. A bicortical hole of 3.2 mm costs about 30 J, so a hundred of them make it a
+// quarter blunt [A].
 struct BluntnessParams {
   double blunt = 2.0;
-  double work_j = 1000.0;
+  double work_j = 10'000.0;
 };
 class Bluntness {
  public:
@@ -30,24 +31,30 @@ class Bluntness {
   double wear_;
 };
 
-// Flutes fill with chips by the depth drilled in one go, and empty as the drill is drawn back. Full ones need more
-// torque, and some more thrust [A].
+// Flutes fill with chips by the bone drilled in one go, and empty as the drill is drawn back. From `onset` on, full ones
+// need more torque, and some more thrust [A]: nobody clears a drill for a bicortical hole, nor leaves it in for ten
+// diameters of cortical bone.
 struct CloggingParams {
-  double capacity_diameters = 6.0;  // depth until they are full
-  double cleared_diameters = 1.5;   // way back until full ones are empty
-  double torque_gain = 1.5;         // torque of full flutes over that of empty ones, less one
-  double thrust_gain = 0.3;
+  double capacity_diameters = 10.0;  // depth in cortical bone until they are full; of softer bone there is less to carry
+  double cleared_diameters = 1.5;    // way back until full ones are empty
+  double onset = 0.5;                // level up to which chips find their way out
+  double torque_gain = 5.0;          // torque of full flutes over that of empty ones, less one
+  double thrust_gain = 0.5;
 };
 class FluteClogging {
  public:
   // `cut_mm`: advance into bone; `back_mm`: withdrawal; both of this tick and not negative. `engaged`: share of the point
-  // that took bone.
-  void step(const CloggingParams& params, double diameter_mm, double cut_mm, double engaged, double back_mm) noexcept;
+  // that took bone of that density.
+  void step(const CloggingParams& params, double diameter_mm, double cut_mm, double engaged, double density_g_cm3,
+            double back_mm) noexcept;
   [[nodiscard]] double level() const noexcept { return level_; }  // 0 empty, 1 full
-  [[nodiscard]] double torque_factor(const CloggingParams& p) const noexcept { return 1.0 + p.torque_gain * level_; }
-  [[nodiscard]] double thrust_factor(const CloggingParams& p) const noexcept { return 1.0 + p.thrust_gain * level_; }
+  [[nodiscard]] double torque_factor(const CloggingParams& p) const noexcept { return 1.0 + p.torque_gain * packed(p); }
+  [[nodiscard]] double thrust_factor(const CloggingParams& p) const noexcept { return 1.0 + p.thrust_gain * packed(p); }
 
  private:
+  [[nodiscard]] double packed(const CloggingParams& p) const noexcept {
+    return level_ > p.onset ? (level_ - p.onset) / (1.0 - p.onset) : 0.0;
+  }
   double level_ = 0;
 };
 [[nodiscard]] bool has_flutes(ToolKind kind) noexcept;
@@ -58,7 +65,7 @@ class FluteClogging {
 struct GrabParams {
   double whole = 0.9;         // share from which the point counts as whole
   double gone = 0.02;         // and below which as out
-  double ratio = 0.3;         // of the thrust; no more than friction could hold [A]
+  double ratio = 0.15;        // of the thrust [A]
   double torque_gain = 1.0;   // [A]
 };
 class BreakthroughGrab {
@@ -106,38 +113,21 @@ struct BlowParams {
 };
 class BroachDrive {
  public:
-  // `held_n`: push of the hand; a loosely held broach bounces and advances in proportion. Returns how far it may go in
-  // this tick, mm.
+  // `held_n`: push of the hand; a loosely held broach bounces and advances in proportion. `gone_mm`: its way since the last
+  // step; what the hand does not follow of a blow is lost with the next. Returns how far it may go until the next step, mm.
   double step(const BlowParams& params, double blows_per_minute, double engaged_area_mm2, double density_g_cm3, double held_n,
-              double dt_s) noexcept;
+              double gone_mm, double dt_s) noexcept;
   [[nodiscard]] bool seated() const noexcept { return seated_; }
   [[nodiscard]] int blows() const noexcept { return blows_; }
 
  private:
   double until_blow_s_ = 0, left_mm_ = 0, speed_mm_per_s_ = 0;
   int blows_ = 0;
-  bool seated_ = false;
+  bool seated_ = false, striking_ = false;
 };
 
-// Trembling of the tool: once a turn by its run-out, and with every tooth that bites, each a share of the cutting force
-// [A]. Above most_hz a hand feels no more and a 1 kHz loop shows something else, so the frequency is held there and the
-// amplitude falls with its square, as a mass moves. Never more than the bound.
-struct VibrationParams {
-  double run_out = 0.03;   // of the cutting force [A]
-  double teeth = 0.05;     // [A]
-  double most_hz = 300.0;
-};
-class ToolVibration {
- public:
-  // Force along the feed, N, of this tick.
-  double step(const VibrationParams& params, double rpm, double teeth, double cutting_n, double bound_n, double dt_s) noexcept;
-
- private:
-  double turn_phase_ = 0, tooth_phase_ = 0;  // of 1
-};
-
-// The motor that drives a tool of this kind, by the power of such handpieces [A]: small ones as a drill of 1000 rpm,
-// saws and reamers four times that. Constant power: torque and droop follow from the tool's speed.
+// The motor that drives a tool of this kind, by the power of such handpieces [A]: what drills, as the drill of 1000 rpm;
+// burs, saws and reamers four times that. Constant power: torque and droop follow from the tool's speed.
 [[nodiscard]] SpindleParams motor_of(const Tool& tool) noexcept;
 
 // What the tool did in a tick.
@@ -165,9 +155,10 @@ class CuttingEffects {
   [[nodiscard]] FeedLaw felt(const FeedLaw& law) const noexcept;
   [[nodiscard]] double torque_nmm(double law_torque_nmm) const noexcept;
   void step(const EffectMoment& moment, double dt_s) noexcept;
-  // The active port: force on the tool along the feed, grab and vibration, at most `bound_n` either way. Call it once a
-  // tick, after step().
-  [[nodiscard]] double motor_n(double bound_n, double dt_s) noexcept;
+  // On taking the tool up: clean and free; only its wear stays.
+  void take_up() noexcept;
+  // Of the grab at breakthrough, on the tool along the feed; not bounded by what the hand feels.
+  [[nodiscard]] double pull_n() const noexcept { return drills_ ? grab_.pull_n(grab_params) : 0.0; }
 
   [[nodiscard]] const FluteClogging& clogging() const noexcept { return clogging_; }
   [[nodiscard]] const BreakthroughGrab& grab() const noexcept { return grab_; }
@@ -179,19 +170,16 @@ class CuttingEffects {
   GrabParams grab_params;
   BindingParams binding_params;
   BlowParams blow_params;
-  VibrationParams vibration_params;
 
  private:
   bool flutes_, drills_, saws_, broaches_;
-  double diameter_mm_, teeth_, stroke_mm_;
+  double diameter_mm_, stroke_mm_;
   Bluntness bluntness_;
   FluteClogging clogging_;
   BreakthroughGrab grab_;
   SawBinding binding_;
   BroachDrive drive_;
-  ToolVibration vibration_;
-  EffectMoment last_;
-  double may_go_mm_per_s_ = 0;  // broach: of the next tick
+  double may_go_mm_per_s_ = 0;  // broach: in the next tick
 };
 
 }  // namespace osteon

@@ -6,11 +6,13 @@
 #include <cstdio>
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "common/runtime/command_line.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
 #include "haptic_client/app/client.hpp"
+#include "haptic_client/app/laws_command.hpp"
 #include "haptic_client/app/plan_file.hpp"
 
 namespace {
@@ -149,6 +151,7 @@ Result<void> run(Options& options, const StopSignal& stop) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc > 1 && std::string_view(argv[1]) == "laws") return run_laws(argc - 1, argv + 1);
   Options options;
   CLI::App app("Carries out a surgeon's plan at a haptic device: feels and cuts the bone of a room at 1 kHz.", kProgram);
   app.add_option("--server", options.room.address, "HOST:PORT of osteon-server")->required();

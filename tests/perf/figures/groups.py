@@ -10,6 +10,7 @@ import numpy as np
 import devices
 import feel
 import kernels
+import laws
 import registry
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -224,4 +225,4 @@ def novice(run):
 
 
 # In the order in which they run: agreement is counted after every session.
-GROUPS = {**kernels.GROUPS, **devices.GROUPS, **feel.GROUPS, "expert": expert, "novice": novice, "rig": rig}
+GROUPS = {**kernels.GROUPS, **devices.GROUPS, **feel.GROUPS, **laws.GROUPS, "expert": expert, "novice": novice, "rig": rig}

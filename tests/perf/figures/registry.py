@@ -109,6 +109,21 @@ FIGURES = [
            "L_sleeve); paths of cuts are simplified by up to 0.01 mm", "feel_guided", ("<=", 0.01), baseline="by eye"),
     Figure("feel_guided_of_play", "ratio", "how far the drill itself gets off the planned line, as a part of that play",
            "feel_guided", ("<=", 1.0), baseline="by eye"),
+    # The force laws by themselves.
+    Figure("laws_listed", "count", "force laws that can be chosen", "laws", (">=", 9)),
+    Figure("laws_chi_error", "percent", "Chi's thrust at 0.3 to 2.0 g/cm3, 1000 rpm, 1 mm/s, against the points of "
+           "comparison, which have two or three digits", "laws", ("<=", 2.0)),
+    Figure("laws_allotta_thrust_error", "percent", "Allotta's thrust of drills of 2.5 to 7.94 mm against the same", "laws",
+           ("<=", 0.2)),
+    Figure("laws_allotta_torque_error", "percent", "Allotta's torque of the same drills", "laws", ("<=", 0.2)),
+    Figure("laws_allotta_energy_error", "ratio", "work of Allotta's torque for each mm3 of the hole over K_s, less one", "laws",
+           ("<=", 1e-9)),
+    Figure("laws_fitted_error", "percent", "spring-damper and multi-point thrust at the cortical point that they are fitted to",
+           "laws", ("<=", 1.0)),
+    Figure("laws_inverse_error", "ratio", "feed of every law's force at its point, against the feed of that point", "laws",
+           ("<=", 1e-9)),
+    Figure("laws_allotta_over_chi", "ratio", "how much the two drilling laws disagree in cortical bone", "laws",
+           baseline="of the reference page"),
     # Agreement of all holders of the bone, over every session of this run.
     Figure("field_hash_differences", "count", "sessions after which server and haptic client held different bone", "rig",
            ("==", 0)),

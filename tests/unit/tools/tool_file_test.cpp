@@ -159,6 +159,29 @@ TEST(ToolFile, EveryBadInputIsNamedWithFileFieldAndRemedy) {
   }
 }
 
+// A tool may name the law by which it resists. Without one its hash is what it was before there was a choice.
+TEST(ToolFile, ALawIsPartOfTheDefinitionWhereItIsNamed) {
+  const Tool plain = *find_tool("burr-round-5");
+  EXPECT_TRUE(plain.law.empty());
+  EXPECT_EQ(to_yaml(plain).find("law"), std::string::npos);
+  const auto chosen = parse_tool(with(to_yaml(plain), "law", "law: agus"), "mine.yaml");
+  ASSERT_TRUE(chosen) << chosen.error().message;
+  EXPECT_EQ(chosen->law, "agus");
+  EXPECT_NE(chosen->hash(), plain.hash());
+  const auto back = parse_tool(to_yaml(*chosen), "mine.yaml");
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(back->hash(), chosen->hash());
+
+  const auto empty = parse_tool(with(to_yaml(plain), "law", "law: \"\""), "mine.yaml");
+  ASSERT_FALSE(empty);
+  EXPECT_NE(empty.error().message.find("\"law\" is empty"), std::string::npos) << empty.error().message;
+  const auto odd = parse_tool(with(to_yaml(plain), "law", "law: Hertz & co"), "mine.yaml");
+  ASSERT_FALSE(odd);
+  EXPECT_NE(odd.error().message.find("name of a force law"), std::string::npos) << odd.error().message;
+  // A guide does not cut.
+  EXPECT_FALSE(parse_tool(with(to_yaml(*find_tool("guide-1")), "law", "law: chi"), "mine.yaml"));
+}
+
 TEST(ToolFile, AFileAddsAToolWithoutCode) {
   const test::TempDir folder;
   std::ofstream(folder / "mine.yaml")

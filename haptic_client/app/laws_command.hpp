@@ -1,0 +1,15 @@
+// `osteon-haptic laws`: the force laws as a list to read, or as JSON for programs.
+#pragma once
+#include <string>
+
+namespace osteon::haptic {
+
+// One paragraph for each law, which tools obey it if nothing else is chosen, and how to choose.
+[[nodiscard]] std::string laws_text();
+// {"laws": [...], "defaults": {kind: law}, "points": [...]}: the points of comparison are computed, not quoted.
+[[nodiscard]] std::string laws_json();
+
+// The whole command; `argv[0]` is "laws". Returns the exit code.
+int run_laws(int argc, const char* const* argv);
+
+}  // namespace osteon::haptic
