@@ -1,10 +1,9 @@
 #include "common/runtime/periodic.hpp"
 
-#include <pthread.h>
-#include <sched.h>
-#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <time.h>
+
+#include "common/runtime/realtime.hpp"
 
 namespace osteon {
 
@@ -34,10 +33,8 @@ int PeriodicTimer::wait(TickStats& stats) noexcept {
 void PeriodicTimer::done(TickStats& stats) noexcept { stats.work.record(std::chrono::steady_clock::now() - woke_); }
 
 bool try_realtime(int priority) noexcept {
-  const bool locked = ::mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
-  sched_param parameters{};
-  parameters.sched_priority = priority;
-  return ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &parameters) == 0 && locked;
+  const Realtime got = make_realtime(priority);
+  return got.fifo && got.locked;
 }
 
 }  // namespace osteon

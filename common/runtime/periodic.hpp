@@ -24,7 +24,7 @@ class PeriodicTimer {
   SteadyTime due_, woke_;
 };
 
-// Asks for SCHED_FIFO at this priority for the calling thread and locks memory; false where the machine refuses.
+// make_realtime() (realtime.hpp); false where the machine refuses the priority or to lock memory.
 bool try_realtime(int priority) noexcept;
 
 }  // namespace osteon
