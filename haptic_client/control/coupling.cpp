@@ -1,0 +1,114 @@
+#include "haptic_client/control/coupling.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "haptic_client/device/haptic_device.hpp"
+
+namespace osteon::haptic {
+namespace {
+
+constexpr double kBleed = 0.1;           // of the handle's free motion
+constexpr double kLeastToLetGo_n = 3.0;  // a burr leaves bone a hundred times a second with less; nobody feels that plunge [A]
+constexpr double kNothing_mm = 1e-9;
+
+}  // namespace
+
+void Coupling::reset(const Vec3& handle_mm, const Vec3& proxy_mm) noexcept {
+  slack_mm_.setZero();
+  returned_mm_.setZero();
+  smooth_n_.setZero();
+  extension_mm_ = handle_mm - proxy_mm;
+  handle_mm_ = handle_mm;
+  cutting_ = false;
+}
+
+void Coupling::let_go_all(const Vec3& handle_mm, const Vec3& proxy_mm) noexcept {
+  reset(handle_mm, proxy_mm);
+  slack_mm_ = proxy_mm - handle_mm;
+  extension_mm_.setZero();
+}
+
+void Coupling::let_go(Vec3& offset_mm, Vec3& extension_mm, const Vec3& to_mm) noexcept {
+  const Vec3 change_mm = to_mm - extension_mm;
+  offset_mm += change_mm;
+  extension_mm_ += change_mm;
+  extension_mm = to_mm;
+}
+
+void Coupling::bleed(const CouplingMoment& moment) noexcept {
+  double most_mm = kBleed * (moment.handle_mm - handle_mm_).norm();
+  for (Vec3* offset_mm : {&slack_mm_, &returned_mm_}) {
+    const double size_mm = offset_mm->norm();
+    if (size_mm < kNothing_mm) {
+      offset_mm->setZero();
+      continue;
+    }
+    const double less_mm = std::min(most_mm, size_mm);
+    *offset_mm *= 1.0 - less_mm / size_mm;
+    most_mm -= less_mm;
+  }
+}
+
+CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& proxy, EnergyLedger& ledger, double dt_s,
+                             double smooth_s) noexcept {
+  CouplingForce force;
+  const double k = moment.stiffness_n_per_mm;
+  const auto stored_mj = [&](double extension_mm) { return 0.5 * k * moment.energy_scale * extension_mm * extension_mm; };
+  const double cutting_mj = moment.energy_scale * proxy.cutting_work_mj;
+  Vec3 e_mm = moment.handle_mm + offset_mm() - moment.proxy_mm;
+
+  if (!moment.touching) {
+    ledger.settle(cutting_mj, 0.0);
+    extension_mm_ = e_mm;
+    bleed(moment);
+    handle_mm_ = moment.handle_mm;
+    smooth_n_.setZero();
+    cutting_ = false;
+    return force;
+  }
+
+  // Only bone that came back moves the proxy away from the handle.
+  const double before_mm = (moment.handle_mm + offset_mm() - moment.proxy_before_mm).norm();
+  if (e_mm.norm() > before_mm + kNothing_mm) {
+    let_go(returned_mm_, e_mm, e_mm * (before_mm / e_mm.norm()));
+    force.returned = true;
+  }
+  // Slack: more than the device can show, and all of it where the bone has given way.
+  const double most_mm = moment.limit_n / k;
+  if (e_mm.norm() > most_mm) {
+    let_go(slack_mm_, e_mm, e_mm * (most_mm / e_mm.norm()));
+    force.limited = true;
+  }
+  if (proxy.breakthrough && k * e_mm.norm() >= kLeastToLetGo_n) {
+    let_go(slack_mm_, e_mm, Vec3::Zero());
+    force.breakthrough = true;
+  }
+  ledger.settle(cutting_mj, stored_mj(e_mm.norm()));
+
+  // Returned bone is let press again as the damping pays for it.
+  const double returned_mm = returned_mm_.norm();
+  if (returned_mm > kNothing_mm && ledger.report().tank_mj > 0.0) {
+    const double most_step_mm = std::min(returned_mm, kBleed * (moment.handle_mm - handle_mm_).norm());
+    const Vec3 back_mm = returned_mm_ * (most_step_mm / returned_mm);
+    const double price_mj = stored_mj((e_mm - back_mm).norm()) - stored_mj(e_mm.norm());
+    if (price_mj <= 0.0 || ledger.draw(price_mj) >= price_mj) let_go(returned_mm_, e_mm, e_mm - back_mm);
+  }
+
+  force.spring_n = -k * e_mm;
+  // A sampled spring needs k·T; never more than the spring, so that it cannot pull.
+  force.damping_n = clamped(-k * (e_mm - extension_mm_), force.spring_n.norm());
+
+  // (7.15), EWMA, on the cutting force alone and only while it goes on: where cutting begins or ends the rest of the
+  // coupling takes over at once, and a filter between them would pull.
+  const Vec3& cutting_n = proxy.cutting_force_n;
+  smooth_n_ = proxy.cutting && cutting_ ? Vec3(smooth_n_ + (cutting_n - smooth_n_) * (1.0 - std::exp(-dt_s / smooth_s))) : cutting_n;
+  force.cutting_lag_n = clamped(cutting_n - smooth_n_, force.spring_n.norm());
+  cutting_ = proxy.cutting;
+
+  extension_mm_ = e_mm;
+  handle_mm_ = moment.handle_mm;
+  return force;
+}
+
+}  // namespace osteon::haptic

@@ -1,0 +1,50 @@
+// The spring between handle and tool, and what is done so that it never gives the hand more than it got: its damping, its
+// slack, the offset for bone that comes back, the smoothing of the cutting force. Physical forces, bone frame.
+//
+// The spring's extension is e = handle + offset - proxy. The proxy moves only where that shortens e; where bone that came
+// back pushes it out, the offset takes the difference, so that the stored energy does not rise.
+#pragma once
+#include "haptic_client/control/energy_ledger.hpp"
+#include "haptic_client/control/proxy.hpp"
+
+namespace osteon::haptic {
+
+struct CouplingMoment {
+  Vec3 handle_mm, proxy_before_mm, proxy_mm;  // bone frame; before: at the end of the last tick
+  double stiffness_n_per_mm = 0;              // K_c, physical
+  double limit_n = 0;                         // physical: the device's over s
+  double energy_scale = 1;                    // mJ at the handle for each physical mJ: s over the workspace's scale
+  bool touching = false;
+};
+
+struct CouplingForce {
+  Vec3 spring_n = Vec3::Zero();      // of the bone on the tool, within the limit: the physical force
+  Vec3 damping_n = Vec3::Zero();     // the sampled spring's k_c·T, never more than the spring
+  Vec3 cutting_lag_n = Vec3::Zero(); // what smoothing holds back of the cutting force, of the bone on the tool
+  bool limited = false, breakthrough = false, returned = false;
+};
+
+class Coupling {
+ public:
+  // [haptic] The handle was put elsewhere, as by the clutch: no extension, no offset.
+  void reset(const Vec3& handle_mm, const Vec3& proxy_mm) noexcept;
+  // [haptic] The handle was found elsewhere, as after a device came back: the tool stays, what lies between is slack.
+  void let_go_all(const Vec3& handle_mm, const Vec3& proxy_mm) noexcept;
+  // [haptic] One tick, after the proxy's step towards handle + offset(). Keeps the ledger's stored energy.
+  CouplingForce step(const CouplingMoment& moment, const ProxyStep& proxy, EnergyLedger& ledger, double dt_s,
+                     double smooth_s) noexcept;
+  [[nodiscard]] Vec3 offset_mm() const noexcept { return slack_mm_ + returned_mm_; }
+
+ private:
+  // Sets the extension; what was there more becomes offset, which does not count as motion.
+  void let_go(Vec3& offset_mm, Vec3& extension_mm, const Vec3& to_mm) noexcept;
+  void bleed(const CouplingMoment& moment) noexcept;
+
+  Vec3 slack_mm_ = Vec3::Zero(), returned_mm_ = Vec3::Zero();
+  Vec3 extension_mm_ = Vec3::Zero();  // at the end of the last tick
+  Vec3 handle_mm_ = Vec3::Zero();
+  Vec3 smooth_n_ = Vec3::Zero();      // the cutting force, smoothed
+  bool cutting_ = false;              // in the last tick
+};
+
+}  // namespace osteon::haptic

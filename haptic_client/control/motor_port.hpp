@@ -1,0 +1,45 @@
+// What the tool's motor does to the hand: drag, kick and vibration. These forces are active, unlike the coupling's: they
+// may put energy into the hand as a real motor does. So they go through a port of their own, whose force is bounded by
+// friction times the normal force and which is shut soon after the pedal.
+#pragma once
+#include "common/geometry/pose.hpp"
+
+namespace osteon::haptic {
+
+struct MotorPortParams {
+  double friction = 0.3;         // mu: the bound of all motor forces over the normal force [A]
+  double drag = 0.6;             // of the bound: how hard a turning flank pulls sideways [A]
+  double kick = 0.8;             // how much of a sudden rise of the normal force pulls too [A]
+  double vibration = 0.15;       // of the bound, at the rate at which teeth bite [A]
+  double kick_s = 0.03;          // a rise slower than this is no kick [A]
+  double most_hz = 300.0;        // faster vibration is beyond a 1 kHz loop: it averages out, sound carries it
+  double on_s = 0.02, off_s = 0.01;  // after the pedal
+};
+
+struct MotorMoment {
+  bool pedal = false;            // the spindle is commanded to turn
+  double spindle_rpm = 0;
+  int teeth = 0;
+  Vec3 normal_n = Vec3::Zero();  // of the bone on the tool, physical
+  Vec3 axis = Vec3::UnitZ();     // of the tool, out of its tip; it turns clockwise as its holder sees it
+  bool cutting = false;
+  double pull_n = 0;             // of a drill that breaks through, along the axis out of its tip; within the same bound
+};
+
+class MotorPort {
+ public:
+  explicit MotorPort(const MotorPortParams& params = {}) : params_(params) {}
+  void reset() noexcept;
+  // [haptic] Force on the tool, physical, N, in the frame of the moment's vectors. Its size is at most friction times that
+  // of the normal force, and zero from off_s after the pedal on.
+  [[nodiscard]] Vec3 step(const MotorMoment& moment, double dt_s) noexcept;
+  [[nodiscard]] const MotorPortParams& params() const noexcept { return params_; }
+
+ private:
+  MotorPortParams params_;
+  double open_ = 0;       // 0 … 1
+  double usual_n_ = 0;    // normal force, slowly followed
+  double phase_ = 0;      // of the teeth, turns
+};
+
+}  // namespace osteon::haptic
