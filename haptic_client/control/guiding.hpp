@@ -1,4 +1,4 @@
-// The guides that stand on the bone, as the haptic loop feels them: once a tool has entered an opening it stays there until
+// What stands on the bone, as the haptic loop feels it, and the openings of the guides among it: once a tool has entered an opening it stays there until
 // it is drawn out, and goes only where the opening lets it.
 #pragma once
 #include <cstdint>
@@ -7,17 +7,22 @@
 #include <vector>
 
 #include "common/tools/guide.hpp"
+#include "haptic_client/control/obstacle.hpp"
 
 namespace osteon::haptic {
 
-// Made ready off the haptic thread, which only reads it.
+// A guide, pin, screw or implant. Made ready off the haptic thread, which only reads it.
 struct PlacedGuide {
-  std::uint32_t id = 0;  // of the scene's item
+  std::uint32_t id = 0;  // of the scene's item, from 1
   Pose pose_bone_guide;
-  GuideShape shape;
+  GuideShape shape;      // without openings for what is no guide
+  // What it is made of; shared by all that stand for items of one definition. Null: it is not felt.
+  std::shared_ptr<const SolidLattice> solid;
 };
-[[nodiscard]] inline PlacedGuide placed_guide(std::uint32_t id, const Tool& guide, const Pose& pose_bone_guide) {
-  return {id, pose_bone_guide, guide_shape(guide)};
+[[nodiscard]] inline PlacedGuide placed_guide(std::uint32_t id, const Tool& guide, const Pose& pose_bone_guide,
+                                              std::shared_ptr<const SolidLattice> solid = nullptr) {
+  if (!solid) solid = std::make_shared<const SolidLattice>(guide);
+  return {id, pose_bone_guide, guide_shape(guide), std::move(solid)};
 }
 
 class Guiding {

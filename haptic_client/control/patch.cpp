@@ -12,12 +12,15 @@ void BrickGrid::reset(double pitch_mm, Coord first, Coord last) {
   dims_ = CoordBox{first, last}.dims();
   bricks_.assign(static_cast<std::size_t>(dims_.x) * static_cast<std::size_t>(dims_.y) * static_cast<std::size_t>(dims_.z),
                  nullptr);
+  tables_.assign(bricks_.size(), nullptr);
 }
 
 void BrickGrid::set(Coord brick, std::shared_ptr<const Brick> values) {
   const Coord at = brick - first_;
   OSTEON_CHECK(at.x >= 0 && at.y >= 0 && at.z >= 0 && at.x < dims_.x && at.y < dims_.y && at.z < dims_.z);
-  bricks_[static_cast<std::size_t>((at.x * dims_.y + at.y) * dims_.z + at.z)] = std::move(values);
+  const auto place = static_cast<std::size_t>((at.x * dims_.y + at.y) * dims_.z + at.z);
+  tables_[place] = values ? values->values.data() : nullptr;
+  bricks_[place] = std::move(values);
 }
 
 bool BrickGrid::sample(const Vec3& point_mm, double& value) const noexcept {

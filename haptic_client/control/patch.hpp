@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "common/core/digest.hpp"
 #include "common/core/id.hpp"
 #include "common/geometry/lattice.hpp"
 
@@ -26,6 +27,10 @@ class BrickGrid {
   // The owners are the patches that hold a brick and the builder's store; the haptic thread owns none.
   void set(Coord brick, std::shared_ptr<const Brick> values);
   [[nodiscard]] double pitch_mm() const { return pitch_mm_; }
+  [[nodiscard]] Coord first() const { return first_; }
+  [[nodiscard]] Coord dims() const { return dims_; }
+  // Samples of each brick or null, z fastest: dims().x * dims().y * dims().z of them.
+  [[nodiscard]] const float* const* tables() const { return tables_.data(); }
   // Trilinear; false where no brick covers the point.
   [[nodiscard]] bool sample(const Vec3& point_mm, double& value) const noexcept;
 
@@ -33,12 +38,23 @@ class BrickGrid {
   double pitch_mm_ = 0;
   Coord first_, dims_;
   std::vector<std::shared_ptr<const Brick>> bricks_;
+  std::vector<const float*> tables_;
+};
+
+// Lower bound of the distance to bone, for every point of cells as wide as a brick at h: from the case, whose bone cuts
+// only take away. It reaches farther than the bricks do.
+struct Clearance {
+  Digest bone;            // of the case that it is of
+  CoordBox cells;
+  double cell_mm = 0;
+  std::vector<float> mm;  // z fastest; zero: nothing is said
 };
 
 struct Patch {
   BrickGrid fine;            // f, mm: negative in bone
   BrickGrid coarse;          // f
-  BrickGrid density;         // g/cm³, at h
+  BrickGrid density;         // g/cm³, at h, of the same bricks as `coarse`
+  Clearance clearance;
   std::uint64_t own_cuts = 0;  // own cuts up to this number are in it
   RoomSeq room_seq;            // committed events that are in it
   std::uint64_t version = 0;   // 0: never filled

@@ -26,11 +26,13 @@ Vec3 brick_centre_mm(Coord index, double pitch_mm) {
 }
 
 // Box of a part of the tool between two places on its axis.
-Box tool_box(const Tool& tool, const Pose& pose, double from_z_mm, double to_z_mm) {
+Box tool_box(const ToolModel& model, const Pose& pose, double from_z_mm, double to_z_mm) {
+  const Box& solid = model.solid.bounds;
   Box box;
-  box.include(pose.point({0, 0, from_z_mm}));
-  box.include(pose.point({0, 0, to_z_mm}));
-  return box.grown(0.5 * std::max(tool.diameter_mm, tool.shank_diameter_mm));
+  for (int corner = 0; corner < 8; ++corner)
+    box.include(pose.point({corner & 4 ? solid.max_mm.x() : solid.min_mm.x(), corner & 2 ? solid.max_mm.y() : solid.min_mm.y(),
+                            corner & 1 ? from_z_mm : to_z_mm}));
+  return box;
 }
 
 template <class Visit>
@@ -121,16 +123,31 @@ void PatchBuilder::build(std::span<const CutField* const> bodies, const ToolMode
   };
 
   // The fine box ends a margin beyond the tip and reaches back as far as the sample limit allows.
-  const double fine_reach_mm = params_.fine_samples * model.fine_pitch_mm - 2.0 * params_.fine_margin_mm - tool.diameter_mm;
-  const Box fine_box = tool_box(tool, pose, 0.0, -std::min(tool.cutting_length_mm, std::max(1.0, fine_reach_mm)));
+  // A blade's plate runs in the kerf as its teeth do.
+  const bool blade = model.feed == Feeding::in_plane;
+  const double fine_reach_mm = params_.fine_samples * model.fine_pitch_mm - 2.0 * params_.fine_margin_mm - (blade ? 0.0 : tool.diameter_mm);
+  const double back_mm = blade ? tool.reach_mm() : tool.cutting_length_mm;
+  const Box fine_box = tool_box(model, pose, 0.0, -std::min(back_mm, std::max(1.0, fine_reach_mm)));
   fill(patch.fine, bricks_in(fine_box.grown(params_.fine_margin_mm), model.fine_pitch_mm), model.fine_pitch_mm,
        params_.fine_margin_mm, [&](Coord i) { return brick(fine_, bodies, model.cut_level, i, Quantity::solid); });
 
-  const CoordBox coarse = bricks_in(tool_box(tool, pose, 0.0, -tool.reach_mm()).grown(params_.coarse_margin_mm), h);
+  const CoordBox coarse = bricks_in(tool_box(model, pose, 0.0, -tool.reach_mm()).grown(params_.coarse_margin_mm), h);
   fill(patch.coarse, coarse, h, params_.coarse_margin_mm,
        [&](Coord i) { return brick(coarse_, bodies, 0, i, Quantity::solid); });
   fill(patch.density, coarse, h, params_.coarse_margin_mm,
        [&](Coord i) { return brick(density_, bodies, 0, i, Quantity::density); });
+
+  // What the case says never changes: it is asked for again only where the tool has gone on to other cells.
+  const CoordBox cells = bricks_in(tool_box(model, pose, 0.0, -tool.reach_mm()).grown(params_.clearance_margin_mm), h);
+  Clearance& clearance = patch.clearance;
+  const Case& bone = bodies.front()->bone();
+  if (clearance.mm.empty() || clearance.cells != cells || clearance.bone != bone.hash()) {
+    clearance.bone = bone.hash();
+    clearance.cells = cells;
+    clearance.cell_mm = kBrickCells * h;
+    clearance.mm.clear();
+    for_each(cells, [&](Coord index) { clearance.mm.push_back(static_cast<float>(bone.clearance_mm(brick_centre_mm(index, h)))); });
+  }
   ++patch.version;
 }
 

@@ -15,6 +15,7 @@ namespace osteon::haptic {
 struct PatchParams {
   double fine_margin_mm = 1.5;    // of fine bricks round the cutting part
   double coarse_margin_mm = 4.0;  // of coarse bricks round the whole tool
+  double clearance_margin_mm = 12.0;  // of what is known to be free round the whole tool
   int fine_samples = 160;         // along an axis, at most
 };
 

@@ -2,43 +2,104 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <cstring>
+#include <utility>
 
-#include "common/geometry/segment.hpp"
+#include "common/field/kernel.hpp"
+#include "common/mechanics/drilling.hpp"
 
 namespace osteon::haptic {
 namespace {
 
-// Free travel in one tick: 500 mm/s. A device that moves faster is followed a little later.
-constexpr double kMostTravel_mm = 0.5;
-constexpr int kMostSubSteps = 24;
+// Free travel along a direction of cutting in one tick: 2 m/s. A device that moves faster is followed a little later.
+constexpr double kMostTravel_mm = 2.0;
+constexpr int kMostSubSteps = 24;      // of what is cut
+constexpr int kMostTravelSteps = 10;   // of what is not
 constexpr double kNothing_mm = 1e-6;
-// Points whose face looks less than this into the direction of cutting neither cut nor resist.
-constexpr double kLeastFacing = 0.2;
+// A point may be so deep in bone without being inside: what a step's own linearity leaves, far below what a hand feels.
+constexpr double kSkin_mm = 1e-4;
+constexpr double kNoise_mm = 1e-5;    // of distances in floats
+constexpr double kFlatField = 0.3;     // a gradient shorter than this says nothing: samples are clipped there
+// A drill's point holds on a slope up to this much force aside for each newton along its axis [A]: 17 degrees. Beyond it
+// skates, until most of its point is in bone.
+constexpr double kBite = 0.3, kSteepest = 3.0, kWholePoint = 0.9;
+constexpr double kSkiveSpeed_mm_per_s = 30.0;
+constexpr double kMostSkive_mm = 3.0;
+constexpr double kDrawnOut_mm = 1.0;   // in a tick, of a tool that is locked in bone
 
-Vec3 sphere_centre(const Pose& pose, double radius_mm) noexcept { return pose.point({0, 0, -radius_mm}); }
+const ContactPoint& point_at(const ToolModel& model, int i) noexcept {
+  const int first = model.contact.first_passive();
+  return i < first ? model.active[static_cast<std::size_t>(i)] : model.passive[static_cast<std::size_t>(i - first)];
+}
+bool is_real(const ToolModel& model, int i) noexcept {
+  const int first = model.contact.first_passive();
+  return i < first ? i < model.contact.active : i - first < model.contact.passive;
+}
+// Along its axis a tool is followed by walls that are no wider than what cuts; those that are wider meet bone.
+bool walls_meet_bone(const ToolModel& model) noexcept {
+  return !model.axial || model.tool.shank_diameter_mm > model.tool.diameter_mm || model.tool.kind == ToolKind::outside_reamer;
+}
+bool skives(ToolKind kind) noexcept { return kind == ToolKind::drill || kind == ToolKind::pin || kind == ToolKind::end_drill; }
+
+Pose halfway(const Pose& a, const Pose& b) noexcept {
+  return {0.5 * (a.position_mm + b.position_mm), a.rotation.slerp(0.5, b.rotation)};
+}
 
 }  // namespace
+
+Proxy::Proxy() : conditions_(std::make_unique<Conditions>()) {
+  for (Sight* sight : {&here_, &there_, &ahead_}) {
+    sight->values.make_room(kMostContactPoints);
+    sight->hard = std::make_unique<std::uint8_t[]>(kMostContactPoints);
+  }
+}
 
 void Proxy::place(const Pose& pose_bone_tool) noexcept {
   pose_ = pose_bone_tool;
   sweep_count_ = 0;
-  sweeping_ = false;
-  cut_before_ = false;
+  sweeping_ = cut_before_ = returned_ = locked_ = false;
+  skive_mm_.setZero();
+  skive_to_mm_.setZero();
+}
+
+void Proxy::Sweep::reach(const Pose& pose) noexcept {
+  to = pose;
+  pose_to_bone = to.inverse();
+  if (!shape->open_behind()) pose_middle_bone = halfway(from, to).inverse();
+}
+
+double Proxy::Sweep::left_mm(const Vec3& p, Vec3& out) const noexcept {
+  if (shape->is_ball()) {
+    const Vec3 a = from.point(shape->ball_centre_mm()), ab = to.point(shape->ball_centre_mm()) - a;
+    const double length2 = ab.squaredNorm(), t = length2 > 0.0 ? std::clamp((p - a).dot(ab) / length2, 0.0, 1.0) : 0.0;
+    const Vec3 off = a + t * ab - p;
+    const double distance = off.norm();
+    out = distance > 0.0 ? Vec3(off / distance) : Vec3(Vec3::Zero());
+    return shape->radius_mm() - distance;
+  }
+  double distance = shape->distance_mm(pose_to_bone.point(p), out);
+  out = -to.direction(out);
+  if (shape->open_behind()) return -distance;
+  for (const Pose* other : {&pose_middle_bone, &pose_from_bone}) {
+    Vec3 way;
+    const double there = shape->distance_mm(other->point(p), way);
+    if (there >= distance) continue;
+    distance = there;
+    out = -(other->rotation.conjugate() * way);
+  }
+  return -distance;
 }
 
 bool Proxy::begin_sweep(const ToolModel& model) noexcept {
   if (sweep_count_ >= kMostSweeps) return false;
   sweeping_ = true;
-  const Tool& tool = model.tool;
   Sweep& sweep = sweeps_[static_cast<std::size_t>(sweep_count_++)];
-  sweep.outline = model.axial ? &model.outline : nullptr;
-  sweep.radius_mm = 0.5 * tool.diameter_mm;
+  sweep.shape = &model.outline;
   sweep.own_cut = 0;
   sweep.open = true;
-  sweep.deepest = pose_;
-  sweep.pose_deepest_bone = pose_.inverse();
-  sweep.from_mm = sweep.to_mm = sphere_centre(pose_, sweep.radius_mm);
+  sweep.from = pose_;
+  sweep.pose_from_bone = sweep.pose_middle_bone = pose_.inverse();
+  sweep.reach(pose_);
   return true;
 }
 
@@ -47,9 +108,9 @@ void Proxy::closed(const ToolModel& model, std::uint64_t own_cut) noexcept {
   Sweep& sweep = sweeps_[static_cast<std::size_t>(sweep_count_ - 1)];
   sweep.own_cut = own_cut;
   constexpr double kSameAxis_rad = 1e-6, kSameAxis_mm = 0.02;
-  const Vec3 away_mm = pose_.position_mm - sweep.deepest.position_mm;
+  const Vec3 away_mm = pose_.position_mm - sweep.to.position_mm;
   const Vec3 axis = pose_.direction(Vec3::UnitZ());
-  if (sweep.outline && pose_.rotation.angularDistance(sweep.deepest.rotation) < kSameAxis_rad &&
+  if (sweep.shape->open_behind() && pose_.rotation.angularDistance(sweep.to.rotation) < kSameAxis_rad &&
       (away_mm - away_mm.dot(axis) * axis).norm() < kSameAxis_mm)
     return;
   sweep.open = false;
@@ -67,10 +128,8 @@ void Proxy::end_sweep() noexcept {
 void Proxy::update_sweep() noexcept {
   if (!sweeping_) return;
   Sweep& sweep = sweeps_[static_cast<std::size_t>(sweep_count_ - 1)];
-  sweep.to_mm = sphere_centre(pose_, sweep.radius_mm);
-  if ((pose_.position_mm - sweep.deepest.position_mm).dot(pose_.direction(Vec3::UnitZ())) <= 0.0) return;
-  sweep.deepest = pose_;
-  sweep.pose_deepest_bone = pose_.inverse();
+  if (sweep.shape->open_behind() && (pose_.position_mm - sweep.to.position_mm).dot(pose_.direction(Vec3::UnitZ())) <= 0.0) return;
+  sweep.reach(pose_);
 }
 
 void Proxy::forget_contained(const Patch& patch) noexcept {
@@ -82,223 +141,502 @@ void Proxy::forget_contained(const Patch& patch) noexcept {
   sweep_count_ = kept;
 }
 
-double Proxy::distance_mm(const Sweep& sweep, const Vec3& point_mm) noexcept {
-  if (!sweep.outline) return segment_distance_mm(point_mm, sweep.from_mm, sweep.to_mm) - sweep.radius_mm;
-  return sweep.outline->distance_mm(sweep.pose_deepest_bone.point(point_mm));
-}
-
-bool Proxy::solid(const Patch& patch, const Vec3& point_mm, double& solid_mm) const noexcept {
-  if (!patch.solid(point_mm, solid_mm)) return false;
-  if (solid_mm > 0.3) return true;
-  for (int i = 0; i < sweep_count_; ++i)
-    solid_mm = std::max(solid_mm, -distance_mm(sweeps_[static_cast<std::size_t>(i)], point_mm));
-  return true;
-}
-
-Vec3 Proxy::normal(const Patch& patch, const Vec3& point_mm) const noexcept {
-  const double d = patch.fine.pitch_mm() > 0.0 ? patch.fine.pitch_mm() : 0.1;
-  Vec3 gradient = Vec3::Zero();
-  for (int axis = 0; axis < 3; ++axis) {
-    const Vec3 offset = d * Vec3::Unit(axis);
-    double above = 0.0, below = 0.0;
-    if (solid(patch, point_mm + offset, above) && solid(patch, point_mm - offset, below)) gradient[axis] = above - below;
+void Proxy::look(const Tick& tick, const Pose& pose, Against against, Sight& sight) const noexcept {
+  const ToolModel& model = tick.model;
+  const ContactSet& set = model.contact;
+  ContactValues& values = sight.values;
+  const int groups = set.groups(), first = against == Against::all ? 0 : against == Against::cutting ? set.active_groups : groups;
+  std::fill_n(values.nearest_mm.begin(), first, kLeftOut_mm);
+  if (tick.scene) {
+    std::fill_n(values.distance_mm.begin(), first * kGroupPoints, kLeftOut_mm);
+    std::memset(sight.hard.get(), 0, static_cast<std::size_t>(groups * kGroupPoints));
   }
-  const double length = gradient.norm();
-  return length > 1e-9 ? Vec3(gradient / length) : Vec3(Vec3::Zero());
-}
-
-Proxy::Engagement Proxy::engagement(const ToolModel& model, const Patch& patch, const Vec3& direction) const noexcept {
-  Engagement result;
-  result.nearest_mm = std::numeric_limits<double>::max();
-  const Vec3 direction_tool = pose_.rotation.conjugate() * direction;
-  const double ahead_mm = 0.25 * model.fine_pitch_mm;
-  for (const ContactPoint& point : model.active) {
-    const double facing = point.outward.dot(direction_tool);
-    if (facing < kLeastFacing) continue;
-    // From the inset point along the direction until a quarter pitch ahead of the face: never beyond the wall of the
-    // tool's own hole.
-    const double reach_mm = std::min((model.inset + ahead_mm) / facing, 2.0 * model.fine_pitch_mm);
-    const Vec3 probe_mm = pose_.point(point.inset_mm) + reach_mm * direction;
-    const double area_mm2 = point.area_mm2 * facing;
-    double solid_mm = 0.0;
-    if (!solid(patch, probe_mm, solid_mm)) {
-      result.covered = false;
-      return result;
+  values.covered = true;
+  sight.deepest_in_bone_mm = kLeftOut_mm;
+  if (first < groups) {
+    ContactQuery query;
+    query.pose_bone_tool = pose;
+    query.first_group = first;
+    query.groups = groups - first;
+    evaluate_contact(tick.patch, set, query, values);
+  }
+  // What was cut since the patch was built is gone.
+  const float near_mm = static_cast<float>(0.75 * model.fine_pitch_mm);
+  for (int group = first; group < groups; ++group) {
+    float& nearest = values.nearest_mm[static_cast<std::size_t>(group)];
+    if (sweep_count_ > 0 && nearest < near_mm) {
+      nearest = kLeftOut_mm;
+      for (int i = group * kGroupPoints; i < (group + 1) * kGroupPoints; ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        float& distance = values.distance_mm[at];
+        if (distance < near_mm && is_real(model, i)) {
+          const Vec3 p = pose.point(point_at(model, i).inset_mm);
+          Vec3 out;
+          for (int s = 0; s < sweep_count_; ++s) {
+            const auto left = static_cast<float>(sweeps_[static_cast<std::size_t>(s)].left_mm(p, out));
+            if (left <= distance) continue;
+            distance = left;
+            values.gx[at] = static_cast<float>(out.x());
+            values.gy[at] = static_cast<float>(out.y());
+            values.gz[at] = static_cast<float>(out.z());
+          }
+        } else if (!is_real(model, i)) {
+          distance = kLeftOut_mm;
+        }
+        nearest = std::min(nearest, distance);
+      }
     }
-    result.area_mm2 += area_mm2;
-    result.nearest_mm = std::min(result.nearest_mm, solid_mm);
-    if (solid_mm >= 0.0) continue;
-    const double density = patch.density_at(probe_mm);
-    result.engaged_mm2 += area_mm2;
-    result.density += area_mm2 * density;
-    if (!model.axial)
-      result.milling += milling_resistance(model.milling, area_mm2, point.axis_distance_mm, density);
+    sight.deepest_in_bone_mm = std::min(sight.deepest_in_bone_mm, nearest);
   }
-  if (result.engaged_mm2 > 0.0) result.density /= result.engaged_mm2;
-  return result;
+  if (tick.scene) see_scene(tick, pose, against, sight);
 }
 
-Vec3 Proxy::slide(const ToolModel& model, const Patch& patch, Vec3 step_mm, bool active_too, const Vec3* across,
-                  bool& blocked, bool& covered) const noexcept {
-  for (int attempt = 0; attempt < 4; ++attempt) {
-    double worst_mm = 0.0;
-    Vec3 worst_point = Vec3::Zero();
-    const auto test = [&](const ContactPoint& point) {
-      const Vec3 at_mm = pose_.point(point.inset_mm);
-      double after_mm = 0.0, before_mm = 0.0;
-      if (!solid(patch, at_mm + step_mm, after_mm)) {
-        covered = false;
-        return;
+void Proxy::see_scene(const Tick& tick, const Pose& pose, Against, Sight& sight) const noexcept {
+  constexpr float kWithin_mm = 0.25f;  // deeper than this the item was set where the tool already was: it is let out
+  const ToolModel& model = tick.model;
+  ContactValues& values = sight.values;
+  for (const PlacedGuide& item : tick.around.items) {
+    if (!item.solid || (item.id != 0 && item.id == tick.around.guide)) continue;
+    const Pose pose_item_tool = item.pose_bone_guide.inverse() * pose;
+    // Twice at most: first whether the tool is in it.
+    for (const bool let_out : {true, false}) {
+      bool within = false;
+      for (int group = 0; group < model.contact.groups() && !within; ++group) {
+        const ContactSet::Ball& ball = model.contact.balls[static_cast<std::size_t>(group)];
+        if (!item.solid->near(pose_item_tool.point(Vec3(ball.x, ball.y, ball.z)), ball.radius_mm)) continue;
+        for (int i = group * kGroupPoints; i < (group + 1) * kGroupPoints && !within; ++i) {
+          if (!is_real(model, i)) break;
+          double distance_mm = 0.0;
+          Vec3 gradient;
+          if (!item.solid->sample(pose_item_tool.point(point_at(model, i).inset_mm), distance_mm, gradient)) continue;
+          const auto distance = static_cast<float>(distance_mm);
+          if (let_out) {
+            within = distance < -kWithin_mm;
+            continue;
+          }
+          const auto at = static_cast<std::size_t>(i);
+          if (distance >= values.distance_mm[at]) continue;
+          const Vec3 out = item.pose_bone_guide.direction(gradient);
+          values.distance_mm[at] = distance;
+          values.gx[at] = static_cast<float>(out.x());
+          values.gy[at] = static_cast<float>(out.y());
+          values.gz[at] = static_cast<float>(out.z());
+          sight.hard[at] = 1;
+          values.nearest_mm[static_cast<std::size_t>(group)] = std::min(values.nearest_mm[static_cast<std::size_t>(group)], distance);
+        }
       }
-      if (after_mm >= 0.0 || !solid(patch, at_mm, before_mm)) return;
-      // Only what makes it worse counts: a tool that was left inside bone can always be drawn out.
-      const double deeper_mm = std::min(-after_mm, before_mm - after_mm);
-      if (deeper_mm > worst_mm) {
-        worst_mm = deeper_mm;
-        worst_point = at_mm + step_mm;
+      if (within) break;
+    }
+  }
+}
+
+void Proxy::add_conditions(const Tick& tick, const Sight& sight, const Pose& pose, const Motion& at, double reach_mm, bool broken_only) noexcept {
+  const ToolModel& model = tick.model;
+  const int groups = model.contact.groups();
+  // How deep each may be: nowhere, or where it is already, a little on its way out.
+  const auto floor_mm = [&](int i) {
+    const double now = static_cast<double>(here_.values.distance_mm[static_cast<std::size_t>(i)]);
+    return now >= 0.0 ? 0.0 : now + std::min(-now, kSkin_mm);
+  };
+  const auto asked = [&](int i) {
+    const double d = static_cast<double>(sight.values.distance_mm[static_cast<std::size_t>(i)]);
+    if (!broken_only) return d < reach_mm;
+    const double now = static_cast<double>(here_.values.distance_mm[static_cast<std::size_t>(i)]);
+    return d < std::min(-kSkin_mm, now) - kNoise_mm;
+  };
+  const auto visit = [&](const auto& see) {
+    for (int group = 0; group < groups; ++group) {
+      if (static_cast<double>(sight.values.nearest_mm[static_cast<std::size_t>(group)]) >= (broken_only ? 0.0 : reach_mm)) continue;
+      for (int i = group * kGroupPoints; i < (group + 1) * kGroupPoints; ++i)
+        if (is_real(model, i) && asked(i)) see(i);
+    }
+  };
+  // Evenly over all of them where they are more than there is room for.
+  constexpr int kMostAtOnce = Conditions::kMost / 4;
+  int found = 0, seen = 0;
+  visit([&](int) { ++found; });
+  const int every = (found + kMostAtOnce - 1) / kMostAtOnce;
+  visit([&](int i) {
+    if (every > 1 && seen++ % every != 0) return;
+    const auto p = static_cast<std::size_t>(i);
+    const ContactPoint& point = point_at(model, i);
+    Condition condition;
+    condition.n = Vec3(sight.values.gx[p], sight.values.gy[p], sight.values.gz[p]);
+    if (condition.n.norm() < kFlatField) condition.n = -pose.direction(point.outward);
+    condition.m = pose.direction(point.inset_mm).cross(condition.n);
+    condition.least_mm = floor_mm(i) - static_cast<double>(sight.values.distance_mm[p]) + condition.n.dot(at.move_mm) + condition.m.dot(at.turn_rad);
+    conditions_->add(condition);
+  });
+}
+
+double Proxy::safe_part(const Tick& tick, const Motion& motion, Against against) const noexcept {
+  const ContactSet& set = tick.model.contact;
+  const double least_mm = 0.5 * tick.model.fine_pitch_mm, turn = motion.turn_rad.norm();
+  double part = 1.0;
+  for (int group = against == Against::cutting && !tick.scene ? set.active_groups : 0; group < set.groups(); ++group) {
+    const ContactSet::Ball& ball = set.balls[static_cast<std::size_t>(group)];
+    const Vec3 centre = pose_.direction(Vec3(ball.x, ball.y, ball.z));
+    const double way_mm = (motion.move_mm + motion.turn_rad.cross(centre)).norm() + turn * static_cast<double>(ball.radius_mm);
+    const double may_mm = std::max(least_mm, 0.8 * static_cast<double>(here_.values.nearest_mm[static_cast<std::size_t>(group)]));
+    if (way_mm * part > may_mm) part = may_mm / way_mm;
+  }
+  return part;
+}
+
+Motion Proxy::allowed(const Tick& tick, const Motion& piece, Against against, const MotionLimits& limits, ProxyStep& report) noexcept {
+  constexpr int kMostTries = 7, kMostSolved = 4;
+  const double most_mm = 1.5 * norm_mm(piece, limits.arm_mm) + 1e-3;
+  bool held = false;
+  conditions_->clear();
+  add_conditions(tick, here_, pose_, Motion{}, 1.25 * tick.model.fine_pitch_mm, false);
+  Motion motion = least_motion(piece, *conditions_, limits, held);
+  for (int attempt = 1; attempt <= kMostTries; ++attempt) {
+    const double length_mm = norm_mm(motion, limits.arm_mm);
+    if (length_mm > most_mm) motion = (most_mm / length_mm) * motion;
+    if (!(length_mm > 1e-9)) break;
+    const Pose there = moved(pose_, motion);
+    look(tick, there, against, there_);
+    if (!there_.values.covered) return {};  // not known there: the tool waits for its patch
+    const int before = conditions_->count();
+    add_conditions(tick, there_, there, motion, 0.0, true);
+    if (conditions_->count() == before) {
+      report.contact |= held;
+      report.moved_mm += motion.move_mm;
+      pose_ = there;
+      std::swap(here_, there_);
+      return motion;
+    }
+    held = true;
+    if (attempt < kMostSolved) motion = least_motion(piece, *conditions_, limits, held);
+    else motion = 0.5 * motion;
+  }
+  report.contact = true;
+  return {};
+}
+
+void Proxy::travel(const Tick& tick, const Pose& wanted, const Vec3* across, bool move_too, ProxyStep& report) noexcept {
+  const MotionLimits limits{.arm_mm = kTurnArm_mm, .may_turn = true, .across = across};
+  for (int i = 0; i < kMostTravelSteps; ++i) {
+    Motion left = between(pose_, wanted);
+    if (!move_too) left.move_mm.setZero();
+    if (across) left.move_mm -= left.move_mm.dot(*across) * *across;
+    if (norm_mm(left, limits.arm_mm) < kNothing_mm) return;
+    const double part = safe_part(tick, left, Against::all);
+    const Motion done = allowed(tick, part * left, Against::all, limits, report);
+    if (part >= 1.0 || norm_mm(done, limits.arm_mm) < kNothing_mm) return;
+  }
+}
+
+Proxy::Engagement Proxy::engagement(const Tick& tick, const Vec3& direction) noexcept {
+  const ToolModel& model = tick.model;
+  const ContactSet& set = model.contact;
+  ContactQuery query;
+  query.pose_bone_tool = pose_;
+  query.groups = set.active_groups;
+  query.density = query.ahead = true;
+  query.direction_bone = direction;
+  query.least_facing = model.least_facing;
+  query.strength = &model.strength;
+  // From the inset point along the direction until a quarter pitch ahead of the face: never beyond the wall of the tool's
+  // own hole. Sides that cut though they hardly look ahead ask before their own face.
+  const double ahead_mm = 0.25 * model.fine_pitch_mm;
+  if (model.tool.kind == ToolKind::broach) {
+    query.lift_mm = model.inset + ahead_mm;
+  } else {
+    query.ahead_mm = model.inset + ahead_mm;
+    query.most_mm = 2.0 * model.fine_pitch_mm;
+  }
+  ContactValues& values = ahead_.values;
+  Engagement now;
+  now.sums = evaluate_contact(tick.patch, set, query, values);
+  now.covered = values.covered;
+  ContactSums& sums = now.sums;
+  if (sweep_count_ > 0 && sums.engaged_mm2 > 0.0) {
+    const Vec3 toward = pose_.rotation.conjugate() * direction;
+    bool any = false;
+    for (int group = 0; group < set.active_groups; ++group) {
+      if (values.nearest_mm[static_cast<std::size_t>(group)] >= 0.0f) continue;
+      for (int i = group * kGroupPoints; i < (group + 1) * kGroupPoints; ++i) {
+        const auto p = static_cast<std::size_t>(i);
+        if (values.distance_mm[p] >= 0.0f || !is_real(model, i)) continue;
+        const ContactPoint& point = model.active[p];
+        const double facing = point.outward.dot(toward);
+        const Vec3 tool_mm = point.inset_mm + query.lift_mm * point.outward;
+        const Vec3 probe = pose_.point(tool_mm) + std::min(query.ahead_mm / facing, query.most_mm) * direction;
+        double left_mm = -1.0;
+        Vec3 out;
+        for (int s = 0; s < sweep_count_ && left_mm < 0.0; ++s) left_mm = sweeps_[static_cast<std::size_t>(s)].left_mm(probe, out);
+        if (left_mm < 0.0) continue;
+        // Gone since the patch was built: it does not count.
+        any = true;
+        values.distance_mm[p] = static_cast<float>(left_mm);
+        const double area = point.area_mm2 * facing, density = static_cast<double>(values.density_g_cm3[p]), arm = static_cast<double>(set.arm_mm[p]);
+        const double step = std::min(density, kMostDensity_g_cm3) * (kDensitySteps / kMostDensity_g_cm3);
+        const auto below = static_cast<std::size_t>(step);
+        const double strength = static_cast<double>(model.strength[below]) +
+                                (step - static_cast<double>(below)) * static_cast<double>(model.strength[below + 1] - model.strength[below]);
+        sums.engaged_mm2 -= area;
+        sums.turned_area_mm2 -= point.area_mm2;
+        sums.density_mm2 -= area * density;
+        sums.milling -= area / arm * strength;
+        sums.arm_mm3 -= area * arm;
+        sums.force += area * density * point.outward;
+        sums.torque += area * density * tool_mm.cross(point.outward);
       }
-    };
-    for (const ContactPoint& point : model.passive) test(point);
-    if (active_too)
-      for (const ContactPoint& point : model.active) test(point);
-    if (worst_mm <= 1e-9) return step_mm;
-
-    blocked = true;
-    Vec3 out = normal(patch, worst_point);
-    if (across) out -= out.dot(*across) * *across;
-    const double length = out.norm();
-    if (length < 0.1) return Vec3::Zero();
-    step_mm += out * (worst_mm / (length * length));
+    }
+    if (any) {
+      sums.nearest_mm = static_cast<double>(kLeftOut_mm);
+      for (int i = 0; i < set.active_groups * kGroupPoints; ++i)
+        sums.nearest_mm = std::min(sums.nearest_mm, static_cast<double>(values.distance_mm[static_cast<std::size_t>(i)]));
+      sums.engaged_mm2 = std::max(0.0, sums.engaged_mm2);
+      sums.milling = std::max(0.0, sums.milling);
+    }
   }
-  return Vec3::Zero();
+  LawInputs& in = now.inputs;
+  in.spindle_rpm = tick.spindle_rpm;
+  in.wear = tick.around.effects ? tick.around.effects->wear() : model.wear;
+  if (sums.engaged_mm2 > 0.0) {
+    in.density_g_cm3 = std::max(0.0, sums.density_mm2) / sums.engaged_mm2;
+    in.engaged = std::min(1.0, sums.engaged_mm2 / sums.area_mm2);
+    in.engaged_area_mm2 = sums.engaged_mm2;
+    in.milling_sum = sums.milling;
+    in.mean_arm_mm = sums.arm_mm3 / sums.engaged_mm2;
+    in.directed_density = std::max(0.0, sums.density_mm2) / model.active_area_mm2;
+  }
+  return now;
 }
 
-void Proxy::travel(const ToolModel& model, const Patch& patch, Vec3 left_mm, const Vec3* across,
-                   ProxyStep& report) noexcept {
-  // Small steps, so that no thin wall is jumped over.
-  constexpr int kSteps = 6;
-  const double longest_mm = 0.5 * model.fine_pitch_mm;
-  for (int i = 0; i < kSteps && left_mm.norm() > kNothing_mm; ++i) {
-    const Vec3 piece_mm = left_mm * std::min(1.0, longest_mm / left_mm.norm());
-    const Vec3 by_mm = slide(model, patch, piece_mm, true, across, report.contact, report.covered);
-    if (!report.covered) return;
-    pose_.position_mm += by_mm;
-    report.moved_mm += by_mm;
-    left_mm -= piece_mm;
-  }
+void Proxy::note_forces(const Tick& tick, const Engagement& now, const Vec3& direction, double thrust_n, ProxyStep& report) noexcept {
+  const ToolModel& model = tick.model;
+  report.cutting_force_n = thrust_n * direction;
+  report.torque_nmm = model.law->torque_nmm(model.law_tool, now.inputs, thrust_n);
+  if (tick.around.effects) report.torque_nmm = tick.around.effects->torque_nmm(report.torque_nmm);
+  // Each engaged face bears its share (7.12, 7.14): their moment about the tip, and the spindle's own, which the bone turns
+  // back.
+  const double along = -pose_.direction(now.sums.force).dot(direction);
+  cut_moment_nmm_ = -report.torque_nmm * pose_.direction(Vec3::UnitZ());
+  if (along > 0.0) cut_moment_nmm_ += thrust_n / along * pose_.direction(now.sums.torque);
 }
 
-void Proxy::advance(const ToolModel& model, const Patch& patch, const Vec3& direction, double distance_mm,
-                    double spindle_rpm, double stiffness_n_per_mm, bool may_cut, double dt_s, ProxyStep& report) noexcept {
+void Proxy::note_slope(const Tick& tick, const Vec3& direction, double extension_mm) noexcept {
+  // What bone is met pushes out along its own normal: where that is not against the feed, the point is pushed down the
+  // slope, as far as the coupling lets it.
+  const ContactSet& set = tick.model.contact;
+  const ContactValues& values = ahead_.values;
+  Vec3 out = Vec3::Zero();
+  for (int group = 0; group < set.active_groups; ++group) {
+    if (values.nearest_mm[static_cast<std::size_t>(group)] >= 0.0f) continue;
+    for (int i = group * kGroupPoints; i < (group + 1) * kGroupPoints; ++i) {
+      const auto p = static_cast<std::size_t>(i);
+      if (values.distance_mm[p] < 0.0f) out += static_cast<double>(set.area_mm2[p]) * Vec3(values.gx[p], values.gy[p], values.gz[p]);
+    }
+  }
+  const double against = -out.dot(direction);
+  const Vec3 aside = out + against * direction;
+  const double slope = against > 0.0 ? aside.norm() / against : 0.0;
+  if (slope > kBite) skive_to_mm_ = aside / aside.norm() * std::min(kMostSkive_mm, (std::min(slope, kSteepest) - kBite) * extension_mm);
+}
+
+void Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm, ProxyStep& report) noexcept {
+  const ToolModel& model = tick.model;
+  const bool walls = walls_meet_bone(model);
+  const Against against = walls ? Against::cutting : Against::scene;
+  const MotionLimits limits{.arm_mm = kTurnArm_mm, .may_turn = false};
+  if (walls || tick.scene) look(tick, pose_, against, here_);
   const double least_mm = 0.25 * model.fine_pitch_mm;
   double extension_mm = distance_mm;
   double free_mm = std::min(distance_mm, kMostTravel_mm);
-  double left_s = dt_s;
+  double left_s = tick.dt_s;
   double cut_mm = 0.0;
   for (int i = 0; i < kMostSubSteps && extension_mm > 0.0 && left_s > 0.0; ++i) {
-    const Engagement now = engagement(model, patch, direction);
-    if (!now.covered) {
-      report.covered = false;
-      return;
-    }
-    const bool engaged = now.engaged_mm2 > 1e-3 * now.area_mm2;
+    const Engagement now = engagement(tick, direction);
+    if (!now.covered) break;  // not known ahead: the tool waits for its patch
+    const bool engaged = now.sums.engaged_mm2 > 1e-3 * now.sums.area_mm2;
     double step_mm = 0.0;
+    FeedSolution feed;
     if (!engaged) {
       if (report.cutting || cut_before_) {
         report.breakthrough = true;
         break;
       }
-      step_mm = std::min(free_mm, std::max(least_mm, 0.8 * now.nearest_mm));
+      step_mm = std::min(free_mm, std::max(least_mm, 0.8 * now.sums.nearest_mm));
       if (step_mm <= 0.0) break;
     } else {
       report.contact = true;
-      report.engaged = now.engaged_mm2 / now.area_mm2;
-      report.density_g_cm3 = now.density;
-      if (!may_cut) break;
-      const RevolutionsPerMinute speed{spindle_rpm};
-      FeedLaw law = model.axial ? drilling_law(model.drilling, speed, GramsPerCm3{now.density}, report.engaged)
-                                : milling_law(model.milling, speed, now.milling, GramsPerCm3{now.density}, report.engaged);
-      // A screw's thread lets it advance by its pitch in a turn, no less for its heel and no more.
-      if (model.tool.kind == ToolKind::screw) law.max_feed_mm_per_s = model.tool.thread_pitch_mm * spindle_rpm / 60.0;
-      const FeedSolution solution = solve_feed(law, stiffness_n_per_mm, extension_mm, left_s);
+      report.engaged = now.inputs.engaged;
+      report.engaged_area_mm2 = now.inputs.engaged_area_mm2;
+      report.density_g_cm3 = now.inputs.density_g_cm3;
+      if (skives(model.tool.kind) && now.inputs.engaged < kWholePoint) note_slope(tick, direction, extension_mm);
+      if (!tick.may_cut) break;
+      FeedLaw law = model.law->feed_law(model.law_tool, now.inputs);
+      if (tick.around.effects) law = tick.around.effects->felt(law);
+      const FeedSolution solution = solve_feed(law, tick.stiffness_n_per_mm, extension_mm, left_s);
       if (!(solution.feed_mm_per_s > 0.0)) break;
-      report.cutting = true;
-      report.heel_contact = solution.heel_contact;
-      report.cutting_force_n = solution.cutting_n * direction;
-      report.torque_nmm = (model.axial ? drilling_torque(model.drilling, Newtons{solution.cutting_n})
-                                 : milling_torque(model.milling, Newtons{solution.cutting_n})).value();
+      feed = solution;
       // Engagement is asked again before the face has moved half a pitch.
       step_mm = std::min(solution.feed_mm_per_s * left_s, 0.5 * model.fine_pitch_mm);
       left_s -= step_mm / solution.feed_mm_per_s;
       if (left_s < 1e-9) left_s = 0.0;
-      cut_mm += step_mm;
-      report.cutting_work_mj += solution.cutting_n * step_mm;
     }
-    // The shank blocks even where the cutting part goes on; walls no wider than what cuts cannot block along the axis.
-    Vec3 by_mm = step_mm * direction;
+    // Walls and the scene block even where the cutting part goes on.
     bool blocked = false;
-    if (!model.axial || model.tool.shank_diameter_mm > model.tool.diameter_mm) by_mm = slide(model, patch, by_mm, false, nullptr, blocked, report.covered);
-    if (blocked) report.contact = true;
-    pose_.position_mm += by_mm;
-    report.moved_mm += by_mm;
+    if (walls || tick.scene) {
+      Motion piece;
+      piece.move_mm = step_mm * direction;
+      const double part = engaged ? 1.0 : safe_part(tick, piece, against);
+      ProxyStep found;
+      step_mm = allowed(tick, part * piece, against, limits, found).move_mm.dot(direction);
+      blocked = found.contact || !(step_mm > 0.0);
+      report.contact |= found.contact;
+      report.moved_mm += found.moved_mm;
+    } else {
+      pose_.position_mm += step_mm * direction;
+      report.moved_mm += step_mm * direction;
+    }
+    if (engaged && step_mm > 0.0) {
+      report.cutting = true;
+      report.heel_contact = feed.heel_contact;
+      note_forces(tick, now, direction, feed.cutting_n, report);
+      cut_mm += step_mm;
+      report.cutting_work_mj += feed.cutting_n * step_mm;
+    }
     update_sweep();
     extension_mm -= step_mm;
     free_mm -= engaged ? 0.0 : step_mm;
-    if (blocked || !report.covered) break;
+    if (blocked) break;
   }
-  report.feed_mm_per_s = cut_mm / dt_s;
+  report.feed_mm_per_s = cut_mm / tick.dt_s;
+}
+
+void Proxy::cut_towards(const Tick& tick, const Pose& wanted, ProxyStep& report) noexcept {
+  const ToolModel& model = tick.model;
+  if (model.feed == Feeding::along) {
+    // Across its axis it only blocks; along it, it feeds.
+    const Vec3 before = pose_.direction(Vec3::UnitZ());
+    Pose beside = wanted;
+    const double most_mm = kSkiveSpeed_mm_per_s * tick.dt_s;
+    const Vec3 change = skive_to_mm_ - skive_mm_;
+    skive_mm_ += change.norm() > most_mm ? Vec3(change * (most_mm / change.norm())) : change;
+    skive_to_mm_.setZero();
+    if (tick.around.guide == 0) beside.position_mm += skive_mm_;
+    travel(tick, beside, &before, true, report);
+    const Vec3 axis = pose_.direction(Vec3::UnitZ());
+    const double along_mm = (wanted.position_mm - pose_.position_mm).dot(axis);
+    if (along_mm < 0.0) {
+      Motion back;
+      back.move_mm = std::max(along_mm, -kMostTravel_mm) * axis;
+      if (tick.scene) {
+        look(tick, pose_, Against::scene, here_);
+        allowed(tick, safe_part(tick, back, Against::scene) * back, Against::scene, {.may_turn = false}, report);
+      } else {
+        pose_.position_mm += back.move_mm;
+        report.moved_mm += back.move_mm;
+      }
+    } else if (along_mm > kNothing_mm) {
+      advance(tick, axis, along_mm, report);
+    }
+    return;
+  }
+  // What turns it, and of a blade what moves it across its flat, only goes as far as bone lets it.
+  Pose turned{pose_.position_mm, wanted.rotation};
+  Vec3 away_mm = wanted.position_mm - pose_.position_mm;
+  const bool blade = model.feed == Feeding::in_plane;
+  if (blade) {
+    const Vec3 flat = pose_.direction(Vec3::UnitY());
+    turned.position_mm += away_mm.dot(flat) * flat;
+  }
+  if (norm_mm(between(pose_, turned), kTurnArm_mm) > kNothing_mm) travel(tick, turned, nullptr, true, report);
+  away_mm = wanted.position_mm - pose_.position_mm;
+  if (blade) {
+    const Vec3 flat = pose_.direction(Vec3::UnitY());
+    away_mm -= away_mm.dot(flat) * flat;
+  }
+  const double distance_mm = away_mm.norm();
+  if (distance_mm > kNothing_mm) advance(tick, away_mm / distance_mm, distance_mm, report);
+  if (report.cutting || report.breakthrough) return;
+  // It rubs: along the surface it goes where it is led.
+  look(tick, pose_, Against::all, here_);
+  travel(tick, wanted, nullptr, true, report);
+}
+
+bool Proxy::bone_returned(const Tick& tick, const Pose& wanted, ProxyStep& report) noexcept {
+  const double deepest_mm = static_cast<double>(here_.deepest_in_bone_mm), pitch_mm = tick.model.fine_pitch_mm;
+  if (deepest_mm >= -pitch_mm) {
+    returned_ = locked_ = false;
+    return false;
+  }
+  returned_ = report.returned = true;
+  locked_ |= deepest_mm <= -0.99 * kBandVoxels * pitch_mm;
+  report.locked = locked_;
+  if (!locked_) return false;
+  // Where it is deeper than the band nothing says which way is out; every tool comes out along its shank.
+  const Vec3 axis = pose_.direction(Vec3::UnitZ());
+  const double along_mm = (wanted.position_mm - pose_.position_mm).dot(axis);
+  if (along_mm < 0.0) {
+    const Vec3 back_mm = std::max(along_mm, -kDrawnOut_mm) * axis;
+    pose_.position_mm += back_mm;
+    report.moved_mm += back_mm;
+  }
+  return true;
+}
+
+bool Proxy::near_bone(const Tick& tick) noexcept {
+  const ToolModel& model = tick.model;
+  const float near_mm = static_cast<float>(0.25 * model.fine_pitch_mm);
+  ContactQuery query;
+  query.pose_bone_tool = pose_;
+  query.groups = model.contact.active_groups;
+  query.lift_mm = model.inset;
+  ContactValues& values = ahead_.values;
+  evaluate_contact(tick.patch, model.contact, query, values);
+  for (int group = 0; group < model.contact.active_groups; ++group) {
+    if (values.nearest_mm[static_cast<std::size_t>(group)] >= near_mm) continue;
+    if (sweep_count_ == 0) return true;
+    for (int i = group * kGroupPoints; i < (group + 1) * kGroupPoints; ++i) {
+      if (values.distance_mm[static_cast<std::size_t>(i)] >= near_mm || !is_real(model, i)) continue;
+      const Vec3 p = pose_.point(model.active[static_cast<std::size_t>(i)].surface_mm);
+      double left_mm = -1e9;
+      Vec3 out;
+      for (int s = 0; s < sweep_count_; ++s) left_mm = std::max(left_mm, sweeps_[static_cast<std::size_t>(s)].left_mm(p, out));
+      if (left_mm < static_cast<double>(near_mm)) return true;
+    }
+  }
+  return false;
 }
 
 ProxyStep Proxy::step(const ToolModel& model, const Patch& patch, const Pose& pose_bone_device, double spindle_rpm,
-                      double stiffness_n_per_mm, bool may_cut, double dt_s) noexcept {
+                      double stiffness_n_per_mm, bool may_cut, double dt_s, const Surroundings& around) noexcept {
   ProxyStep report;
   forget_contained(patch);
+  Tick tick{model, patch, around, stiffness_n_per_mm, spindle_rpm, false, dt_s};
+  for (const PlacedGuide& item : around.items) tick.scene |= item.solid && !(item.id != 0 && item.id == around.guide);
 
-  // The device's rotation is taken wherever the tool fits with it.
-  if (pose_.rotation.angularDistance(pose_bone_device.rotation) > 1e-7) {
-    const Pose turned{pose_.position_mm, pose_bone_device.rotation};
-    const auto fits = [&](const ContactPoint& point) {
-      double before_mm = 0.0, after_mm = 0.0;
-      if (!solid(patch, turned.point(point.inset_mm), after_mm)) return false;
-      return after_mm >= 0.0 || (solid(patch, pose_.point(point.inset_mm), before_mm) && after_mm >= before_mm);
-    };
-    if (std::ranges::all_of(model.active, fits) && std::ranges::all_of(model.passive, fits)) pose_ = turned;
+  look(tick, pose_, Against::all, here_);
+  if (!here_.values.covered) {
+    report.covered = false;
+    return report;
   }
-
-  const bool cuts = may_cut && spindle_rpm >= kMinCuttingRpm;
-  const Vec3 away_mm = pose_bone_device.position_mm - pose_.position_mm;
-  if (model.axial) {
-    // Across its axis a drill only blocks; along it, it feeds.
-    const Vec3 axis = pose_.direction(Vec3::UnitZ());
-    const double along_mm = away_mm.dot(axis);
-    travel(model, patch, away_mm - along_mm * axis, &axis, report);
-    if (along_mm < 0.0) {
-      const Vec3 by_mm = std::max(along_mm, -kMostTravel_mm) * axis;
-      pose_.position_mm += by_mm;
-      report.moved_mm += by_mm;
-    } else if (along_mm > kNothing_mm && report.covered) {
-      advance(model, patch, axis, along_mm, spindle_rpm, stiffness_n_per_mm, cuts, dt_s, report);
-    }
-  } else if (away_mm.norm() > kNothing_mm) {
-    const double distance_mm = away_mm.norm();
-    if (cuts) {
-      advance(model, patch, away_mm / distance_mm, distance_mm, spindle_rpm, stiffness_n_per_mm, true, dt_s, report);
-    } else {
-      travel(model, patch, away_mm, nullptr, report);
-    }
+  cut_moment_nmm_.setZero();
+  if (bone_returned(tick, pose_bone_device, report)) {
+    cut_before_ = false;
+    return report;
+  }
+  tick.may_cut = may_cut && !returned_ && model.feed != Feeding::none && spindle_rpm >= kMinCuttingRpm;
+  if (tick.may_cut) {
+    cut_towards(tick, pose_bone_device, report);
+  } else {
+    skive_mm_.setZero();
+    travel(tick, pose_bone_device, nullptr, true, report);
   }
   update_sweep();
   cut_before_ = report.cutting && !report.breakthrough;
 
-  if (cuts && report.covered) {
-    for (const ContactPoint& point : model.active) {
-      double solid_mm = 0.0;
-      if (solid(patch, pose_.point(point.surface_mm), solid_mm) && solid_mm < 0.25 * model.fine_pitch_mm) {
-        report.near_bone = true;
-        break;
-      }
-    }
-  }
+  // What turned the tool may have pushed it back by more than it cut.
+  if (report.cutting_force_n.dot(report.moved_mm) < 0.0) report.cutting_force_n.setZero();
+  report.turn_rad = between(pose_, pose_bone_device).turn_rad;
+  report.contact_torque_nmm = cut_moment_nmm_;
+  if (report.contact) report.contact_torque_nmm -= stiffness_n_per_mm * kTurnArm_mm * kTurnArm_mm * report.turn_rad;
+  if (tick.may_cut) report.near_bone = near_bone(tick);
   return report;
 }
 

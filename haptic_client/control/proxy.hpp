@@ -1,13 +1,22 @@
-// The tool that the bone sees: a god-object that follows the device but never enters bone except by cutting it.
+// The tool that the bone sees: a god-object of six degrees of freedom that follows the device but never enters bone except
+// by cutting it, nor what stands on the bone.
 //
-// Translation is solved against contact points; the rotation is the device's wherever the tool fits. Points on the
-// cutting part ask for bone a little ahead of the face they stand for: so it does not matter that patches are some
-// milliseconds old, nor that interpolation rounds edges by half a pitch. What was cut since the patch was built is
+// Each tick it takes the motion nearest to the device's that every contact point allows: a move of the tip and a turn about
+// it, where a turn counts as much as a move that is kTurnArm_mm times as long. So a tool that is pressed on one side leans,
+// one in a hole keeps to the hole, and what the device's orientation asks for beyond that is a torque. The motion goes in
+// parts of at most half a patch pitch, or as far as nothing is near: no wall that the patch shows is ever jumped over.
+// Points on the cutting part ask for bone a little ahead of the face they stand for: so it does not matter that patches are
+// some milliseconds old, nor that interpolation rounds edges by half a pitch. What was cut since the patch was built is
 // known from a ring of the proxy's own recent sweeps.
 #pragma once
 #include <array>
 #include <cstdint>
+#include <memory>
+#include <span>
 
+#include "common/mechanics/cutting_effects.hpp"
+#include "haptic_client/control/guiding.hpp"
+#include "haptic_client/control/least_motion.hpp"
 #include "haptic_client/control/patch.hpp"
 #include "haptic_client/control/tool_model.hpp"
 
@@ -19,25 +28,43 @@ struct ProxyStep {
   bool cutting = false;        // it advances into bone
   bool near_bone = false;      // the cutting part touches or may remove bone
   bool heel_contact = false;
+  bool returned = false;       // bone came back where the tool is: it cuts nothing until it has left that
+  bool locked = false;         // and so deep that it cannot be felt: no force, the spindle is to stand, until drawn out
   double feed_mm_per_s = 0;    // into bone, along the direction of cutting
   double density_g_cm3 = 0;    // engaged-area weighted
   double engaged = 0;          // share of the leading projected area in bone
-  double torque_nmm = 0;
+  double engaged_area_mm2 = 0; // that area
+  double torque_nmm = 0;       // of the bone on the spindle, about the tool's axis
   Vec3 cutting_force_n = Vec3::Zero();  // of the tool on the bone
   double cutting_work_mj = 0;  // of the law's force over the way cut in this tick, its parts added; never negative
   // What was being cut ended in this tick or with the one before: the tool has stopped there, its coupling still
   // stretched; where it goes on is the loop's to say.
   bool breakthrough = false;
   Vec3 moved_mm = Vec3::Zero();
+  // Of bone and scene on the tool, about its tip, bone frame: what holds its turn back, and the moment of the cut. Never a
+  // force on a device of three axes.
+  Vec3 contact_torque_nmm = Vec3::Zero();
+  Vec3 turn_rad = Vec3::Zero();  // from the proxy's orientation to the wanted one
+};
+
+// What else is there beside the bone.
+struct Surroundings {
+  std::span<const PlacedGuide> items;
+  std::uint32_t guide = 0;  // the one whose opening holds the tool, 0 for none: it is not touched, as its play rules
+  const CuttingEffects* effects = nullptr;  // of the tool in hand; null: it is as sharp as its model says, and clean
 };
 
 class Proxy {
  public:
+  // K of a turn is the coupling's times this arm squared [A]: about a hand's width from where a pencil grip turns.
+  static constexpr double kTurnArm_mm = 20.0;
+
+  Proxy();
   // [haptic] Puts the tool down somewhere in free air.
   void place(const Pose& pose_bone_tool) noexcept;
   // [haptic] One tick towards the device. `may_cut` false: every point only blocks.
   ProxyStep step(const ToolModel& model, const Patch& patch, const Pose& pose_bone_device, double spindle_rpm,
-                 double stiffness_n_per_mm, bool may_cut, double dt_s) noexcept;
+                 double stiffness_n_per_mm, bool may_cut, double dt_s, const Surroundings& around = {}) noexcept;
   // [haptic] From here on the sweep takes bone away, until end_sweep(). False where too many sweeps still wait to be
   // seen in a patch; nothing may be cut then.
   bool begin_sweep(const ToolModel& model) noexcept;
@@ -48,34 +75,65 @@ class Proxy {
   [[nodiscard]] const Pose& pose() const noexcept { return pose_; }
 
  private:
-  // What the cutting part has taken away since a patch was built. A sphere: from one place to another. A drill or
-  // reamer cuts along its axis, so its deepest place holds all others, and one sweep goes on for as long as it is not turned.
+  // What the cutting part has taken away since a patch was built: from one place to another. Of what goes along its axis
+  // the deepest place holds all others, and one sweep goes on for as long as it is not turned.
   struct Sweep {
-    const SweptOutline* outline = nullptr;  // of the tool in hand; null for a sphere
-    double radius_mm = 0;        // sphere
-    Pose deepest;                // pose_bone_tool
-    Pose pose_deepest_bone;      // its inverse
-    Vec3 from_mm, to_mm;         // sphere: its centre
-    std::uint64_t own_cut = 0;   // newest cut that holds it all; 0: none yet
+    const CutShape* shape = nullptr;  // of the tool in hand
+    Pose from, to;                    // pose_bone_tool; `to`: the deepest, where that holds all
+    Pose pose_from_bone, pose_middle_bone, pose_to_bone;
+    std::uint64_t own_cut = 0;        // newest cut that holds it all; 0: none yet
     bool open = false;
+    // f that it leaves at a point, at least, and the way out of bone there.
+    [[nodiscard]] double left_mm(const Vec3& point_mm, Vec3& out) const noexcept;
+    void reach(const Pose& pose) noexcept;
   };
-  [[nodiscard]] static double distance_mm(const Sweep& sweep, const Vec3& point_mm) noexcept;
+  // All that a tick works on.
+  struct Tick {
+    const ToolModel& model;
+    const Patch& patch;
+    const Surroundings& around;
+    double stiffness_n_per_mm;
+    double spindle_rpm;
+    bool may_cut;
+    double dt_s;
+    bool scene = false;  // something of it may be near
+  };
+  // Which points block, and against what.
+  enum class Against : std::uint8_t {
+    all,      // everything does
+    cutting,  // points that cut meet the scene only, the others bone too
+    scene,    // bone gives way
+  };
+  // What the points find at a pose.
+  struct Sight {
+    ContactValues values;
+    std::unique_ptr<std::uint8_t[]> hard;  // of each point: the scene, not bone
+    float deepest_in_bone_mm = 0;          // least distance, over blocking points
+  };
   struct Engagement {
-    double area_mm2 = 0, engaged_mm2 = 0, density = 0, milling = 0, nearest_mm = 0;
+    ContactSums sums;
+    LawInputs inputs;
     bool covered = true;
   };
 
-  [[nodiscard]] bool solid(const Patch& patch, const Vec3& point_mm, double& solid_mm) const noexcept;
-  [[nodiscard]] Vec3 normal(const Patch& patch, const Vec3& point_mm) const noexcept;
-  [[nodiscard]] Engagement engagement(const ToolModel& model, const Patch& patch, const Vec3& direction) const noexcept;
-  // The part of `step_mm` that no given point forbids; `across`: it stays square to this direction.
-  [[nodiscard]] Vec3 slide(const ToolModel& model, const Patch& patch, Vec3 step_mm, bool active_too,
-                           const Vec3* across, bool& blocked, bool& covered) const noexcept;
-  // Goes as far as nothing blocks, cutting nothing.
-  void travel(const ToolModel& model, const Patch& patch, Vec3 left_mm, const Vec3* across, ProxyStep& report) noexcept;
+  void look(const Tick& tick, const Pose& pose, Against against, Sight& sight) const noexcept;
+  void see_scene(const Tick& tick, const Pose& pose, Against against, Sight& sight) const noexcept;
+  void add_conditions(const Tick& tick, const Sight& sight, const Pose& pose, const Motion& at, double reach_mm, bool broken_only) noexcept;
+  // The part of a small motion that nothing forbids; both sights are of the poses before and after it, if it is any.
+  Motion allowed(const Tick& tick, const Motion& piece, Against against, const MotionLimits& limits, ProxyStep& report) noexcept;
+  // How much of a motion may be made at once.
+  [[nodiscard]] double safe_part(const Tick& tick, const Motion& motion, Against against) const noexcept;
+  // Goes as far towards a pose as nothing blocks, cutting nothing.
+  void travel(const Tick& tick, const Pose& wanted, const Vec3* across, bool move_too, ProxyStep& report) noexcept;
+  [[nodiscard]] Engagement engagement(const Tick& tick, const Vec3& direction) noexcept;
+  void note_slope(const Tick& tick, const Vec3& direction, double extension_mm) noexcept;
   // Goes along a direction, cutting what is in the way as far as the force allows.
-  void advance(const ToolModel& model, const Patch& patch, const Vec3& direction, double distance_mm, double spindle_rpm,
-               double stiffness_n_per_mm, bool may_cut, double dt_s, ProxyStep& report) noexcept;
+  void advance(const Tick& tick, const Vec3& direction, double distance_mm, ProxyStep& report) noexcept;
+  void cut_towards(const Tick& tick, const Pose& wanted, ProxyStep& report) noexcept;
+  // Bone that came back, by undo or rejection, where the tool is. True: the tick is over.
+  [[nodiscard]] bool bone_returned(const Tick& tick, const Pose& wanted, ProxyStep& report) noexcept;
+  void note_forces(const Tick& tick, const Engagement& now, const Vec3& direction, double thrust_n, ProxyStep& report) noexcept;
+  [[nodiscard]] bool near_bone(const Tick& tick) noexcept;
   void update_sweep() noexcept;
   void forget_contained(const Patch& patch) noexcept;
 
@@ -85,6 +143,12 @@ class Proxy {
   int sweep_count_ = 0;
   bool sweeping_ = false;
   bool cut_before_ = false;  // the last step ended cutting
+  bool returned_ = false, locked_ = false;
+  Vec3 skive_mm_ = Vec3::Zero();  // how far the point is pushed aside by the slope that it stands on
+  Vec3 skive_to_mm_ = Vec3::Zero();
+  Vec3 cut_moment_nmm_ = Vec3::Zero();
+  Sight here_, there_, ahead_;
+  std::unique_ptr<Conditions> conditions_;
 };
 
 }  // namespace osteon::haptic

@@ -110,12 +110,14 @@ bool is_guide(ToolKind kind) {
 Result<void> suits(const Tool& tool, Action action) {
   if (action == Action::place && !is_guide(tool.kind))
     return failure(ErrorCode::invalid_input, sentence(tool, "is not a guide; choose a drill sleeve or a cutting block"));
-  if (action == Action::drill && (!feeds_along_axis(tool.kind) || tool.kind == ToolKind::screw))
-    return failure(ErrorCode::invalid_input, sentence(tool, "cannot do this action; choose a drill, reamer or pin"));
+  // Saws are plunged: they go along their axis too.
+  const bool plunges = feeds_along_axis(tool.kind) || feeding(tool.kind) == Feeding::in_plane;
+  if (action == Action::drill && (!plunges || tool.kind == ToolKind::screw))
+    return failure(ErrorCode::invalid_input, sentence(tool, "cannot do this action; choose a drill, reamer, pin, broach or saw"));
   if (action == Action::screw && tool.kind != ToolKind::screw)
     return failure(ErrorCode::invalid_input, sentence(tool, "is not a screw; choose one"));
-  if (action == Action::burr && tool.kind != ToolKind::round_burr)
-    return failure(ErrorCode::invalid_input, sentence(tool, "cannot do this action; choose a round burr"));
+  const bool burr = tool.kind == ToolKind::round_burr || tool.kind == ToolKind::barrel_burr || tool.kind == ToolKind::contoured_burr;
+  if (action == Action::burr && !burr) return failure(ErrorCode::invalid_input, sentence(tool, "cannot do this action; choose a burr"));
   return {};
 }
 

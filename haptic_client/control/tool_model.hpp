@@ -1,55 +1,51 @@
-// A tool made ready for the haptic loop: its contact points and the law by which it cuts.
+// A tool made ready for the haptic loop: its contact points, how it is fed, and the law by which it cuts.
 #pragma once
-#include <array>
 #include <vector>
 
-#include "common/mechanics/drilling.hpp"
-#include "common/mechanics/milling.hpp"
+#include "common/mechanics/force_law.hpp"
 #include "common/mechanics/spindle.hpp"
 #include "common/tools/tool_solid.hpp"
+#include "haptic_client/control/contact.hpp"
+#include "haptic_client/control/cut_shape.hpp"
 
 namespace osteon::haptic {
 
-struct ContactPoint {
-  Vec3 surface_mm;   // on the tool, tool frame
-  Vec3 inset_mm;     // moved inwards by half a patch pitch and the pose quantum, else a tool jams in its own hole
-  Vec3 outward;      // unit normal out of the tool
-  double area_mm2;
-  double axis_distance_mm;
+// Where the hand may feed a tool so that it cuts.
+enum class Feeding : std::uint8_t {
+  none,      // it does not cut
+  along,     // along its axis, into the hole that it makes: drills, reamers, pins, screws, broaches
+  in_plane,  // in the plane of its blade: saws
+  any,       // wherever it is pushed: burs, solids of any form
 };
-
-// What a body of revolution leaves free behind it when it goes along its axis: the half-planes of its outline that do not
-// look back, in (distance from the axis, place along it), and a ball that rounds its end.
-struct SweptOutline {
-  struct Plane {
-    double r = 0, z = 0, offset_mm = 0;
-  };
-  std::array<Plane, kMostProfileCorners + 3> planes;
-  int count = 0;
-  double dome_mm = 0;
-  // Of a point in the tool's frame: exact inside and before faces, too small before edges, where only the sign counts.
-  [[nodiscard]] double distance_mm(const Vec3& point_mm) const noexcept;
-};
-
-// Whether the hand feeds it along its axis into the hole that it makes; the others cut sideways too, or not at all.
+[[nodiscard]] Feeding feeding(ToolKind kind) noexcept;
 [[nodiscard]] bool feeds_along_axis(ToolKind kind) noexcept;
+
+// The haptic loop has room for so many points, those that fill up groups included.
+inline constexpr int kMostContactPoints = 8192;
 
 struct ToolModel {
   Tool tool;
-  Implicit solid;                       // cutting part and shank, made once
-  bool axial = false;                   // feeds_along_axis
-  SweptOutline outline;                 // axial
+  Implicit solid;                       // cutting part and shank, of a saw over its whole stroke; made once
+  Feeding feed = Feeding::along;
+  bool axial = false;                   // feed is along
+  CutShape outline;                     // what it takes away
   int cut_level = 0;                    // the level of its cuts: the tool's own or the finest of the case
   double fine_pitch_mm = 0;             // of that level
   double inset = 0;                     // mm, see ContactPoint
+  double least_facing = 0.2;            // faces that look less than this into the feed neither cut nor resist
   std::vector<ContactPoint> active;     // on the part that cuts
   std::vector<ContactPoint> passive;    // walls and shank: they only block
-  DrillingParams drilling;
-  MillingParams milling;
+  ContactSet contact;                   // both, in the same order
+  DensityTable strength;                // milling_resistance() of 1 mm2 at 1 mm from the axis
+  double active_area_mm2 = 0;
+  double wear = 1.0;
+  const ForceLaw* law = nullptr;        // never null
+  LawTool law_tool;
   SpindleParams spindle;
 
-  // `pitch_mm`: h of the case.
-  ToolModel(const Tool& tool, double pitch_mm, double wear = 1.0);
+  // `pitch_mm`: h of the case. The law is the tool's own if it names one that suits it, else its kind's. `points`: on the
+  // part that cuts, at least; 0: as many as its size asks for.
+  ToolModel(const Tool& tool, double pitch_mm, double wear = 1.0, int points = 0);
 };
 
 }  // namespace osteon::haptic

@@ -292,6 +292,23 @@ def collision(run):
     }
 
 
+def contact(run):
+    """Thousands of points of a tool against the bone round it, beside OpenVDB's sampler."""
+    run.say("contact")
+    out = json.loads(run.output("osteon-contact-bench"))
+    run.tables.append((f"contact of {out['points']} points, {out['lanes']} at a time, {100.0 * out['in_bone']:.0f} % of them in bone", [
+        ("way", "us p50", "min", "max")] + [
+        (way, *(f"{out[f'{key}_us_{what}']:.1f}" for what in ("p50", "min", "max")))
+        for way, key in (("ours", "contact"), ("GridSampler, accessor", "accessor"), ("GridSampler, tree", "tree"))]))
+    return {
+        "contact_4096": of(out, "contact_us", "accessor_us", 1),
+        "contact_speedup": Measured(out["speedup_p50"], None, out["speedup_min"], out["speedup_max"], 1),
+        "contact_of_budget": Measured(out["contact_us_p50"] / 25.0, None, None, None, 1),
+        "contact_difference": Measured(1000.0 * out["largest_difference_mm"]),
+        "contact_force_difference": Measured(out["largest_force_difference"]),
+    }
+
+
 FRAME_MS = 1000.0 / 30.0
 
 
@@ -346,5 +363,5 @@ def real_skull(run):
 
 GROUPS = {"cutting": cutting, "accuracy": accuracy, "set_property": set_property, "set_property_full": set_property_full,
           "growth": growth, "undo": undo, "surface": surface,
-          "refinement": refinement, "collision": collision,
+          "refinement": refinement, "collision": collision, "contact": contact,
           "real_temporal": real_temporal, "real_skull": real_skull}

@@ -224,6 +224,15 @@ FIGURES = [
     Figure("collision_distance_gain", "ratio", "error of cells with the nearest voxel over that of the distance field",
            "collision", (">=", 1.0)),
     Figure("collision_cells_memory", "ratio", "memory of the cells over that of the distance field's samples", "collision"),
+    # Contact of a tool of 4096 points in the haptic loop: distances, normals, density, force and torque in one pass.
+    Figure("contact_4096", "us", "one collision and force evaluation of 4096 points with density, median with warm caches", "contact",
+           baseline="OpenVDB's GridSampler through an accessor, with central differences"),
+    Figure("contact_speedup", "ratio", "OpenVDB's GridSampler (BoxSampler, through an accessor) doing the same with central "
+           "differences, over ours, in turns", "contact", (">=", 30.0)),
+    Figure("contact_of_budget", "of_budget", "the same evaluation as a part of 25 us", "contact"),
+    Figure("contact_difference", "um", "largest difference of the two in distance near the surface", "contact", ("<=", 1.0)),
+    Figure("contact_force_difference", "ratio", "largest difference of the two in force and torque, against their size", "contact",
+           ("<=", 0.01)),
     # Devices on an emulated USB.
     Figure("falcon_cycles", "count", "frames each way with an emulated Falcon", "falcon_cycles", (">=", 100000), full=True),
     Figure("falcon_cycle_faults", "count", "of them, spoilt ones and those that gave another place than the grip's",

@@ -137,19 +137,26 @@ TEST(ScrewStep, FollowsItsThreadAndStays) {
               left[1].pose_bone_item.position_mm.z());
 }
 
-TEST(Plan, RefusesWhatTheHandCannotGuideYet) {
-  const Case bone = block_case();
-  for (const char* name : {"saw-oscillating-1", "broach-1", "burr-barrel"}) {
+TEST(Plan, TakesEachToolForWhatItIsMadeFor) {
+  const Case bone = block_case(64.0);
+  const auto asked = [&](const char* name, Action action) {
     PlanStep step;
-    step.action = Action::drill;
+    step.action = action;
     step.tool = name;
-    step.entry.toward = Vec3(0, 0, -1);
-    const auto refused = make_ready({step}, bone);
-    ASSERT_FALSE(refused.has_value()) << name;
-    EXPECT_NE(refused.error().message.find("choose a drill"), std::string::npos) << refused.error().message;
-    step.action = Action::burr;
-    EXPECT_NE(make_ready({step}, bone).error().message.find("choose a round burr"), std::string::npos);
-  }
+    step.to_mm = 3;
+    step.entry.point_mm = Vec3(0, 0, 0);
+    step.entry.axis = Vec3(0, 0, 1);
+    const auto ready = make_ready({step}, bone);
+    return ready.has_value() ? std::string() : ready.error().message;
+  };
+  for (const char* name : {"drill-3.2", "saw-oscillating-1", "saw-reciprocating", "broach-1", "broach-2", "end-drill"})
+    EXPECT_EQ(asked(name, Action::drill), "") << name;
+  for (const char* name : {"burr-round", "burr-barrel", "burr-contoured"}) EXPECT_EQ(asked(name, Action::burr), "") << name;
+  EXPECT_NE(asked("burr-barrel", Action::drill).find("choose a drill"), std::string::npos);
+  EXPECT_NE(asked("screw-1", Action::drill).find("choose a drill"), std::string::npos);
+  EXPECT_NE(asked("guide-1", Action::drill).find("choose a drill"), std::string::npos);
+  EXPECT_NE(asked("saw-oscillating-1", Action::burr).find("choose a burr"), std::string::npos);
+  EXPECT_NE(asked("trial-stem", Action::burr).find("choose a burr"), std::string::npos);
 }
 
 }  // namespace

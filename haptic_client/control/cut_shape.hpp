@@ -1,0 +1,43 @@
+// What a tool takes away, as the proxy remembers it until the bone of its patch has caught up: the cutting body's distance
+// at a point, and the way out of it.
+#pragma once
+#include <array>
+#include <memory>
+
+#include "common/tools/tool.hpp"
+
+namespace osteon::haptic {
+
+class CutShape {
+ public:
+  CutShape() = default;
+  // `open_behind`: of a tool that goes along its axis, whose hole goes on behind it: faces that look back are left out.
+  CutShape(const Tool& tool, bool open_behind);
+  // Of a point in the tool's frame: exact inside and before faces, too small before edges, where only the sign counts.
+  [[nodiscard]] double distance_mm(const Vec3& point_mm) const noexcept {
+    Vec3 out;
+    return distance_mm(point_mm, out);
+  }
+  // [haptic] `out`: its gradient, a unit vector out of the body.
+  [[nodiscard]] double distance_mm(const Vec3& point_mm, Vec3& out) const noexcept;
+  [[nodiscard]] bool open_behind() const noexcept { return open_behind_; }
+  // A ball's sweep is a capsule about its middle.
+  [[nodiscard]] bool is_ball() const noexcept { return kind_ == CutKind::ball; }
+  [[nodiscard]] double radius_mm() const noexcept { return radius_mm_; }
+  [[nodiscard]] Vec3 ball_centre_mm() const noexcept { return {0, 0, -radius_mm_}; }
+
+ private:
+  // turned: (n · (distance from the axis, place along it)); hull: n · point; both at most the offset.
+  struct Plane {
+    Vec3 n = Vec3::Zero();
+    double offset_mm = 0;
+  };
+  CutKind kind_ = CutKind::none;
+  bool open_behind_ = false;
+  int count_ = 0;
+  std::array<Plane, kMostHullPlanes + 4> planes_;
+  double radius_mm_ = 0;  // ball, and the dome that rounds a turned body's end
+  std::shared_ptr<const SampledDistance> sampled_;  // shared with the tool, immutable
+};
+
+}  // namespace osteon::haptic

@@ -1,0 +1,184 @@
+// Every tool of the box in the hand: what cuts takes bone where it is pushed and leaves force and torque on the hand, what
+// does not cut only touches, and a saw or broach comes out of what it has made.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "haptic_client/control/haptic_loop.hpp"
+#include "haptic_client/control/patch_builder.hpp"
+#include "haptic_client/control/replica.hpp"
+#include "tests/support/allocation_counter.hpp"
+#include "tests/support/scenes/bones.hpp"
+#include "tests/unit/haptic_client/bench.hpp"
+
+namespace osteon::haptic::test {
+namespace {
+
+// The hand at the loop without a plan: it holds the tool stiffly where it is told to.
+class HandStage {
+ public:
+  HandStage(Case bone, const Tool& tool, const Pose& start)
+      : replica_(std::move(bone), BodyId{}), loop_(LoopParams{}, {ToolModel(tool, replica_.predicted().bone().pitch_mm())}) {
+    input_.pose_device_tool = start;
+    loop_.take_up(0, start, WorkspaceMapping{});
+    build(start);
+  }
+  LoopReport tick() {
+    const osteon::test::AllocationCounter heap;
+    const LoopReport report = loop_.tick(input_, patch_);
+    allocations_ += heap.count();
+    force_n_ = std::max(force_n_, report.force_physical_n.norm());
+    torque_nmm_ = std::max(torque_nmm_, report.torque_nmm);
+    work_min_ = std::min(work_min_, report.cutting_force_n.dot(report.moved_mm));
+    cutting_ += report.phase == CuttingPhase::cutting;
+    touching_ += report.phase == CuttingPhase::rubbing;
+    CutPiece piece;
+    while (loop_.take_piece(piece)) {
+      const Cut cut = cut_of(piece, loop_.tool(0), AuthorId{1}, 0);
+      replica_.add_own(cut);
+      replica_.commit(RoomSeq{++seq_}, cut, true);
+    }
+    if (++ticks_ % 12 == 0) build(report.pose_bone_proxy);
+    return report;
+  }
+  LoopReport lead(const Vec3& by_mm, double seconds) {
+    const Vec3 from = input_.pose_device_tool.position_mm;
+    const int ticks = static_cast<int>(1000 * seconds);
+    LoopReport report;
+    for (int i = 1; i <= ticks; ++i) {
+      input_.pose_device_tool.position_mm = from + by_mm * i / ticks;
+      report = tick();
+    }
+    return report;
+  }
+  void build(const Pose& pose) {
+    for (const ChangedLeaves& change : replica_.take_changes())
+      builder_.changed(replica_.predicted().bone().pitch_mm(), change.level, change.origins);
+    builder_.build(replica_.predicted(), loop_.tool(0), pose, patch_);
+    patch_.own_cuts = replica_.last_own();
+  }
+
+  Replica replica_;
+  HapticLoop loop_;
+  PatchBuilder builder_;
+  Patch patch_;
+  LoopInput input_;
+  double force_n_ = 0, torque_nmm_ = 0, work_min_ = 0;
+  std::int64_t allocations_ = 0, ticks_ = 0;
+  int cutting_ = 0, touching_ = 0;
+  std::uint64_t seq_ = 0;
+};
+
+// The bone is at z > 0. Cancellous, so that a push that a hand can give goes on.
+Case block(double pitch_mm, double width_mm, double deep_mm) {
+  return osteon::test::make_bone({Vec3(-0.5 * width_mm, -0.5 * width_mm, -3), Vec3(0.5 * width_mm, 0.5 * width_mm, deep_mm)}, pitch_mm,
+                                 [=](const Vec3& p) { return std::max({-p.z(), std::abs(p.x()) - 0.5 * width_mm + 3.0, std::abs(p.y()) - 0.5 * width_mm + 3.0}); },
+                                 [](const Vec3&) { return 0.6; });
+}
+
+// How each tool is held against a face that looks along -z, and which way it is pushed: z, into the bone.
+Pose held(const Tool& tool) {
+  const Eigen::Quaterniond lying = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), Vec3::UnitX());
+  switch (tool.kind) {
+    case ToolKind::round_burr:
+    case ToolKind::barrel_burr:
+    case ToolKind::contoured_burr:  // with its side
+      return {{0.25 * tool.cutting_length_mm, 0, -0.5 * tool.diameter_mm - 0.4}, lying};
+    case ToolKind::reciprocating_saw: {  // with its toothed edge: x of the tool into the bone
+      const Eigen::Quaterniond edge(Eigen::AngleAxisd(-0.5 * std::numbers::pi, Vec3::UnitY()));
+      return {{17.0 - tool.cutting_length_mm, 0, -0.5 * tool.width_mm - 0.4}, edge};  // its plate is beside the block
+    }
+    default: return {{0.1, -0.1, -0.4}, Eigen::Quaterniond::Identity()};
+  }
+}
+
+TEST(HandTools, EveryToolThatCutsTakesBone) {
+  int tried = 0;
+  for (const Tool& tool : builtin_tools()) {
+    if (!tool.cuts()) continue;
+    const bool large = tool.cut_level == 0;
+    HandStage stage(block(large ? 1.0 : 0.5, large ? 70.0 : 40.0, large ? 24.0 : 12.0), tool, held(tool));
+    stage.input_.spindle_rpm = tool.spindle_rpm;
+    stage.lead(Vec3::Zero(), 0.5);
+    const double before = stage.replica_.removed_mm3();
+    const LoopReport pushed = stage.lead({0, 0, 2.0}, 2.0);
+    const LoopReport back = stage.lead({0, 0, -3.5}, 0.7);
+    const double removed = stage.replica_.removed_mm3() - before;
+    std::printf("  %-20s cut for %4d of 2700 ticks, %8.2f mm3, at most %6.1f N and %8.1f N mm, %.2f mm deep\n", tool.name.c_str(), stage.cutting_,
+                removed, stage.force_n_, stage.torque_nmm_, pushed.pose_bone_proxy.position_mm.z() - held(tool).position_mm.z() - 0.4);
+    EXPECT_GT(stage.cutting_, 50) << tool.name;
+    EXPECT_GT(removed, 0.05) << tool.name;
+    EXPECT_GT(stage.force_n_, 0.05) << tool.name;
+    EXPECT_GE(stage.work_min_, 0.0) << tool.name;
+    EXPECT_EQ(stage.allocations_, 0) << tool.name;
+    // Drawn back it is free: nothing jams in what it has made.
+    EXPECT_EQ(back.force_physical_n.norm(), 0.0) << tool.name;
+    EXPECT_NEAR((back.pose_bone_proxy.position_mm - stage.input_.pose_device_tool.position_mm).norm(), 0.0, 1e-5) << tool.name;
+    ++tried;
+  }
+  EXPECT_GE(tried, 21);
+}
+
+TEST(HandTools, WhatDoesNotCutOnlyTouches) {
+  for (const char* name : {"trial-cup-50", "trial-stem", "guide-1"}) {
+    const Tool tool = *find_tool(name);
+    HandStage stage(block(1.0, 70.0, 24.0), tool, {{0, 0, -0.5}, Eigen::Quaterniond::Identity()});
+    stage.input_.spindle_rpm = 1000;
+    const LoopReport report = stage.lead({0, 0, 1.5}, 0.5);
+    EXPECT_EQ(stage.cutting_, 0) << name;
+    EXPECT_GT(stage.touching_, 100) << name;
+    EXPECT_LT(report.pose_bone_proxy.position_mm.z(), 0.6) << name;
+    EXPECT_GT(-report.force_physical_n.z(), 10.0) << name;
+    EXPECT_EQ(stage.replica_.removed_mm3(), 0.0) << name;
+  }
+}
+
+// A blade goes on in its own plane and no way across its flat, in its kerf and in the air beside it.
+TEST(Saw, GoesInItsPlaneOnly) {
+  const Tool saw = *find_tool("saw-oscillating-2");
+  HandStage stage(block(0.5, 40.0, 12.0), saw, held(saw));
+  stage.input_.spindle_rpm = saw.spindle_rpm;
+  stage.lead(Vec3::Zero(), 0.5);
+  const LoopReport in = stage.lead({0, 0, 3.4}, 6.0);
+  EXPECT_GT(in.pose_bone_proxy.position_mm.z(), 1.0);
+  const double y = in.pose_bone_proxy.position_mm.y(), z = in.pose_bone_proxy.position_mm.z();
+  const LoopReport aside = stage.lead({0, 1.0, 0}, 0.3);
+  EXPECT_NEAR(aside.pose_bone_proxy.position_mm.y(), y, 0.5 * saw.set_mm + 0.15);
+  EXPECT_LT(aside.force_physical_n.y(), -20.0);
+  EXPECT_GT(aside.pose_bone_proxy.position_mm.z(), z - 0.2);
+  stage.lead({0, -1.0, 0}, 0.3);
+  const LoopReport out = stage.lead({0, 0, -5.0}, 0.5);
+  EXPECT_EQ(out.force_physical_n.norm(), 0.0);
+}
+
+// In its own hole, drilled at a slant through a face, a drill neither jams nor is held on its way out.
+TEST(OwnHole, DoesNotJamAtAnyAngle) {
+  for (const double degrees : {0.0, 10.0, 20.0, 30.0}) {
+    PlanStep step;
+    step.action = Action::drill;
+    step.tool = "drill-3.2";
+    step.hand = HandKind::rig;
+    step.feed_mm_per_s = 2;
+    step.to_mm = 9;
+    step.entry.point_mm = Vec3(0.1, -0.2, 0);
+    const double a = degrees * std::numbers::pi / 180.0;
+    step.entry.axis = Vec3(std::sin(a) * std::cos(0.7), std::sin(a) * std::sin(0.7), std::cos(a));
+    Bench bench(block_case(24.0), {step});
+    double deepest = 0, out_n = 0, torque_out = 0;
+    bench.run([&](const SessionTick& tick) {
+      const double depth = (tick.report.pose_bone_proxy.position_mm - Vec3(0.1, -0.2, 0)).dot(step.entry.axis->normalized());
+      deepest = std::max(deepest, depth);
+      if (tick.order.phase == SurgeonPhase::retract && depth < deepest - 1.0) out_n = std::max(out_n, tick.report.force_physical_n.norm());
+    });
+    std::printf("  own hole at %2.0f degrees: %.2f mm deep, at most %.3f N on the way out\n", degrees, deepest, out_n);
+    EXPECT_TRUE(bench.session().surgeon().results()[0].completed) << degrees;
+    EXPECT_GE(deepest, 9.0) << degrees;
+    EXPECT_LT(out_n, 0.5) << degrees;
+    EXPECT_EQ(torque_out, 0.0);
+  }
+}
+
+}  // namespace
+}  // namespace osteon::haptic::test
