@@ -72,6 +72,13 @@ PlanEntry read_entry(const json& step) {
   return result;
 }
 
+// The force law, which must suit the tool; empty where none is named.
+std::string read_law(const json& object, const std::string& tool) {
+  const std::string law = text(object, "law", "");
+  if (const auto chosen = choose_law(*find_tool(tool), law); !chosen) throw Wrong("\"law\": " + chosen.error().message);
+  return law;
+}
+
 PlanStep read_step(const json& object) {
   if (!object.is_object()) throw Wrong("it must be an object with an \"action\"");
   PlanStep step;
@@ -92,13 +99,14 @@ PlanStep read_step(const json& object) {
     return step;
   }
   if (action == "screw") {
-    only(object, {"action", "tool", "spindle_rpm", "entry", "tremor_mm", "wear"});
+    only(object, {"action", "tool", "spindle_rpm", "entry", "tremor_mm", "wear", "law"});
     step.action = Action::screw;
     step.tool = text(object, "tool", "screw-1");
     if (const Result<Tool> known = find_tool(step.tool); !known) throw Wrong("\"tool\": " + known.error().message);
     step.spindle_rpm = number(object, "spindle_rpm", 0.0, 50.0, 600.0);
     step.tremor_mm = number(object, "tremor_mm", 0.0, 0.0, 5.0);
     step.wear = number(object, "wear", step.wear, 1.0, 5.0);
+    step.law = read_law(object, step.tool);
     step.entry = read_entry(object);
     return step;
   }
@@ -106,7 +114,7 @@ PlanStep read_step(const json& object) {
     throw Wrong("\"action\" is \"" + action + "\"; choose \"drill\", \"burr\", \"screw\", \"place\" or \"wait\"");
   const bool drill = action == "drill";
   only(object, {"action", "tool", "spindle_rpm", "hand", "feed_mm_per_s", "push_n", "entry", "beyond_mm", "window_mm",
-                "depth_mm", "sweep_mm_per_s", "wear", "guide", "tremor_mm", "to_mm", "leave", "hand_stiffness_n_per_mm",
+                "depth_mm", "sweep_mm_per_s", "wear", "law", "guide", "tremor_mm", "to_mm", "leave", "hand_stiffness_n_per_mm",
                 "hand_damping_n_s_per_mm"});
   step.action = drill ? Action::drill : Action::burr;
   step.tool = text(object, "tool", drill ? "drill-3.2" : "burr-round-5");
@@ -126,6 +134,7 @@ PlanStep read_step(const json& object) {
   step.depth_mm = number(object, "depth_mm", step.depth_mm, 0.1, 20.0);
   step.sweep_mm_per_s = number(object, "sweep_mm_per_s", step.sweep_mm_per_s, 0.5, 60.0);
   step.wear = number(object, "wear", step.wear, 1.0, 5.0);
+  step.law = read_law(object, step.tool);
   if (object.contains("window_mm")) {
     const auto window = numbers<2>(object, "window_mm");
     if (!(window[0] > 0.0 && window[1] > 0.0 && window[0] <= 100.0 && window[1] <= 100.0))

@@ -36,6 +36,7 @@ struct PlanStep {
   double to_mm = 0;                   // drill: as deep as this; 0: through the bone
   double window_u_mm = 12, window_v_mm = 8, depth_mm = 2, sweep_mm_per_s = 15;  // burr
   double wear = 1;
+  std::string law = {};               // force law by which the tool resists; empty: the tool's own
   bool through_guide = false;         // drill: through the guide that was placed last, at its site unless an entry is given
   bool leave = false;                 // drill: the pin stays where it is at the end; a screw always does
   double tremor_mm = 0;               // of the hand: how far it strays at most, across the axis
