@@ -16,7 +16,7 @@ const char* name(CuttingPhase phase) {
   return "unknown";
 }
 
-std::string law_name(const ToolModel& model) { return model.axial ? "chi" : "milling"; }
+std::string law_name(const ToolModel& model) { return std::string(model.law->name); }
 
 std::vector<std::string> event_names() {
   return {"uncovered", "force limited", "slew limited", "cuts waiting", "missed ticks", "heel contact", "guided",
