@@ -108,7 +108,8 @@ TEST(HandTools, EveryToolThatCutsTakesBone) {
     const double removed = stage.replica_.removed_mm3() - before;
     std::printf("  %-20s cut for %4d of 2700 ticks, %8.2f mm3, at most %6.1f N and %8.1f N mm, %.2f mm deep\n", tool.name.c_str(), stage.cutting_,
                 removed, stage.force_n_, stage.torque_nmm_, pushed.pose_bone_proxy.position_mm.z() - held(tool).position_mm.z() - 0.4);
-    EXPECT_GT(stage.cutting_, 50) << tool.name;
+    // A broach moves in its blows only.
+    EXPECT_GT(stage.cutting_, tool.kind == ToolKind::broach ? 2 : 50) << tool.name;
     EXPECT_GT(removed, 0.05) << tool.name;
     EXPECT_GT(stage.force_n_, 0.05) << tool.name;
     EXPECT_GE(stage.work_min_, 0.0) << tool.name;
