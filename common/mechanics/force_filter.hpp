@@ -12,11 +12,11 @@ inline constexpr double kCuttingFilter_s = 2e-3;  // tau
 template <class T>
 class ForceFilter {
  public:
-  explicit ForceFilter(const T& start, double tau_s = kCuttingFilter_s) noexcept : value_(start), tau_s_(tau_s) {}
+  explicit ForceFilter(const T& start) noexcept : value_(start) {}
 
   // [haptic] One tick; a tau of zero passes everything.
-  const T& step(const T& sample, double dt_s) noexcept {
-    const double alpha = tau_s_ > 0.0 ? std::exp(-dt_s / tau_s_) : 0.0;
+  const T& step(const T& sample, double dt_s, double tau_s = kCuttingFilter_s) noexcept {
+    const double alpha = tau_s > 0.0 ? std::exp(-dt_s / tau_s) : 0.0;
     value_ = sample * (1.0 - alpha) + value_ * alpha;
     return value_;
   }
@@ -26,7 +26,6 @@ class ForceFilter {
 
  private:
   T value_;
-  double tau_s_;
 };
 
 }  // namespace osteon

@@ -32,6 +32,13 @@ void DurationHistogram::record(std::chrono::nanoseconds duration) noexcept {
   max_ns_ = std::max(max_ns_, ns);
 }
 
+DurationHistogram DurationHistogram::since(const DurationHistogram& earlier) const noexcept {
+  DurationHistogram later = *this;
+  for (std::size_t bin = 0; bin < bins_.size(); ++bin) later.bins_[bin] -= earlier.bins_[bin];
+  later.count_ -= earlier.count_;
+  return later;
+}
+
 double DurationHistogram::percentile_us(double percent) const noexcept {
   if (count_ == 0) return 0.0;
   const auto wanted = std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::ceil(percent / 100.0 * static_cast<double>(count_))));

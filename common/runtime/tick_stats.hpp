@@ -11,6 +11,8 @@ class DurationHistogram {
   void record(std::chrono::nanoseconds duration) noexcept;  // negative counts as zero
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
   [[nodiscard]] double percentile_us(double percent) const noexcept;  // 0 when empty
+  // What was recorded after an earlier copy of this; its largest is of all.
+  [[nodiscard]] DurationHistogram since(const DurationHistogram& earlier) const noexcept;
   [[nodiscard]] double max_us() const noexcept { return static_cast<double>(max_ns_) / 1000.0; }
 
  private:
@@ -27,6 +29,9 @@ struct TickStats {
   DurationHistogram lateness;  // start of the tick after its due time
   DurationHistogram work;      // from start to end of the tick
   std::uint64_t missed = 0;    // periods that no tick ran in, because the one before came too late
+  [[nodiscard]] TickStats since(const TickStats& earlier) const noexcept {
+    return {lateness.since(earlier.lateness), work.since(earlier.work), missed - earlier.missed};
+  }
 };
 
 }  // namespace osteon

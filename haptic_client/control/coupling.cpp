@@ -17,7 +17,7 @@ constexpr double kNothing_mm = 1e-9;
 void Coupling::reset(const Vec3& handle_mm, const Vec3& proxy_mm) noexcept {
   slack_mm_.setZero();
   returned_mm_.setZero();
-  smooth_n_.setZero();
+  smooth_.reset(Vec3::Zero());
   extension_mm_ = handle_mm - proxy_mm;
   handle_mm_ = handle_mm;
   cutting_ = false;
@@ -63,7 +63,7 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
     extension_mm_ = e_mm;
     bleed(moment);
     handle_mm_ = moment.handle_mm;
-    smooth_n_.setZero();
+    smooth_.reset(Vec3::Zero());
     cutting_ = false;
     return force;
   }
@@ -102,8 +102,9 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
   // (7.15), EWMA, on the cutting force alone and only while it goes on: where cutting begins or ends the rest of the
   // coupling takes over at once, and a filter between them would pull.
   const Vec3& cutting_n = proxy.cutting_force_n;
-  smooth_n_ = proxy.cutting && cutting_ ? Vec3(smooth_n_ + (cutting_n - smooth_n_) * (1.0 - std::exp(-dt_s / smooth_s))) : cutting_n;
-  force.cutting_lag_n = clamped(cutting_n - smooth_n_, force.spring_n.norm());
+  if (proxy.cutting && cutting_) smooth_.step(cutting_n, dt_s, smooth_s);
+  else smooth_.reset(cutting_n);
+  force.cutting_lag_n = clamped(cutting_n - smooth_.value(), force.spring_n.norm());
   cutting_ = proxy.cutting;
 
   extension_mm_ = e_mm;

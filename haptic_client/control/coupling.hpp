@@ -4,6 +4,7 @@
 // The spring's extension is e = handle + offset - proxy. The proxy moves only where that shortens e; where bone that came
 // back pushes it out, the offset takes the difference, so that the stored energy does not rise.
 #pragma once
+#include "common/mechanics/force_filter.hpp"
 #include "haptic_client/control/energy_ledger.hpp"
 #include "haptic_client/control/proxy.hpp"
 
@@ -43,7 +44,7 @@ class Coupling {
   Vec3 slack_mm_ = Vec3::Zero(), returned_mm_ = Vec3::Zero();
   Vec3 extension_mm_ = Vec3::Zero();  // at the end of the last tick
   Vec3 handle_mm_ = Vec3::Zero();
-  Vec3 smooth_n_ = Vec3::Zero();      // the cutting force, smoothed
+  ForceFilter<Vec3> smooth_{Vec3(Vec3::Zero())};  // the cutting force
   bool cutting_ = false;              // in the last tick
 };
 

@@ -10,9 +10,9 @@ namespace osteon::haptic {
 
 struct EnergyParams {
   double dt_s = 1e-3;
-  double allowance_mj = 0.002;            // that one contact may give more than it got
+  double allowance_mj = 0.008;            // that one contact may give more than it got
   double tank_mj = 2.0;                   // most of the damping's work that is kept for later
-  double surprise_mm_per_s2 = 20000.0;    // a hand and its device are taken to accelerate less than this [A]
+  double surprise_mm_per_s2 = 10000.0;    // a hand and its device are taken to accelerate less than this [A]
 };
 
 // Energies at the handle, mJ: force shown to the hand times the way of the handle.

@@ -10,8 +10,10 @@
 #include "common/mechanics/cutting_state.hpp"
 #include "common/mechanics/spindle.hpp"
 #include "common/runtime/event_queue.hpp"
+#include "haptic_client/control/coupling.hpp"
 #include "haptic_client/control/cut_recorder.hpp"
 #include "haptic_client/control/guiding.hpp"
+#include "haptic_client/control/motor_port.hpp"
 #include "haptic_client/control/proxy.hpp"
 #include "haptic_client/control/workspace_mapping.hpp"
 
@@ -23,19 +25,25 @@ struct LoopParams {
   double stiffness_n_per_mm = 50.0;       // K_c of the coupling, physical, where the device is stiff enough for it
   double device_n_per_mm = 60.0;          // k of the device
   double peak_n = 60.0;                   // of the device
+  double peak_nmm = 0;                    // of the device, torque; 0: it shows none
   double continuous_n = 30.0;             // of the device; the limit while it is warm
   double slew_n_per_ms = 0.5;             // growth of force that the hand did not cause; on the device
+  double smooth_s = 2e-3;                 // tau of (7.15), on the cutting force alone
+  double ramp_s = 0.3;                    // after a device came or was calibrated: from no force to all of it
+  bool motor_effects = true;
+  bool tool_effects = true;               // bluntness, clogging, grab, binding, blows
 };
 
 // For a device: s = continuous force / 30 N unless given.
-[[nodiscard]] LoopParams loop_params(double peak_n, double continuous_n, double stiffness_n_per_mm, double force_scale);
+[[nodiscard]] LoopParams loop_params(double peak_n, double continuous_n, double stiffness_n_per_mm, double force_scale,
+                                     double peak_nmm = 0.0);
 
 struct LoopInput {
   Pose pose_device_tool;      // the handle, device frame
   bool clutch = false;        // held: the tool stays, no force, the handle moves freely
   double spindle_rpm = 0;     // commanded
-  bool device_ok = true;
-  bool device_warm = false;
+  bool device_ok = true;      // there, working and calibrated; false: no force
+  bool device_warm = false;   // no more than the continuous force
   bool link_ok = true;        // false: the server has gone; no force, no spindle
   int periods = 1;            // since the last tick; 1 when on time
 };
@@ -49,14 +57,26 @@ enum LoopEvent : std::uint32_t {
   kMissedTicks = 16,
   kHeelContact = 32,
   kGuided = 64,          // a guide holds the tool
+  kStalled = 128,        // the spindle stands under its load
+  kBreakthrough = 256,   // what was cut has ended: the coupling's stretch was let go
+  kReturned = 512,       // bone came back: what it would have added to the coupling became offset
+  kEnergyLimited = 1024, // the passivity monitor cut the force
+  kRamping = 2048,       // after connecting
 };
 
 struct LoopReport {
   Vec3 force_device_n = Vec3::Zero();    // to write to the device, device frame
   Vec3 force_physical_n = Vec3::Zero();  // of the bone on the tool, bone frame; not scaled, within the device's limit
   Vec3 cutting_force_n = Vec3::Zero();   // of the tool on the bone, the law's part, bone frame
+  double cutting_work_mj = 0;            // of that force over the way cut in this tick, physical
+  Vec3 coupling_device_n = Vec3::Zero(); // what of force_device_n is the coupling's: passive
+  Vec3 motor_device_n = Vec3::Zero();    // the rest, the motor's: active, within s · mu · normal force
+  Vec3 torque_physical_nmm = Vec3::Zero();  // of the bone on the tool about its tip, bone frame; not scaled
+  Vec3 torque_device_nmm = Vec3::Zero();    // to write to a device that shows torque, device frame
   Vec3 moved_mm = Vec3::Zero();          // of the proxy in this tick
   Pose pose_bone_proxy, pose_bone_device;
+  Vec3 offset_mm = Vec3::Zero();         // of the handle's place, bone frame: slack, and what returned bone would have stretched
+  EnergyReport energy;                   // of the coupling, at the handle
   double guide_play_mm = 0;              // while guided: how far the tip may be off the opening's middle
   double spindle_rpm = 0, feed_mm_per_s = 0, density_g_cm3 = 0, engaged = 0, torque_nmm = 0;
   CuttingPhase phase = CuttingPhase::idle;
@@ -88,12 +108,18 @@ class HapticLoop {
 
  private:
   void record(const ToolModel& model, bool near_bone, LoopReport& report) noexcept;
-  [[nodiscard]] Vec3 rendered_force(const Vec3& extension_mm, double limit_n, int periods, LoopReport& report) noexcept;
+  void wear_and_clog(const ToolModel& model, const ProxyStep& step, const Vec3& spring_n) noexcept;
+  [[nodiscard]] double load_nmm(const ProxyStep& step, double pressed_n) noexcept;
+  // The force on the handle: the coupling's within ramp, slew limit and energy, and the motor's.
+  void show(const LoopInput& input, const ToolModel& model, const CouplingForce& coupling, const CouplingMoment& moment,
+            LoopReport& report) noexcept;
+  [[nodiscard]] Vec3 slewed(const Vec3& wanted_n, double hand_mm, int periods, LoopReport& report) const noexcept;
 
   static constexpr int kQuietTicks = 20;  // a path ends when the tool has been off the bone for so long
 
   LoopParams params_;
   std::vector<ToolModel> tools_;
+  std::vector<CuttingEffects> effects_;   // of each tool
   EventQueue<CutPiece, 64> pieces_;
   WorkspaceMapping mapping_;
   Proxy proxy_;
@@ -104,11 +130,17 @@ class HapticLoop {
   bool placed_ = false, clutched_ = false;
   int quiet_ticks_ = 0;
   double torque_nmm_ = 0;
+  double torque_per_n_ = 0;               // of the spindle's load, when it last cut
   double coupling_n_per_mm_ = 0;
   std::uint64_t cuts_closed_ = 0, ticks_ = 0;
-  Vec3 extension_mm_ = Vec3::Zero();      // of the last tick
-  Vec3 force_bone_n_ = Vec3::Zero();      // rendered in the last tick
+  Coupling coupling_;
+  EnergyLedger ledger_;
+  MotorPort motor_;
+  Vec3 torque_bone_nmm_ = Vec3::Zero();   // rendered in the last tick
+  Vec3 force_bone_n_ = Vec3::Zero();      // of the coupling, rendered in the last tick
   Vec3 device_mm_ = Vec3::Zero();         // device in the last tick, bone frame
+  bool device_was_ok_ = true;
+  double ramp_ = 0;                       // 0 … 1
 };
 
 }  // namespace osteon::haptic

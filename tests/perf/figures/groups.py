@@ -9,6 +9,7 @@ import numpy as np
 
 import devices
 import feel
+import haptics
 import kernels
 import laws
 import registry
@@ -225,4 +226,4 @@ def novice(run):
 
 
 # In the order in which they run: agreement is counted after every session.
-GROUPS = {**kernels.GROUPS, **devices.GROUPS, **feel.GROUPS, **laws.GROUPS, "expert": expert, "novice": novice, "rig": rig}
+GROUPS = {**kernels.GROUPS, **devices.GROUPS, **feel.GROUPS, **haptics.GROUPS, **laws.GROUPS, "expert": expert, "novice": novice, "rig": rig}

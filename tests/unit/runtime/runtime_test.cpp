@@ -71,6 +71,19 @@ TEST(DurationHistogram, PercentilesAreRightToThreePerCent) {
   EXPECT_EQ(DurationHistogram{}.percentile_us(50), 0.0);
 }
 
+TEST(DurationHistogram, TellsWhatCameLater) {
+  TickStats stats;
+  for (int us = 1; us <= 1000; ++us) stats.work.record(std::chrono::microseconds(us));
+  const TickStats earlier = stats;
+  for (int us = 5001; us <= 6000; ++us) stats.work.record(std::chrono::microseconds(us));
+  stats.missed = 3;
+  const TickStats later = stats.since(earlier);
+  EXPECT_EQ(later.work.count(), 1000u);
+  EXPECT_EQ(later.missed, 3u);
+  EXPECT_NEAR(later.work.percentile_us(50), 5500.0, 0.03 * 5500.0);
+  EXPECT_NEAR(later.work.percentile_us(1), 5010.0, 0.03 * 5010.0);
+}
+
 TEST(PeriodicTimer, NeverTicksEarlyAndCountsWhatItMissed) {
   TickStats stats;
   const auto start = std::chrono::steady_clock::now();

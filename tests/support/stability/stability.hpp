@@ -1,0 +1,44 @@
+// A hand at the haptic loop for as many ticks as one likes, in pure virtual time: it strokes, presses and cuts while a room
+// behind a slow network lets others cut under it and takes bone back. What the loop gives the hand is accounted for from
+// outside, from nothing but forces written and places read.
+#pragma once
+#include <cstdint>
+
+#include "haptic_client/device/simulated_device.hpp"
+
+namespace osteon::test {
+
+enum class StabilityScene : std::uint8_t { stroke, cavity, thin_wall, burr, drill };
+inline constexpr int kStabilityScenes = 5;
+[[nodiscard]] const char* name(StabilityScene scene);
+
+struct StabilityRun {
+  StabilityScene scene = StabilityScene::stroke;
+  std::int64_t ticks = 50'000;
+  int delay_ms = 0;            // one way
+  double dt_s = 1e-3;
+  bool others = true;          // cut near the tool, and undo under it
+  std::uint64_t seed = 1;
+};
+
+struct StabilityResult {
+  std::int64_t ticks = 0, touching = 0, cutting = 0, uncovered = 0, held_back = 0, returned = 0, slew_limited = 0;
+  std::uint64_t episodes = 0, others_cuts = 0, undone = 0;
+  double generated_mj = 0;     // over all contacts that gave more than they got
+  double worst_mj = 0;         // most of one contact
+  double net_mj = 0;           // over all contacts: negative, what the coupling took
+  double cutting_mj = 0;       // work of the cutting forces, at the handle
+  double least_cutting_n_mm = 0;  // of all ticks' F_cut · dx
+  double step_over_n = 0;      // growth of force in a tick that neither the hand's motion nor the slew limit explains; 0: none
+  double still_step_n = 0;     // growth of force in a tick while the handle stood still
+  double motor_over_n = 0;     // of the motor's force over s · mu · normal force
+  double motor_late_n = 0;     // of the motor's force later than 10 ms after the pedal
+  double motor_most_n = 0;
+  double force_most_n = 0;
+  double deepest_mm = 0;       // thin wall: of the tool's tip beyond its near face
+  std::int64_t allocations = 0;
+  void add(const StabilityResult& other);
+};
+[[nodiscard]] StabilityResult run_stability(const StabilityRun& run);
+
+}  // namespace osteon::test

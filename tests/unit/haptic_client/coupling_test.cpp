@@ -1,0 +1,291 @@
+// The coupling's rules, each from its own arithmetic: the energy account, slack, offset, smoothing; and the motor's port.
+#include "haptic_client/control/coupling.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "haptic_client/control/motor_port.hpp"
+#include "tests/support/scenes/random.hpp"
+
+namespace osteon::haptic::test {
+namespace {
+
+using osteon::test::Random;
+
+constexpr double kT = 1e-3;
+
+// A sampled wall, spring and damper, whose force is held for a tick: what it gives a handle that is thrown about at random
+// with no more than `most_mm_per_s2`. Most of one contact, mJ.
+struct Wall {
+  double worst_mj = -1e9;
+  int contacts = 0;
+};
+Wall bounce(double stiffness_n_per_mm, double damping_share, double most_mm_per_s2, bool monitored) {
+  Random random(7);
+  EnergyLedger ledger;
+  double x = -0.05, v = 0.0, e_before = 0.0, force = 0.0, given = 0.0;
+  Wall wall;
+  bool inside = false;
+  for (int i = 0; i < 400'000; ++i) {
+    // Kept near the wall by a soft pull, else random.
+    const double a = std::clamp(most_mm_per_s2 * random.between(-1.0, 1.0) - 40.0 * v - 4e4 * x, -most_mm_per_s2, most_mm_per_s2);
+    v += a * kT;
+    x += v * kT;
+    given += -force * v * kT;  // force is outward, -x
+    ledger.observe({v * kT, 0, 0});
+    const double e = std::max(0.0, x);
+    const bool touching = e > 0.0;
+    const double spring = stiffness_n_per_mm * e;
+    const double damping = std::clamp(damping_share * stiffness_n_per_mm * (e - e_before), -spring, spring);
+    ledger.settle(0.0, 0.5 * stiffness_n_per_mm * e * e);
+    const Vec3 shown = ledger.limited({-(spring + damping), 0, 0}, {-damping, 0, 0}, touching);
+    force = monitored ? -shown.x() : touching ? spring + damping : 0.0;
+    e_before = e;
+    if (inside && !touching) {
+      wall.worst_mj = std::max(wall.worst_mj, given);
+      ++wall.contacts;
+      given = 0.0;
+    }
+    inside = touching;
+  }
+  return wall;
+}
+
+// Whatever a hand does that accelerates no faster than is assumed, no contact gives more than the allowance.
+TEST(EnergyLedger, NoContactGivesMoreThanItsAllowance) {
+  const EnergyParams params;
+  for (const double stiffness : {5.0, 50.0})
+    for (const double damping : {0.0, 1.0}) {
+      const Wall wall = bounce(stiffness, damping, params.surprise_mm_per_s2, true);
+      EXPECT_GT(wall.contacts, 1000);
+      EXPECT_LE(wall.worst_mj, params.allowance_mj + 1e-12) << stiffness << ' ' << damping;
+    }
+  // The same without the monitor: a spring that is sampled gives energy away.
+  EXPECT_GT(bounce(50.0, 0.0, params.surprise_mm_per_s2, false).worst_mj, 0.01);
+}
+
+// Pressing in and out at constant speed costs the hand what a damper of k·T costs, twice k·T·v·way, and a tick's worth.
+TEST(EnergyLedger, CountsWhatTheDamperTook) {
+  const double k = 50.0, d = 0.01;
+  const int n = 50;
+  EnergyLedger ledger(EnergyParams{.surprise_mm_per_s2 = 0.0});  // nothing is held back of so even a motion
+  double e_before = 0.0, given_mj = 0.0, moved = d;
+  for (int i = 1; i <= 2 * n; ++i) {
+    moved = i <= n ? d : -d;
+    const double e = d * (i <= n ? i : 2 * n - i);
+    ledger.observe({moved, 0, 0});
+    const double spring = k * e, damping = std::clamp(k * (e - e_before), -spring, spring);
+    ledger.settle(0.0, 0.5 * k * e * e);
+    static_cast<void>(ledger.limited({-(spring + damping), 0, 0}, {-damping, 0, 0}, e > 0.0));
+    e_before = e;
+  }
+  given_mj = ledger.report().ended_mj;
+  ASSERT_TRUE(ledger.report().ended);
+  // In: force of tick i over the way of tick i + 1. Sum over in and out of k·(e ± d)·d by hand.
+  double expected = 0.0;
+  for (int i = 1; i < n; ++i) expected -= k * d * (i + 1) * d;      // in, i = 1 … n-1
+  expected += k * d * (n + 1) * d;                                  // turning: the damper still pushes
+  for (int i = n + 1; i < 2 * n; ++i) expected += k * d * (2 * n - i - 1) * d;
+  EXPECT_NEAR(given_mj, expected, 1e-9);
+  EXPECT_LT(given_mj, 0.0);
+}
+
+// Feed follows force: the hand goes on steadily, the tool after it under 20 N. What the hand pays goes into cutting, to
+// the last microjoule; what it paid before is in the spring, and lost when that is let go.
+TEST(EnergyLedger, CuttingIsPaidByTheHand) {
+  const double k = 50.0, feed = 0.002;
+  EnergyLedger ledger(EnergyParams{.surprise_mm_per_s2 = 0.0});
+  double e = 0.0, at_rest = 0.0;
+  for (int i = 0; i < 600; ++i) {
+    const bool pressing = i < 200;  // first only the spring is stretched, to 20 N
+    ledger.observe({feed, 0, 0});
+    if (pressing) e += feed;
+    ledger.settle(pressing ? 0.0 : k * e * feed, 0.5 * k * e * e);
+    static_cast<void>(ledger.limited({-k * e, 0, 0}, Vec3::Zero(), true));
+    if (i == 200) at_rest = ledger.report().episode_mj;
+  }
+  EXPECT_NEAR(ledger.report().episode_mj, at_rest, 1e-9);
+  EXPECT_NEAR(at_rest, -0.5 * k * e * e, k * e * feed);
+  EXPECT_EQ(ledger.report().tank_mj, 0.0);  // nothing was damped
+}
+
+class CouplingAtWall : public ::testing::Test {
+ protected:
+  CouplingAtWall() {
+    moment_.stiffness_n_per_mm = 50.0;
+    moment_.limit_n = 60.0;
+    moment_.touching = true;
+    step_.contact = true;
+  }
+  CouplingForce to(const Vec3& handle_mm, const Vec3& proxy_mm) {
+    moment_.proxy_before_mm = moment_.proxy_mm;
+    moment_.handle_mm = handle_mm;
+    moment_.proxy_mm = proxy_mm;
+    ledger_.observe(handle_mm - handle_mm_);
+    handle_mm_ = handle_mm;
+    const CouplingForce force = coupling_.step(moment_, step_, ledger_, kT, 2e-3);
+    static_cast<void>(ledger_.limited(force.spring_n + force.damping_n, force.damping_n, moment_.touching));
+    return force;
+  }
+  Coupling coupling_;
+  EnergyLedger ledger_;
+  CouplingMoment moment_;
+  ProxyStep step_;
+  Vec3 handle_mm_ = Vec3::Zero();
+};
+
+// Beyond f_max / k the handle slips; in free air the slip goes back by a tenth of the way.
+TEST_F(CouplingAtWall, SlackTakesWhatTheDeviceCannotShow) {
+  for (int i = 1; i <= 200; ++i) to({0, 0, 0.01 * i}, Vec3::Zero());
+  const CouplingForce force = to({0, 0, 2.0}, Vec3::Zero());
+  EXPECT_NEAR(force.spring_n.z(), -60.0, 1e-9);
+  EXPECT_NEAR(coupling_.offset_mm().z(), -(2.0 - 60.0 / 50.0), 1e-9);
+  // Coming back the force goes down at once: what was beyond is forgotten.
+  EXPECT_NEAR(to({0, 0, 1.9}, Vec3::Zero()).spring_n.z(), -55.0, 1e-9);
+
+  moment_.touching = false;
+  const double before = coupling_.offset_mm().norm();
+  double way = 0.0;
+  Vec3 handle(0, 0, 1.9);
+  for (int i = 0; i < 30; ++i) {
+    handle += Vec3(0.05, 0, -0.1);
+    way += Vec3(0.05, 0, -0.1).norm();
+    to(handle, handle + coupling_.offset_mm());
+  }
+  EXPECT_NEAR(coupling_.offset_mm().norm(), before - 0.1 * way, 1e-9);
+  for (int i = 0; i < 300; ++i) to(handle += Vec3(0.1, 0, 0), handle + coupling_.offset_mm());
+  EXPECT_EQ(coupling_.offset_mm().norm(), 0.0);
+}
+
+TEST_F(CouplingAtWall, BreakthroughLetsTheWholeStretchGoOnce) {
+  for (int i = 1; i <= 50; ++i) to({0, 0, 0.01 * i}, Vec3::Zero());
+  step_.breakthrough = true;
+  const CouplingForce force = to({0, 0, 0.5}, Vec3::Zero());
+  EXPECT_TRUE(force.breakthrough);
+  EXPECT_EQ(force.spring_n.norm(), 0.0);
+  EXPECT_NEAR(coupling_.offset_mm().z(), -0.5, 1e-12);
+  // A hundredth of that is no breakthrough.
+  step_.breakthrough = false;
+  coupling_.reset(Vec3::Zero(), Vec3::Zero());
+  to({0, 0, 0.005}, Vec3::Zero());
+  step_.breakthrough = true;
+  EXPECT_FALSE(to({0, 0, 0.005}, Vec3::Zero()).breakthrough);
+}
+
+// Bone comes back and pushes the proxy out by 0.3 mm under a handle that stands still: nothing is felt of it, and the
+// stored energy does not rise.
+TEST_F(CouplingAtWall, ReturnedBoneStoresNothing) {
+  CouplingForce force;
+  for (int i = 1; i <= 20; ++i) force = to({0, 0, 0.01 * i}, Vec3::Zero());
+  const double before_mj = ledger_.report().stored_mj, before_n = force.spring_n.norm();
+  const double tank_mj = ledger_.report().tank_mj;
+  force = to({0, 0, 0.2}, {0, 0, -0.3});
+  EXPECT_TRUE(force.returned);
+  EXPECT_NEAR(force.spring_n.norm(), before_n, 1e-9);
+  EXPECT_LE(ledger_.report().stored_mj, before_mj + 1e-12);
+  EXPECT_NEAR(coupling_.offset_mm().z(), -0.3, 1e-9);
+  // It presses again only as damping pays: over small motions of the hand no more than its work and what the tank held.
+  double handle = 0.2, paid_mj = tank_mj;
+  for (int i = 0; i < 200; ++i) {
+    const double next = 0.2 + 0.02 * std::sin(0.2 * i);
+    const double moved = next - handle;
+    const double offset = coupling_.offset_mm().norm();
+    to({0, 0, next}, {0, 0, -0.3});
+    paid_mj += 50.0 * moved * moved;  // most that a damper of k·T can take of this motion
+    const double released = offset - coupling_.offset_mm().norm();
+    EXPECT_GE(released, -1e-12);
+    if (released > 0.0) {
+      paid_mj -= ledger_.report().stored_mj - 0.5 * 50.0 * std::pow(std::sqrt(2.0 * ledger_.report().stored_mj / 50.0) - released, 2);
+    }
+    EXPECT_GE(paid_mj, -1e-6) << i;
+    handle = next;
+  }
+  EXPECT_LT(coupling_.offset_mm().norm(), 0.3);
+  EXPECT_GT(coupling_.offset_mm().norm(), 0.0);
+}
+
+// (7.15): a step of the cutting force comes through as 1 - exp(-t / 2 ms); what is no cutting comes at once.
+TEST_F(CouplingAtWall, OnlyTheCuttingForceIsSmoothed) {
+  step_.cutting = true;
+  step_.cutting_force_n = {0, 0, 10};
+  to({0, 0, 0.4}, Vec3::Zero());
+  to({0, 0, 0.4}, Vec3::Zero());
+  step_.cutting_force_n = {0, 0, 20};
+  for (int i = 1; i <= 10; ++i) {
+    const CouplingForce force = to({0, 0, 0.4}, Vec3::Zero());
+    EXPECT_NEAR(force.spring_n.z(), -20.0, 1e-9);
+    EXPECT_NEAR(force.spring_n.z() + force.cutting_lag_n.z(), -20.0 + 10.0 * std::exp(-i * kT / 2e-3), 1e-9) << i;
+  }
+  step_.cutting = false;
+  step_.cutting_force_n.setZero();
+  EXPECT_EQ(to({0, 0, 0.4}, Vec3::Zero()).cutting_lag_n.norm(), 0.0);
+}
+
+MotorMoment turning(double rpm, const Vec3& normal_n) {
+  MotorMoment moment;
+  moment.pedal = true;
+  moment.spindle_rpm = rpm;
+  moment.teeth = 2;
+  moment.normal_n = normal_n;
+  moment.cutting = true;
+  return moment;
+}
+
+// Bone at +x of a tool that points along +z and turns clockwise for its holder: its flank goes towards +y there, and the
+// bone holds it back.
+TEST(MotorPort, DragsAgainstTheFlank) {
+  MotorPort port;
+  MotorMoment moment = turning(30000, {-10, 0, 0});
+  Vec3 force;
+  for (int i = 0; i < 500; ++i) force = port.step(moment, kT);
+  EXPECT_NEAR(force.y(), -MotorPortParams{}.drag * 0.3 * 10.0, 1e-3);
+  EXPECT_NEAR(force.x(), 0.0, 1e-9);  // 1 kHz of teeth is for the ear
+  EXPECT_NEAR(force.z(), 0.0, 1e-9);
+  moment.normal_n = {0, 0, -10};  // at the pole nothing slides to a side
+  for (int i = 0; i < 500; ++i) force = port.step(moment, kT);
+  EXPECT_NEAR(force.norm(), 0.0, 1e-9);
+}
+
+TEST(MotorPort, StaysWithinFrictionAndEndsWithThePedal) {
+  MotorPort port;
+  Random random(3);
+  double most = 0.0;
+  for (int i = 0; i < 20'000; ++i) {
+    const Vec3 normal = random.between(0.0, 40.0) * random.direction();
+    MotorMoment moment = turning(random.between(0.0, 20000.0), normal);
+    moment.cutting = i % 3 > 0;
+    const Vec3 force = port.step(moment, kT);
+    EXPECT_LE(force.norm(), 0.3 * normal.norm() + 1e-12);
+    most = std::max(most, force.norm());
+  }
+  EXPECT_GT(most, 5.0);
+  MotorMoment moment = turning(3000, {-20, 0, 0});
+  for (int i = 0; i < 100; ++i) static_cast<void>(port.step(moment, kT));
+  EXPECT_GT(port.step(moment, kT).norm(), 1.0);
+  moment.pedal = false;  // the spindle still runs down
+  Vec3 force;
+  for (int i = 0; i < 10; ++i) force = port.step(moment, kT);
+  EXPECT_NEAR(force.norm(), 0.0, 1e-12);
+}
+
+// 1000 rpm and two lips bite 33 times a second: the force's mean over many turns is the drag alone.
+TEST(MotorPort, VibrationHasNoMean) {
+  MotorPort port;
+  MotorMoment moment = turning(1000, {0, 0, -20});
+  double sum = 0.0, square = 0.0;
+  constexpr int kTicks = 30'000;
+  for (int i = 0; i < kTicks; ++i) {
+    const Vec3 force = port.step(moment, kT);
+    sum += force.z();
+    square += force.z() * force.z();
+  }
+  EXPECT_NEAR(sum / kTicks, 0.0, 0.01);
+  const double amplitude = MotorPortParams{}.vibration * 0.3 * 20.0;
+  EXPECT_NEAR(std::sqrt(square / kTicks), amplitude / std::numbers::sqrt2, 0.02 * amplitude);
+}
+
+}  // namespace
+}  // namespace osteon::haptic::test

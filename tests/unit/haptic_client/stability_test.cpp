@@ -1,0 +1,50 @@
+// A short run of what tests/perf measures over a million ticks: the coupling gives the hand nothing that it did not get.
+#include "tests/support/stability/stability.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+
+namespace osteon::test {
+namespace {
+
+class Stability : public ::testing::TestWithParam<std::tuple<int, int>> {};
+
+TEST_P(Stability, TheCouplingGivesNothingAway) {
+  StabilityRun run;
+  run.scene = static_cast<StabilityScene>(std::get<0>(GetParam()));
+  run.delay_ms = std::get<1>(GetParam());
+  run.ticks = 40'000;  // rig and hand on a strong device and on a weak one
+  const StabilityResult r = run_stability(run);
+  std::printf("  %s, %d ms: %llu contacts, generated %.4f mJ, worst %.5f, net %.1f, cutting %.1f; steps over %.3f N, still %.3f N; "
+              "motor %.2f N; uncovered %lld, held back %lld, returned %lld\n",
+              name(run.scene), run.delay_ms, static_cast<unsigned long long>(r.episodes), r.generated_mj, r.worst_mj, r.net_mj, r.cutting_mj,
+              r.step_over_n, r.still_step_n, r.motor_most_n, static_cast<long long>(r.uncovered), static_cast<long long>(r.held_back),
+              static_cast<long long>(r.returned));
+  EXPECT_LE(r.worst_mj, 0.01);
+  EXPECT_LE(r.generated_mj, 1.0);
+  EXPECT_GE(r.least_cutting_n_mm, 0.0);
+  EXPECT_LE(r.step_over_n, 1e-9);
+  EXPECT_LE(r.still_step_n, 0.5 + 1e-9);
+  EXPECT_LE(r.motor_over_n, 1e-9);
+  EXPECT_EQ(r.motor_late_n, 0.0);
+  EXPECT_EQ(r.allocations, 0);
+  // Else it would prove nothing.
+  EXPECT_GT(r.touching, 2'000);
+  EXPECT_GT(r.force_most_n, 2.0);
+  EXPECT_LT(r.uncovered, r.ticks / 100);
+  if (run.scene == StabilityScene::cavity || run.scene == StabilityScene::burr || run.scene == StabilityScene::drill) {
+    EXPECT_GT(r.cutting, 1'000);
+    EXPECT_GT(r.motor_most_n, 0.05);
+  }
+  if (run.scene == StabilityScene::thin_wall) {
+    EXPECT_LT(r.deepest_mm, 0.3);
+  } else {
+    EXPECT_GT(r.undone, 20u);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, Stability, ::testing::Combine(::testing::Range(0, kStabilityScenes), ::testing::Values(0, 100)));
+
+}  // namespace
+}  // namespace osteon::test

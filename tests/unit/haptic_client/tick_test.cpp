@@ -1,0 +1,79 @@
+// What must not depend on how time and space are cut up, and the spindle in bone: it stalls under the hand and turns again.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/haptic_client/bench.hpp"
+
+namespace osteon::haptic::test {
+namespace {
+
+PlanStep expert_drilling() {
+  PlanStep step;
+  step.action = Action::drill;
+  step.tool = "drill-3.2";
+  step.spindle_rpm = 1000;
+  step.hand = HandKind::expert;
+  step.entry.point_mm = Vec3(0.1, -0.2, 0);
+  step.entry.axis = Vec3(0, 0, 1);
+  return step;
+}
+
+struct Felt {
+  double cortex_n, medulla_n, cortex_feed, medulla_feed;
+};
+Felt drill(double dt_s, double pitch_mm) {
+  const auto ticks = [&](double s) { return static_cast<int>(std::lround(s / dt_s)); };
+  Bench bench(block_case(12.0, pitch_mm), {expert_drilling()}, {}, 0.0, {ticks(0.012), ticks(0.025)}, dt_s);
+  bench.run();
+  EXPECT_TRUE(bench.session().done());
+  const StepResult& result = bench.session().surgeon().results()[0];
+  const Felt felt{result.near_cortex.force_n, result.medulla.force_n, result.near_cortex.feed_mm_per_s, result.medulla.feed_mm_per_s};
+  std::printf("  %.1f kHz, h %.2f mm: %.2f and %.2f N, %.3f and %.2f mm/s\n", 1e-3 / dt_s, pitch_mm, felt.cortex_n, felt.medulla_n,
+              felt.cortex_feed, felt.medulla_feed);
+  return felt;
+}
+
+TEST(Ticks, NeitherTheirRateNorThePitchIsFelt) {
+  const Felt usual = drill(1e-3, 0.5);
+  for (const auto& [dt_s, pitch_mm] : {std::pair{2e-3, 0.5}, {0.5e-3, 0.5}, {1e-3, 0.25}}) {
+    const Felt other = drill(dt_s, pitch_mm);
+    EXPECT_NEAR(other.cortex_n, usual.cortex_n, 0.03 * usual.cortex_n);
+    EXPECT_NEAR(other.medulla_n, usual.medulla_n, 0.03 * usual.medulla_n);
+    EXPECT_NEAR(other.cortex_feed, usual.cortex_feed, 0.03 * usual.cortex_feed);
+    EXPECT_NEAR(other.medulla_feed, usual.medulla_feed, 0.03 * usual.medulla_feed);
+  }
+}
+
+// A motor of 10 N mm under a hand that pushes for 27: it stands in the bone, nothing advances; drawn back it turns again.
+TEST(Ticks, ASpindleStallsInBoneAndTurnsAgain) {
+  const Case bone = block_case();
+  ReadyPlan plan = *make_ready({expert_drilling()}, bone);
+  plan.tools[0].spindle.most_nmm = 10.0;
+  Bench bench(bone, std::move(plan));
+  int stood = 0;
+  double advanced_mm = 0.0, again_rpm = 0.0, last_mm = 0.0, pushed_n = 0.0, least_rpm = 1e9, torque_nmm = 0.0;
+  int pushing = 0;
+  bench.run([&](const SessionTick& tick) {
+    const LoopReport& r = tick.report;
+    if (tick.order.phase == SurgeonPhase::push && (r.events & kStalled)) {
+      if (stood++ > 100) advanced_mm += std::abs(r.pose_bone_proxy.position_mm.z() - last_mm);
+      pushed_n = std::max(pushed_n, r.force_physical_n.norm());
+      EXPECT_LT(r.spindle_rpm, 1.0);
+    }
+    if (tick.order.phase == SurgeonPhase::push) {
+      ++pushing;
+      least_rpm = std::min(least_rpm, r.spindle_rpm);
+      torque_nmm = std::max(torque_nmm, r.torque_nmm);
+    }
+    last_mm = r.pose_bone_proxy.position_mm.z();
+    if (tick.order.phase == SurgeonPhase::retract) again_rpm = std::max(again_rpm, r.spindle_rpm);
+  });
+  EXPECT_GT(stood, 10'000) << pushing << " ticks of pushing, down to " << least_rpm << " rpm, " << torque_nmm << " N mm, " << last_mm << " mm";
+  EXPECT_NEAR(pushed_n, 29.0, 3.0);
+  EXPECT_LT(advanced_mm, 0.05);
+  EXPECT_GT(again_rpm, 950.0);
+}
+
+}  // namespace
+}  // namespace osteon::haptic::test
