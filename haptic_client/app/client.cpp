@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <cstdio>
 #include <deque>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -14,6 +15,7 @@
 #include "common/runtime/latest_value.hpp"
 #include "common/runtime/log.hpp"
 #include "common/runtime/periodic.hpp"
+#include "common/runtime/watchdog.hpp"
 #include "haptic_client/control/guiding.hpp"
 #include "haptic_client/control/patch_builder.hpp"
 #include "haptic_client/control/replica.hpp"
@@ -28,7 +30,10 @@ using Clock = std::chrono::steady_clock;
 constexpr auto kTick = 1ms;
 constexpr auto kSpin = 150us;
 constexpr int kPriority = 80;
+constexpr auto kStall = 4ms;                  // more than three periods: the force is zero by then
+constexpr std::uint64_t kLiveTicks = 1000;    // between two statistics of the haptic loop
 constexpr auto kConfirmPatience = 20s;
+constexpr auto kStopPatience = 2s;            // where being asked to stop is how a session ends
 constexpr auto kJoinPatience = 30s;           // without anything from the room
 constexpr std::size_t kMostFromRoom = 4096;   // events that may wait for the replica; the network waits beyond that
 constexpr std::size_t kTickTimes = 8192;  // ticks whose wake-up time is remembered
@@ -64,16 +69,15 @@ struct ToolPlace {
 
 class Client {
  public:
-  Client(RoomSession& room, ReadyPlan plan, const SimulatedDeviceParams& device, const ClientOptions& options,
-         const StopSignal& stop)
-      : room_(room), options_(options), stop_(stop), session_(std::move(plan), device, options.force_scale),
+  Client(RoomSession& room, Session& session, const ClientOptions& options, const StopSignal& stop)
+      : room_(room), options_(options), stop_(stop), session_(session),
         replica_(room.bone(), BodyId{}, room.tools()), lease_epoch_(room.room().lease_epoch) {
     for (auto& time : tick_times_) time.store(0, std::memory_order_relaxed);
-    for (const ToolModel& model : session_.surgeon().plan().tools) tool_names_.push_back(model.tool.name);
+    for (const ToolModel& model : session_.plan().tools) tool_names_.push_back(model.tool.name);
     if (tool_names_.empty()) tool_names_.emplace_back("none");
     outcome_.limits = session_.device().limits();
     outcome_.loop = session_.loop().params();
-    outcome_.removed_mm3.resize(session_.surgeon().plan().steps.size());
+    outcome_.removed_mm3.resize(session_.plan().steps.size());
   }
 
   Result<ClientOutcome> run() {
@@ -97,17 +101,19 @@ class Client {
       const std::lock_guard lock(mutex_);
       if (lost_why_) return tl::unexpected(*lost_why_);
     }
-    outcome_.stopped = stop_.requested() && !session_.done();
+    outcome_.stopped = stop_.requested() && !session_.done() && !session_.endless();
     if (!outcome_.stopped && replica_.unconfirmed() > 0)
       return failure(ErrorCode::unavailable, "the server has not confirmed the last " + std::to_string(replica_.unconfirmed()) +
                                                  " cuts within " + std::to_string(kConfirmPatience.count()) + " s; look at the server's log");
     outcome_.coupling_n_per_mm = session_.loop().coupling_n_per_mm();
     outcome_.workspace_scale = session_.loop().mapping().scale();
-    outcome_.steps = session_.surgeon().results();
+    outcome_.steps = session_.results();
     outcome_.field_hash = replica_.hash();
     outcome_.removed_total_mm3 = replica_.removed_mm3();
     outcome_.room_seq = replica_.room_seq();
     outcome_.rejected = replica_.rejected();
+    outcome_.stalls = watchdog_.stalls();
+    outcome_.longest_stall_ms = 1e-6 * static_cast<double>(watchdog_.longest().count());
     outcome_.patch_p50_us = patch_times_.percentile_us(50);
     outcome_.patch_p99_us = patch_times_.percentile_us(99);
     return std::move(outcome_);
@@ -124,7 +130,7 @@ class Client {
     info.case_title = room_.bone().info().title;
     info.pitch_mm = room_.bone().pitch_mm();
     info.author = room_.room().author.value;
-    for (const ToolModel& model : session_.surgeon().plan().tools) info.tools.push_back({model.tool.name, law_name(model), model.tool.diameter_mm});
+    for (const ToolModel& model : session_.plan().tools) info.tools.push_back({model.tool.name, law_name(model), model.tool.diameter_mm});
     return info;
   }
 
@@ -182,7 +188,7 @@ class Client {
       if (!room_follows) ++outcome_.held_for_room_ticks;
       guides_.refresh();
       const SessionTick now = session_.tick(patches_.value(), link_ok && room_follows, periods, &guides_.value());
-      items_left_.store(session_.surgeon().left().size(), std::memory_order_release);
+      items_left_.store(session_.left().size(), std::memory_order_release);
 
       const std::int64_t woke_ns = ns(timer.woke());
       tick_times_[now.report.state_seq % kTickTimes].store(woke_ns, std::memory_order_relaxed);
@@ -198,7 +204,7 @@ class Client {
       row_.step = static_cast<std::uint32_t>(now.order.step);
       row_.idle = idle;
       row_.report = now.report;
-      if (!idle) site_ = &session_.surgeon().plan().steps[now.order.step].site;
+      if (!idle) site_ = &session_.plan().steps[now.order.step].site;
       if (site_) {
         row_.depth_mm = (now.report.pose_bone_proxy.position_mm - site_->entry_mm).dot(site_->axis);
         row_.device_depth_mm = (now.report.pose_bone_device.position_mm - site_->entry_mm).dot(site_->axis);
@@ -214,7 +220,18 @@ class Client {
       }
       if (!rows_.try_push(row_)) ++outcome_.rows_dropped;
       timer.done(outcome_.ticks);
+      watchdog_.beat();
+      if (outcome_.ticks.work.count() % kLiveTicks == 0) live_.store(outcome_.ticks);
     }
+    watchdog_.rest();
+  }
+
+  // [watchdog] Said at most every five seconds.
+  void stalled() {
+    const auto now = Clock::now();
+    if (now - stall_told_ < 5s) return;
+    stall_told_ = now;
+    log::warn("the haptic loop stands", {{"longer_than_ms", kStall.count()}, {"remedy", "see osteon-haptic check"}});
   }
 
   void replica_thread() {
@@ -239,7 +256,8 @@ class Client {
       if (!over) continue;
       if (!waiting_since) waiting_since = Clock::now();
       const bool settled = replica_.unconfirmed() == 0 && unsent_.empty();
-      if (settled || !link_ok_ || stop_.requested() || Clock::now() - *waiting_since > kConfirmPatience) break;
+      const auto patience = !stop_.requested() ? kConfirmPatience : session_.endless() ? kStopPatience : 0s;
+      if (settled || !link_ok_ || Clock::now() - *waiting_since >= patience) break;
     }
     note_removed(outcome_.removed_mm3.size());
     const std::lock_guard lock(mutex_);
@@ -293,8 +311,12 @@ class Client {
     std::vector<PlacedGuide>& guides = guides_.writable();
     guides.clear();
     for (const SceneItem& item : scene.items)
-      if (const ToolBox::Entry* entry = room_.tools()->find(item.tool))
-        if (PlacedGuide guide = placed_guide(item.id, entry->tool, item.pose_bone_item); opening_count(guide.shape) > 0) guides.push_back(std::move(guide));
+      if (const ToolBox::Entry* entry = room_.tools()->find(item.tool)) {
+        // Made once for each definition: it takes up to a tenth of a second.
+        std::shared_ptr<const SolidLattice>& solid = solids_[item.tool];
+        if (!solid) solid = std::make_shared<const SolidLattice>(entry->tool);
+        guides.push_back(placed_guide(item.id, entry->tool, item.pose_bone_item, solid));
+      }
     guides_.publish();
   }
   void take(const Committed& committed) {
@@ -382,9 +404,9 @@ class Client {
   // What the plan has left on the bone goes into the room's scene; guides come back from there and guide the tool.
   void set_items() {
     for (; items_set_ < items_left_ && link_ok_; ++items_set_) {
-      const LeftItem& left = session_.surgeon().left()[items_set_];
+      const LeftItem& left = session_.left()[items_set_];
       SceneItem item;
-      item.tool = session_.surgeon().plan().steps[left.step].item.hash();
+      item.tool = session_.plan().steps[left.step].item.hash();
       item.pose_bone_item = left.pose_bone_item;
       item.turns = left.turns;
       if (const Result<std::uint32_t> set = room_.set_item(item); !set) give_up(set.error());
@@ -412,12 +434,18 @@ class Client {
     return state;
   }
 
-  void print_status(const TickRow& row) const {
+  void print_status(const TickRow& row) {
     const LoopReport& r = row.report;
     std::printf("%s %s: depth %.1f mm, force %.1f N, feed %.2f mm/s, %.0f rpm (%s)", tool_name(row).c_str(), name(row.phase),
                 row.depth_mm, r.force_physical_n.norm(), r.feed_mm_per_s, r.spindle_rpm, name(r.phase));
     const RoomHealth health = room_health_;
     if (health != RoomHealth::follows) std::printf(", held: %s, %zu cuts unconfirmed", name(health), unconfirmed_.load());
+    if (live_.refresh()) {
+      const TickStats now = live_.value().since(told_);
+      told_ = live_.value();
+      std::printf(", loop %.0f us (99 of 100: %.0f), late %.0f us (%.0f), %llu missed", now.work.percentile_us(50), now.work.percentile_us(99),
+                  now.lateness.percentile_us(50), now.lateness.percentile_us(99), static_cast<unsigned long long>(now.missed));
+    }
     std::printf("\n");
     std::fflush(stdout);
   }
@@ -425,7 +453,7 @@ class Client {
   RoomSession& room_;
   const ClientOptions& options_;
   const StopSignal& stop_;
-  SimulatedSession session_;   // haptic thread; its queue of cuts is emptied by the replica's thread
+  Session& session_;           // haptic thread; its queue of cuts is emptied by the replica's thread
   Replica replica_;            // replica thread, until it is joined
   PatchBuilder builder_;       // replica thread
   SessionLog log_;             // reporter thread
@@ -434,8 +462,12 @@ class Client {
 
   LatestValue<Patch> patches_;     // replica → haptic
   LatestValue<ToolPlace> places_;  // haptic → replica
-  LatestValue<std::vector<PlacedGuide>> guides_;  // of the room's scene, replica → haptic
+  LatestValue<std::vector<PlacedGuide>> guides_;  // all that stands in the room's scene, replica → haptic
+  std::map<Digest, std::shared_ptr<const SolidLattice>> solids_;  // of its definitions; replica thread
   EventQueue<TickRow, 2048> rows_; // haptic → reporter
+  LatestValue<TickStats> live_;    // haptic → reporter, once a second
+  TickStats told_;                 // reporter: of the last line
+  Clock::time_point stall_told_ = Clock::time_point::min() + 1h;  // watchdog
   std::array<std::atomic<std::int64_t>, kTickTimes> tick_times_;
 
   std::mutex mutex_;               // guards the three below; never taken by the haptic thread
@@ -466,14 +498,14 @@ class Client {
   DurationHistogram patch_times_;
 
   ClientOutcome outcome_;
+  Watchdog watchdog_{kStall, kPriority + 1, [this] { stalled(); }};  // last: its thread uses the rest
 };
 
 }  // namespace
 
-Result<ClientOutcome> run_client(RoomSession& room, ReadyPlan plan, const SimulatedDeviceParams& device,
-                                 const ClientOptions& options, const StopSignal& stop) {
+Result<ClientOutcome> run_client(RoomSession& room, Session& session, const ClientOptions& options, const StopSignal& stop) {
   // Large: its queues are part of it.
-  const auto client = std::make_unique<Client>(room, std::move(plan), device, options, stop);
+  const auto client = std::make_unique<Client>(room, session, options, stop);
   return client->run();
 }
 

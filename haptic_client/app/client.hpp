@@ -28,6 +28,8 @@ struct ClientOutcome {
   std::vector<CutRow> cuts;
   TickStats ticks;
   bool realtime = false;                 // the haptic thread had SCHED_FIFO
+  std::uint64_t stalls = 0;              // times that it did not run for more than three periods, as its watchdog saw
+  double longest_stall_ms = 0;
   Digest field_hash;
   RoomSeq room_seq;
   double removed_total_mm3 = 0;
@@ -40,9 +42,8 @@ struct ClientOutcome {
   double coupling_n_per_mm = 0, workspace_scale = 0;  // of the last step: K_c, and bone mm for each mm of the handle
 };
 
-// Runs a plan to its end and waits until the room has confirmed every cut. Errors: unavailable (the server went away;
+// Runs a session to its end and waits until the room has confirmed every cut. Errors: unavailable (the server went away;
 // force and spindle are down by then, or it stopped confirming), internal (the log cannot be written).
-[[nodiscard]] Result<ClientOutcome> run_client(RoomSession& room, ReadyPlan plan, const SimulatedDeviceParams& device,
-                                               const ClientOptions& options, const StopSignal& stop);
+[[nodiscard]] Result<ClientOutcome> run_client(RoomSession& room, Session& session, const ClientOptions& options, const StopSignal& stop);
 
 }  // namespace osteon::haptic

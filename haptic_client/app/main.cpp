@@ -1,4 +1,4 @@
-// osteon-haptic: joins a room and carries out a plan at a haptic device, a thousand times a second.
+// osteon-haptic: joins a room with a tool in the hand, a person's or one with a plan, a thousand times a second.
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -11,9 +11,11 @@
 #include "common/runtime/command_line.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
+#include "haptic_client/app/check_command.hpp"
 #include "haptic_client/app/client.hpp"
+#include "haptic_client/app/devices_command.hpp"
+#include "haptic_client/app/hand.hpp"
 #include "haptic_client/app/laws_command.hpp"
-#include "haptic_client/app/plan_file.hpp"
 
 namespace {
 
@@ -25,8 +27,8 @@ constexpr const char* kProgram = "osteon-haptic";
 struct Options {
   RoomSessionOptions room;
   double patience_s = 5.0;
-  std::filesystem::path plan, cut_log, summary;
-  std::string device = "simulated";
+  std::filesystem::path cut_log, summary;
+  HandOptions hand;
   ClientOptions client;
 };
 
@@ -50,6 +52,14 @@ json step_summary(const ReadyStep& step, const StepResult& result, double remove
     out["tool"] = step.plan.tool;
     out["entry_mm"] = vector(step.site.entry_mm);
     out["axis"] = vector(step.site.axis);
+    return out;
+  }
+  if (step.plan.action == Action::free_hand) {
+    out["tool"] = step.plan.tool;
+    out["spindle_rpm"] = step.spindle_rpm;
+    out["entry_mm"] = vector(step.site.entry_mm);
+    out["removed_mm3"] = removed_mm3;
+    out["peak_force_n"] = result.peak_force_n;
     return out;
   }
   const bool drill = step.feeds();
@@ -76,12 +86,13 @@ json step_summary(const ReadyStep& step, const StepResult& result, double remove
   return out;
 }
 
-json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, const std::string& device) {
+json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string_view device, int losses) {
   const TickStats& ticks = outcome.ticks;
   json steps = json::array();
   for (std::size_t i = 0; i < plan.steps.size(); ++i)
     steps.push_back(step_summary(plan.steps[i], outcome.steps[i], outcome.removed_mm3[i]));
   return {{"device", device},
+          {"device_losses", losses},
           {"device_limits",
            {{"peak_n", outcome.limits.peak_n},
             {"continuous_n", outcome.limits.continuous_n},
@@ -93,6 +104,8 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, const std::
           {"loop",
            {{"ticks", ticks.work.count()},
             {"missed", ticks.missed},
+            {"stalls", outcome.stalls},
+            {"longest_stall_ms", outcome.longest_stall_ms},
             {"realtime", outcome.realtime},
             {"late_p50_us", ticks.lateness.percentile_us(50)},
             {"late_p99_us", ticks.lateness.percentile_us(99)},
@@ -118,32 +131,42 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, const std::
           {"stopped", outcome.stopped}};
 }
 
+// What a person should know of the devices, as it happens.
+void tell(DeviceEvent event, std::string_view device, const std::string& sentence) {
+  switch (event) {
+    case DeviceEvent::lost: log::warn("device lost", {{"device", device}, {"because", sentence}, {"force", "none until it is back"}}); break;
+    case DeviceEvent::back: log::info("device back", {{"device", device}}); break;
+    case DeviceEvent::advice: log::warn("device waits", {{"device", device}, {"for", sentence}}); break;
+    case DeviceEvent::ready: log::info("device ready", {{"device", device}}); break;
+  }
+}
+
 Result<void> run(Options& options, const StopSignal& stop) {
   // Everything that can be wrong without a server is said before one is looked for.
-  const Result<SimulatedDeviceParams> device = find_simulated_device(options.device);
-  if (!device) return tl::unexpected(device.error());
   if (options.client.force_scale < 0.0 || options.client.force_scale > 1.0)
     return failure(ErrorCode::invalid_input, "--scale must be a number above 0 and at most 1");
   if (!(options.patience_s >= 0.0 && options.patience_s <= 3600.0))
     return failure(ErrorCode::invalid_input, "--patience must be from 0 to 3600 seconds");
   if (Result<void> usable = check_writable(options.client.record, "the recording", "--record"); !usable) return usable;
-  const Result<std::vector<PlanStep>> plan = read_plan(options.plan);
-  if (!plan) return tl::unexpected(plan.error());
+  Result<HandChoice> hand = HandChoice::make(options.hand, tell);
+  if (!hand) return tl::unexpected(hand.error());
 
   options.room.patience = std::chrono::milliseconds(std::llround(1e3 * options.patience_s));
   Result<RoomSession> room = RoomSession::join(options.room, [&] { return stop.requested(); });
   if (!room) return tl::unexpected(room.error());
   log::info("joined", {{"case", room->bone().info().title}, {"author", room->room().author.value}});
-  const Result<ReadyPlan> ready = make_ready(*plan, room->bone());
-  if (!ready) return failure(ready.error().code, "the plan " + options.plan.string() + ", " + ready.error().message);
+  Result<std::unique_ptr<Session>> session = hand->on(room->bone(), options.client.force_scale);
+  if (!session) return tl::unexpected(session.error());
 
-  const Result<ClientOutcome> outcome = run_client(*room, *ready, *device, options.client, stop);
+  const Result<ClientOutcome> outcome = run_client(*room, **session, options.client, stop);
+  const int losses = hand->losses();
+  hand->disconnect();
   if (!outcome) return tl::unexpected(outcome.error());
   if (Result<void> written = write_cut_log(options.cut_log, outcome->cuts); !written) return written;
   if (!options.summary.empty())
-    if (Result<void> written = write_file(options.summary, summary_of(*outcome, *ready, device->name).dump(2) + "\n"); !written) return written;
+    if (Result<void> written = write_file(options.summary, summary_of(*outcome, (*session)->plan(), hand->device_name(), losses).dump(2) + "\n"); !written) return written;
   std::printf("%s: %s %zu steps, %zu cuts, %.1f mm3 removed, field %.12s at %llu\n", kProgram,
-              outcome->stopped ? "stopped in" : "done", ready->steps.size(), outcome->cuts.size(), outcome->removed_total_mm3,
+              outcome->stopped ? "stopped in" : "done", (*session)->plan().steps.size(), outcome->cuts.size(), outcome->removed_total_mm3,
               to_hex(outcome->field_hash).c_str(), static_cast<unsigned long long>(outcome->room_seq.value));
   return {};
 }
@@ -151,12 +174,23 @@ Result<void> run(Options& options, const StopSignal& stop) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc > 1 && (std::string_view(argv[1]) == "check" || std::string_view(argv[1]) == "--check")) return run_check(argc - 1, argv + 1);
   if (argc > 1 && std::string_view(argv[1]) == "laws") return run_laws(argc - 1, argv + 1);
+  if (argc > 1 && std::string_view(argv[1]) == "devices") return run_devices(argc - 1, argv + 1);
   Options options;
-  CLI::App app("Carries out a surgeon's plan at a haptic device: feels and cuts the bone of a room at 1 kHz.", kProgram);
+  CLI::App app("Feels and cuts the bone of a room at 1 kHz: with your hand at a haptic device, or with a simulated one that carries out a plan. "
+               "Other commands: check, devices, laws (each with --help).", kProgram);
   app.add_option("--server", options.room.address, "HOST:PORT of osteon-server")->required();
-  app.add_option("--plan", options.plan, "JSON file with the surgeon's steps")->required();
-  app.add_option("--device", options.device, "simulated, one as strong as the drilling of bone, or simulated-3.3N, a desktop one; both with a simulated hand")->capture_default_str();
+  app.add_option("--plan", options.hand.plan, "JSON file with the steps of a simulated surgeon");
+  app.add_option("--tool", options.hand.tool, "The tool for your own hand, e.g. drill-3.2; no --plan then");
+  app.add_option("--device", options.hand.device, "simulated or simulated-3.3N (a simulated hand, with a --plan), recorded:FILE (a recording, with its --plan), or for your hand "
+                 "one of osteon-haptic devices, others added by \"+\": phantom, falcon+spacemouse+pedal")->capture_default_str();
+  app.add_option("--view", options.hand.view, "Your hand: from where you look, front, back, left, right, top or bottom of the patient, or the direction x,y,z")->capture_default_str();
+  app.add_option("--at", options.hand.at, "Your hand: the place x,y,z in mm over which the tool begins; by default the bone's middle");
+  app.add_option("--rpm", options.hand.spindle_rpm, "Your hand: the spindle's full speed; by default the tool's own");
+  app.add_option("--law", options.hand.law, "Your hand: the force law by which the tool resists, see osteon-haptic laws; by default the tool's own");
+  app.add_option("--wear", options.hand.wear, "Your hand: how blunt the tool is, from 1, sharp; about 2 is blunt")->capture_default_str();
+  add_device_options(app, options.hand.devices);
   app.add_option("--scale", options.client.force_scale, "Rendered over physical force; by default the device's continuous force / 30 N");
   app.add_option("--session-log", options.client.session_log, "CSV with a row for each millisecond");
   app.add_option("--record", options.client.record, "HDF5 file with a row for each millisecond: poses, wrenches, spindle, bone; --device recorded:FILE plays it");

@@ -296,7 +296,7 @@ void RecordFile::Impl::make_columns() {
   add(enumeration<R>("data/state", "what the tool does to the bone",
                      {{{"idle", 1}, {"free", 2}, {"cutting", 3}, {"rubbing", 4}}}, [](const R& r) { return static_cast<int>(r.report.phase); }));
   Names phases;
-  for (int i = 0; i <= static_cast<int>(SurgeonPhase::done); ++i) phases.values.emplace_back(name(static_cast<SurgeonPhase>(i)), i);
+  for (int i = 0; i <= static_cast<int>(SurgeonPhase::free_hand); ++i) phases.values.emplace_back(name(static_cast<SurgeonPhase>(i)), i);
   add(enumeration<R>("data/phase", "what the step under way is at", phases, [](const R& r) { return static_cast<int>(r.phase); }));
   add(column<std::uint32_t, R>("data/step", "1", "", "of the plan, from 0", [](const R& r) { return r.step; }));
   add(column<std::uint8_t, R>("data/tool", "1", "", "in hand: its place in metadata/tools", [](const R& r) { return r.report.tool; }));

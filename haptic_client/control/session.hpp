@@ -12,23 +12,42 @@ struct SessionTick {
   LoopReport report;
 };
 
-class SimulatedSession {
+// Whoever holds the handle: a tick at a time it moves, and the loop answers.
+class Session {
+ public:
+  virtual ~Session() = default;
+  // [haptic] `link_ok` false ends force and spindle; `periods`: of 1 ms since the last tick, 1 when on time.
+  // `room_guides`: those of the room's scene. Null: the plan's own, from the step on that places them.
+  virtual SessionTick tick(const Patch& patch, bool link_ok, int periods = 1, const std::vector<PlacedGuide>* room_guides = nullptr) noexcept = 0;
+  [[nodiscard]] virtual bool done() const noexcept = 0;
+  [[nodiscard]] virtual bool endless() const noexcept { return false; }  // goes on until it is asked to stop
+  [[nodiscard]] virtual HapticLoop& loop() noexcept = 0;
+  // Its steps and tools; a hand that is free has tools only.
+  [[nodiscard]] virtual const ReadyPlan& plan() const noexcept = 0;
+  [[nodiscard]] virtual const std::vector<StepResult>& results() const noexcept = 0;
+  // What was left on the bone so far, in order. Entries stay as they are: another thread may read those that it was told of.
+  [[nodiscard]] virtual const std::vector<LeftItem>& left() const noexcept = 0;
+  [[nodiscard]] virtual const HapticDevice& device() const noexcept = 0;
+};
+
+class SimulatedSession final : public Session {
  public:
   // `dt_s`: of a tick.
   SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale, double dt_s = 1e-3);
 
-  // [haptic] `link_ok` false ends force and spindle; `periods`: of 1 ms since the last tick, 1 when on time. The
-  // simulated hand lives on these ticks: while none comes, as when the machine stalls, no time passes for it.
-  // `room_guides`: those of the room's scene. Null: the plan's own, from the step on that places them.
-  SessionTick tick(const Patch& patch, bool link_ok, int periods = 1, const std::vector<PlacedGuide>* room_guides = nullptr) noexcept;
-  [[nodiscard]] bool done() const noexcept { return surgeon_.done(); }
+  // [haptic] The simulated hand lives on these ticks: while none comes, as when the machine stalls, no time passes for it.
+  SessionTick tick(const Patch& patch, bool link_ok, int periods = 1, const std::vector<PlacedGuide>* room_guides = nullptr) noexcept override;
+  [[nodiscard]] bool done() const noexcept override { return surgeon_.done(); }
   // Before the first tick: the handle moves as this device says, and the simulated hand lets go. The plan still says
   // which tools are taken up when; with a recording of the same plan on the same bone everything happens again.
   void play(HapticDevice& device) noexcept { played_ = &device; }
 
-  [[nodiscard]] HapticLoop& loop() noexcept { return loop_; }
+  [[nodiscard]] HapticLoop& loop() noexcept override { return loop_; }
+  [[nodiscard]] const ReadyPlan& plan() const noexcept override { return surgeon_.plan(); }
+  [[nodiscard]] const std::vector<StepResult>& results() const noexcept override { return surgeon_.results(); }
+  [[nodiscard]] const std::vector<LeftItem>& left() const noexcept override { return surgeon_.left(); }
   [[nodiscard]] const Surgeon& surgeon() const noexcept { return surgeon_; }
-  [[nodiscard]] const SimulatedDevice& device() const noexcept { return device_; }
+  [[nodiscard]] const SimulatedDevice& device() const noexcept override { return device_; }
 
  private:
   Surgeon surgeon_;

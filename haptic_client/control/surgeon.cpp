@@ -210,13 +210,13 @@ Result<ReadyPlan> make_ready(const std::vector<PlanStep>& plan, const Case& bone
 }
 
 const char* name(Action action) {
-  constexpr const char* kNames[] = {"drill", "burr", "wait", "place", "screw"};
+  constexpr const char* kNames[] = {"drill", "burr", "wait", "place", "screw", "free_hand"};
   return kNames[static_cast<int>(action)];
 }
 
 const char* name(SurgeonPhase phase) {
   constexpr const char* kNames[] = {"take_up", "approach", "spin_up", "seek", "push", "feed",
-                                    "react",   "sweep",    "retract", "lift", "wait", "done"};
+                                    "react",   "sweep",    "retract", "lift", "wait", "done", "free_hand"};
   return kNames[static_cast<int>(phase)];
 }
 

@@ -14,7 +14,7 @@
 
 namespace osteon::haptic {
 
-enum class Action : std::uint8_t { drill, burr, wait, place, screw };
+enum class Action : std::uint8_t { drill, burr, wait, place, screw, free_hand };  // the last is of no plan
 [[nodiscard]] const char* name(Action action);
 enum class HandKind : std::uint8_t { expert, novice, rig };
 
@@ -69,7 +69,8 @@ using ToolFinder = std::function<Result<Tool>(std::string_view name)>;
 // Error invalid_input or not_found: names the step, the field and the remedy.
 [[nodiscard]] Result<ReadyPlan> make_ready(const std::vector<PlanStep>& plan, const Case& bone, const ToolFinder& find = find_tool);
 
-enum class SurgeonPhase : std::uint8_t { take_up, approach, spin_up, seek, push, feed, react, sweep, retract, lift, wait, done };
+// free_hand: of no plan, a person's own.
+enum class SurgeonPhase : std::uint8_t { take_up, approach, spin_up, seek, push, feed, react, sweep, retract, lift, wait, done, free_hand };
 [[nodiscard]] const char* name(SurgeonPhase phase);
 
 // What the hand is to do in the next tick; bone frame.

@@ -29,6 +29,12 @@ Result<std::unique_ptr<CombinedDevice>> CombinedDevice::make(std::vector<std::un
   return result;
 }
 
+DeviceLimits CombinedDevice::limits() const {
+  DeviceLimits limits = parts_[0]->limits();
+  if (turning_) limits.peak_nmm = limits.continuous_nmm = 0.0;
+  return limits;
+}
+
 DeviceInfo CombinedDevice::info() const {
   DeviceInfo info = parts_[0]->info();
   for (std::size_t i = 1; i < parts_.size(); ++i) {

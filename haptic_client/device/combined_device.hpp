@@ -15,7 +15,7 @@ class CombinedDevice final : public HapticDevice {
   [[nodiscard]] static Result<std::unique_ptr<CombinedDevice>> make(std::vector<std::unique_ptr<HapticDevice>> parts);
 
   [[nodiscard]] std::string_view name() const override { return name_; }
-  [[nodiscard]] DeviceLimits limits() const override { return parts_[0]->limits(); }
+  [[nodiscard]] DeviceLimits limits() const override;
   [[nodiscard]] DeviceInfo info() const override;
   // Neither the hand nor its rotation may be missing; without its pedal the spindle only stands still.
   [[nodiscard]] DeviceReading read() noexcept override;

@@ -173,6 +173,7 @@ class OpenHaptics final : public HapticDevice {
     info_.model = text_of(*call_, hd::kModel);
     info_.serial = text_of(*call_, hd::kSerial);
     info_.driver = text_of(*call_, hd::kDriverVersion);
+    info_.torque_axes = 0;  // the few with six motors are driven as if they had three: nothing published tells their torque
     // Arrays longer than any the library fills, should a device have more motors than we know of.
     std::array<double, 16> value{};
     const auto number = [&](hd::Enum what) {
@@ -194,9 +195,6 @@ class OpenHaptics final : public HapticDevice {
     }
     limits_.workspace_radius_mm = radius_mm;
     std::array<int, 16> integers{};
-    call_->get_integers(hd::kOutputAxes, integers.data());
-    info_.torque_axes = integers[0] >= 6 ? 3 : 0;
-    integers.fill(0);
     call_->get_integers(hd::kCalibrationStyle, integers.data());
     styles_ = static_cast<hd::Enum>(integers[0]);
     if (const unsigned code = take_error(*call_); code != hd::kNoError) return tl::unexpected(sentence(code));

@@ -1,0 +1,90 @@
+#include "haptic_client/app/hand.hpp"
+
+#include "haptic_client/app/plan_file.hpp"
+
+namespace osteon::haptic {
+
+Result<HandChoice> HandChoice::make(const HandOptions& options, DeviceNotice notice) {
+  HandChoice choice;
+  choice.options_ = options;
+  const bool simulated = options.device.starts_with("simulated"), recorded = options.device.starts_with("recorded:");
+  if (simulated) {
+    const Result<SimulatedDeviceParams> device = find_simulated_device(options.device);
+    if (!device) return tl::unexpected(device.error());
+    choice.simulated_ = *device;
+    if (options.plan.empty())
+      return failure(ErrorCode::invalid_input, "--device " + options.device + " has a hand of our own making, which needs a --plan; name a device for your own hand (osteon-haptic devices lists them) or give one");
+  }
+  if (options.plan.empty() == options.tool.empty())
+    return failure(ErrorCode::invalid_input, options.plan.empty() ? "--tool is missing; name the tool for your hand, e.g. drill-3.2, or give a --plan"
+                                                                  : "--tool is for a hand without a plan; leave out --tool or --plan");
+  if (!options.plan.empty() && !options.law.empty())
+    return failure(ErrorCode::invalid_input, "--law is for a hand without a plan; write \"law\" into the plan's steps");
+  if (options.plan.empty()) {
+    if (Result<void> taken = choice.take_person(std::move(notice)); !taken) return tl::unexpected(taken.error());
+    return choice;
+  }
+  if (!simulated && !recorded) {
+    if (const auto known = make_devices(options.device, options.devices); !known) return tl::unexpected(known.error());
+    return failure(ErrorCode::invalid_input, "--device " + options.device + " is held by a person, who needs no plan; leave out --plan and give --tool, or take --device simulated");
+  }
+  if (recorded) {
+    Result<std::unique_ptr<RecordedDevice>> device = make_recorded_device(options.device.substr(std::string_view("recorded:").size()));
+    if (!device) return tl::unexpected(device.error());
+    choice.recorded_ = std::move(*device);
+    choice.simulated_ = {options.device, choice.recorded_->limits()};
+  }
+  Result<std::vector<PlanStep>> plan = read_plan(options.plan);
+  if (!plan) return tl::unexpected(plan.error());
+  choice.plan_ = std::move(*plan);
+  return choice;
+}
+
+Result<void> HandChoice::take_person(DeviceNotice notice) {
+  const Result<Vec3> toward = read_view(options_.view);
+  if (!toward) return tl::unexpected(toward.error());
+  free_ = {.tool = options_.tool, .spindle_rpm = options_.spindle_rpm, .wear = options_.wear, .law = options_.law, .toward = *toward, .at_mm = std::nullopt};
+  if (!options_.at.empty()) {
+    const Result<Vec3> at = read_point(options_.at, "--at");
+    if (!at) return tl::unexpected(at.error());
+    free_.at_mm = *at;
+  }
+  if (!(options_.spindle_rpm >= 0.0 && options_.spindle_rpm <= 200000.0)) return failure(ErrorCode::invalid_input, "--rpm must be from 0 to 200000");
+  const Result<Tool> tool = find_tool(options_.tool);
+  if (!tool) return tl::unexpected(tool.error());
+  if (const auto law = choose_law(*tool, options_.law); !law) return failure(law.error().code, "--law: " + law.error().message);
+  if (!(options_.wear >= 1.0 && options_.wear <= 5.0)) return failure(ErrorCode::invalid_input, "--wear must be from 1, sharp, to 5");
+  Result<std::unique_ptr<CombinedDevice>> device = make_devices(options_.device, options_.devices);
+  if (!device) return tl::unexpected(device.error());
+  person_ = std::move(*device);
+  for (const auto& part : person_->parts()) {
+    connections_.push_back(std::make_unique<DeviceConnection>(*part, notice));
+    if (const Result<void> started = connections_.back()->start(); !started)
+      return failure(started.error().code, "--device " + std::string(part->name()) + ": " + started.error().message);
+  }
+  return {};
+}
+
+Result<std::unique_ptr<Session>> HandChoice::on(const Case& bone, double force_scale) {
+  if (person_) {
+    Result<ReadyPlan> ready = make_free_hand(free_, bone);
+    if (!ready) return tl::unexpected(ready.error());
+    return std::make_unique<FreeHandSession>(std::move(*ready), *person_, force_scale);
+  }
+  Result<ReadyPlan> ready = make_ready(plan_, bone);
+  if (!ready) return failure(ready.error().code, "the plan " + options_.plan.string() + ", " + ready.error().message);
+  if (recorded_ && force_scale == 0.0) force_scale = recorded_->session().force_scale;
+  auto session = std::make_unique<SimulatedSession>(std::move(*ready), simulated_, force_scale);
+  if (recorded_) session->play(*recorded_);
+  return session;
+}
+
+std::string_view HandChoice::device_name() const { return person_ ? person_->name() : std::string_view(simulated_.name); }
+
+int HandChoice::losses() const {
+  int losses = 0;
+  for (const auto& connection : connections_) losses += connection->losses();
+  return losses;
+}
+
+}  // namespace osteon::haptic
