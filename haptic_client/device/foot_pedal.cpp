@@ -5,8 +5,8 @@
 #include <atomic>
 #include <chrono>
 
+#include "common/input/hid_port.hpp"
 #include "haptic_client/device/device_exchange.hpp"
-#include "haptic_client/device/hid_port.hpp"
 
 namespace osteon::haptic {
 namespace {

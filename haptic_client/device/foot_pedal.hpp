@@ -5,8 +5,8 @@
 #include <optional>
 #include <span>
 
+#include "common/input/hid_report.hpp"
 #include "haptic_client/device/haptic_device.hpp"
-#include "haptic_client/device/hid_report.hpp"
 
 namespace osteon::haptic {
 

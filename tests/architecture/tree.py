@@ -14,6 +14,7 @@ LAYERS = {
     "mechanics": {"core", "geometry", "tools", "field"},
     "sound": {"core"},
     "runtime": {"core"},
+    "input": {"core", "geometry", "runtime"},
     "wire": {"core", "geometry", "tools", "field", "surface", "mechanics"},
 }
 PROGRAMS = ("server", "haptic_client", "viewer_client", "audio_client")
@@ -27,7 +28,7 @@ HEAVY = {
     "gRPC": (re.compile(r"^grpc(pp)?/"), ("common/wire", "*/net")),
     "HDF5": (re.compile(r"^hdf5"), ("haptic_client/app", "haptic_client/device")),
     "libusb": (re.compile(r"^libusb"), ("haptic_client/device",)),
-    "hidapi": (re.compile(r"^hidapi/"), ("haptic_client/device",)),
+    "hidapi": (re.compile(r"^hidapi/"), ("common/input",)),
     "GDCM": (re.compile(r"^gdcm"), ("common/imaging", "server/import")),
 }
 GENERATED = re.compile(r"\.pb\.h$")

@@ -75,7 +75,7 @@ int main(int argc, char** argv) {
     if (!until([&] { return falcon->read().usable(); })) return fail("it does not become ready");
     if (usb.falcon_told().with_force > 0) ++counted.force_after_loss;
     const auto begun = Clock::now();
-    const std::uint64_t first = falcon->read().sample, wanted = cycles / static_cast<std::uint64_t>(unplugs + 1);
+    const std::uint64_t first = falcon->read().sample, wanted = cycles / static_cast<std::uint64_t>(unplugs + 1) + 1;
     // The haptic thread: reads and writes a thousand times a second. The grip goes round meanwhile.
     std::uint64_t last = first;
     while (last < first + wanted) {

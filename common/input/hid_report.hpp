@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-namespace osteon::haptic {
+namespace osteon {
 
 struct HidField {
   std::uint16_t page = 0, usage = 0;
@@ -29,4 +29,4 @@ struct HidUsage {
 };
 [[nodiscard]] std::optional<HidField> find_field(std::span<const HidField> fields, std::span<const HidUsage> usages);
 
-}  // namespace osteon::haptic
+}  // namespace osteon

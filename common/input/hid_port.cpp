@@ -1,4 +1,4 @@
-#include "haptic_client/device/hid_port.hpp"
+#include "common/input/hid_port.hpp"
 
 #include <hidapi/hidapi.h>
 
@@ -9,7 +9,7 @@
 #include <fstream>
 #include <iterator>
 
-namespace osteon::haptic {
+namespace osteon {
 namespace {
 
 constexpr std::size_t kLargestReport = 64;
@@ -124,4 +124,4 @@ void HidReader::run(std::chrono::milliseconds pause) {
   if (calls_.before_close) calls_.before_close(*port_);
 }
 
-}  // namespace osteon::haptic
+}  // namespace osteon

@@ -13,7 +13,7 @@
 
 #include "common/core/result.hpp"
 
-namespace osteon::haptic {
+namespace osteon {
 
 struct HidFound {
   std::string path, product, serial;
@@ -74,4 +74,4 @@ class HidReader {
   Error why_ended_;
 };
 
-}  // namespace osteon::haptic
+}  // namespace osteon

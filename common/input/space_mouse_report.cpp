@@ -1,9 +1,9 @@
-#include "haptic_client/device/space_mouse_report.hpp"
+#include "common/input/space_mouse_report.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-namespace osteon::haptic {
+namespace osteon {
 namespace {
 
 constexpr std::uint8_t kTranslation = 1, kRotation = 2, kButtons = 3, kBattery = 0x17;
@@ -17,12 +17,6 @@ Vec3 axes(std::span<const std::uint8_t> bytes) {
     raw[i] = std::clamp(static_cast<double>(static_cast<std::int16_t>(bits)) / kSpaceMouseRange, -1.0, 1.0);
   }
   return {raw[0], -raw[2], raw[1]};
-}
-
-Vec3 beyond_rest(const Vec3& deflection, double rest) {
-  const double size = deflection.norm();
-  // Two axes pushed together are no faster than one.
-  return size <= rest ? Vec3(Vec3::Zero()) : Vec3(deflection * (std::min(1.0, (size - rest) / (1.0 - rest)) / size));
 }
 
 }  // namespace
@@ -54,13 +48,9 @@ bool take_report(SpaceMouseState& state, std::span<const std::uint8_t> report) n
   }
 }
 
-void RateControl::step(const SpaceMouseState& state, double dt_s) noexcept {
-  pose_.position_mm += params_.fastest_mm_per_s * dt_s * beyond_rest(state.push, params_.rest);
-  const double far = pose_.position_mm.norm();
-  if (far > params_.reach_mm) pose_.position_mm *= params_.reach_mm / far;
-  const Vec3 turn = params_.fastest_rad_per_s * dt_s * beyond_rest(state.twist, params_.rest);
-  const double angle = turn.norm();
-  if (angle > 0.0) pose_.rotation = (Eigen::Quaterniond(Eigen::AngleAxisd(angle, turn / angle)) * pose_.rotation).normalized();
+Vec3 beyond_rest(const Vec3& deflection, double rest) noexcept {
+  const double size = deflection.norm();
+  return size <= rest ? Vec3(Vec3::Zero()) : Vec3(deflection * (std::min(1.0, (size - rest) / (1.0 - rest)) / size));
 }
 
-}  // namespace osteon::haptic
+}  // namespace osteon

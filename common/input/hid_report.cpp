@@ -1,9 +1,9 @@
-#include "haptic_client/device/hid_report.hpp"
+#include "common/input/hid_report.hpp"
 
 #include <algorithm>
 #include <map>
 
-namespace osteon::haptic {
+namespace osteon {
 namespace {
 
 // Global items hold until they change; local ones end with each main item.
@@ -137,4 +137,4 @@ std::optional<HidField> find_field(std::span<const HidField> fields, std::span<c
   return std::nullopt;
 }
 
-}  // namespace osteon::haptic
+}  // namespace osteon
