@@ -212,7 +212,7 @@ class Client {
       row_.force_rendered_n = now.report.force_device_n.norm();
       row_.reading = now.reading;
       row_.commanded_rpm = now.commanded_rpm;
-      row_.rendered = now.report.force_device_n;
+      row_.rendered = {now.report.force_device_n, now.report.torque_device_nmm};
       row_.take_up = now.order.take_up;
       if (row_.take_up) {
         row_.taken_up_at = {now.order.hand.target_mm, now.order.rotation};

@@ -274,10 +274,10 @@ void RecordFile::Impl::make_columns() {
                         [](const R& r) { return numbers(r.report.pose_bone_proxy); }));
   add(column<float, R>("drill_force_feedback/wrench", "N, N, N, N.mm, N.mm, N.mm", kDevice, "shown by the device to the hand",
                        [](const R& r) { return wrench(r.rendered.force_n, r.rendered.torque_nmm); }));
-  add(column<float, R>("drill_force_physical/wrench", "N, N, N, N.mm, N.mm, N.mm", kBone, "of the bone on the tool, not scaled", [](const R& r) {
-    // The bone resists the spindle, which turns clockwise for who looks along the tool's +z.
-    return wrench(r.report.force_physical_n, -r.report.torque_nmm * (r.report.pose_bone_proxy.rotation * Vec3::UnitZ()));
-  }));
+  add(column<float, R>("drill_force_feedback/motor_force", "N, N, N", kDevice, "what of it is the motor's: drag, kick, vibration",
+                       [](const R& r) { return numbers(r.report.motor_device_n); }));
+  add(column<float, R>("drill_force_physical/wrench", "N, N, N, N.mm, N.mm, N.mm", kBone, "of the bone on the tool, not scaled",
+                       [](const R& r) { return wrench(r.report.force_physical_n, r.report.torque_physical_nmm); }));
   add(column<float, R>("drill_force_physical/cutting_force", "N, N, N", kBone, "of the tool on the bone, by the law alone",
                        [](const R& r) { return numbers(r.report.cutting_force_n); }));
   add(column<std::int64_t, R>("data/mono_ns", "ns", "", "the machine's monotonic clock, as in every log of the session", [](const R& r) { return r.mono_ns; }));
@@ -288,6 +288,11 @@ void RecordFile::Impl::make_columns() {
   add(column<float, R>("data/density", "g/cm3", "", "of the bone being cut, weighted by engaged area", [](const R& r) { return r.report.density_g_cm3; }));
   add(column<float, R>("data/engaged", "1", "", "share of the leading area that is in bone", [](const R& r) { return r.report.engaged; }));
   add(column<float, R>("data/torque", "N.mm", "", "that the bone takes from the spindle", [](const R& r) { return r.report.torque_nmm; }));
+  add(column<float, R>("data/cutting_work", "mJ", "", "of the law's force over the way cut in the tick", [](const R& r) { return r.report.cutting_work_mj; }));
+  add(column<float, R>("data/coupling_energy", "mJ", "", "given out by the coupling in this contact, less what the hand put in",
+                       [](const R& r) { return r.report.energy.episode_mj; }));
+  add(column<float, R>("data/offset", "mm, mm, mm", kBone, "of the hand's place: slack and what returned bone would have stretched",
+                       [](const R& r) { return numbers(r.report.offset_mm); }));
   add(column<float, R>("data/depth", "mm", "", "of the tip below the entry of the step under way", [](const R& r) { return r.depth_mm; }));
   add(column<float, R>("data/device_depth", "mm", "", "the same of the hand", [](const R& r) { return r.device_depth_mm; }));
   add(column<float, R>("data/force_scale", "1", "", "s: rendered over physical force", [s](const R&) { return s; }));

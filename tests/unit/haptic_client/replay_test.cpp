@@ -40,7 +40,7 @@ TickRow row_of(Bench& bench, const SessionTick& tick) {
   row.report = tick.report;
   row.reading = tick.reading;
   row.commanded_rpm = tick.commanded_rpm;
-  row.rendered = tick.report.force_device_n;
+  row.rendered = {tick.report.force_device_n, tick.report.torque_device_nmm};
   row.take_up = tick.order.take_up;
   row.taken_up_at = {tick.order.hand.target_mm, tick.order.rotation};
   row.mapping = bench.session().loop().mapping();
