@@ -13,11 +13,15 @@ Result<HandChoice> HandChoice::make(const HandOptions& options, DeviceNotice not
     if (!device) return tl::unexpected(device.error());
     choice.simulated_ = *device;
     if (options.plan.empty())
-      return failure(ErrorCode::invalid_input, "--device " + options.device + " has a hand of our own making, which needs a --plan; name a device for your own hand (osteon-haptic devices lists them) or give one");
+      return failure(ErrorCode::invalid_input, "--device " + options.device +
+                                                   " has a hand of our own making, which needs a --plan; name a device "
+                                                   "for your own hand (osteon-haptic devices lists them) or give one");
   }
   if (options.plan.empty() == options.tool.empty())
-    return failure(ErrorCode::invalid_input, options.plan.empty() ? "--tool is missing; name the tool for your hand, e.g. drill-3.2, or give a --plan"
-                                                                  : "--tool is for a hand without a plan; leave out --tool or --plan");
+    return failure(ErrorCode::invalid_input,
+                   options.plan.empty()
+                       ? "--tool is missing; name the tool for your hand, e.g. drill-3.2, or give a --plan"
+                       : "--tool is for a hand without a plan; leave out --tool or --plan");
   if (!options.plan.empty() && !options.law.empty())
     return failure(ErrorCode::invalid_input, "--law is for a hand without a plan; write \"law\" into the plan's steps");
   if (options.plan.empty()) {
@@ -26,10 +30,14 @@ Result<HandChoice> HandChoice::make(const HandOptions& options, DeviceNotice not
   }
   if (!simulated && !recorded) {
     if (const auto known = make_devices(options.device, options.devices); !known) return tl::unexpected(known.error());
-    return failure(ErrorCode::invalid_input, "--device " + options.device + " is held by a person, who needs no plan; leave out --plan and give --tool, or take --device simulated");
+    return failure(
+        ErrorCode::invalid_input,
+        "--device " + options.device +
+            " is held by a person, who needs no plan; leave out --plan and give --tool, or take --device simulated");
   }
   if (recorded) {
-    Result<std::unique_ptr<RecordedDevice>> device = make_recorded_device(options.device.substr(std::string_view("recorded:").size()));
+    Result<std::unique_ptr<RecordedDevice>> device =
+        make_recorded_device(options.device.substr(std::string_view("recorded:").size()));
     if (!device) return tl::unexpected(device.error());
     choice.recorded_ = std::move(*device);
     choice.simulated_ = {options.device, choice.recorded_->limits()};
@@ -43,17 +51,25 @@ Result<HandChoice> HandChoice::make(const HandOptions& options, DeviceNotice not
 Result<void> HandChoice::take_person(DeviceNotice notice) {
   const Result<Vec3> toward = read_view(options_.view);
   if (!toward) return tl::unexpected(toward.error());
-  free_ = {.tool = options_.tool, .spindle_rpm = options_.spindle_rpm, .wear = options_.wear, .law = options_.law, .toward = *toward, .at_mm = std::nullopt};
+  free_ = {.tool = options_.tool,
+           .spindle_rpm = options_.spindle_rpm,
+           .wear = options_.wear,
+           .law = options_.law,
+           .toward = *toward,
+           .at_mm = std::nullopt};
   if (!options_.at.empty()) {
     const Result<Vec3> at = read_point(options_.at, "--at");
     if (!at) return tl::unexpected(at.error());
     free_.at_mm = *at;
   }
-  if (!(options_.spindle_rpm >= 0.0 && options_.spindle_rpm <= 200000.0)) return failure(ErrorCode::invalid_input, "--rpm must be from 0 to 200000");
+  if (!(options_.spindle_rpm >= 0.0 && options_.spindle_rpm <= 200000.0))
+    return failure(ErrorCode::invalid_input, "--rpm must be from 0 to 200000");
   const Result<Tool> tool = find_tool(options_.tool);
   if (!tool) return tl::unexpected(tool.error());
-  if (const auto law = choose_law(*tool, options_.law); !law) return failure(law.error().code, "--law: " + law.error().message);
-  if (!(options_.wear >= 1.0 && options_.wear <= 5.0)) return failure(ErrorCode::invalid_input, "--wear must be from 1, sharp, to 5");
+  if (const auto law = choose_law(*tool, options_.law); !law)
+    return failure(law.error().code, "--law: " + law.error().message);
+  if (!(options_.wear >= 1.0 && options_.wear <= 5.0))
+    return failure(ErrorCode::invalid_input, "--wear must be from 1, sharp, to 5");
   Result<std::unique_ptr<CombinedDevice>> device = make_devices(options_.device, options_.devices);
   if (!device) return tl::unexpected(device.error());
   person_ = std::move(*device);
@@ -79,7 +95,9 @@ Result<std::unique_ptr<Session>> HandChoice::on(const Case& bone, double force_s
   return session;
 }
 
-std::string_view HandChoice::device_name() const { return person_ ? person_->name() : std::string_view(simulated_.name); }
+std::string_view HandChoice::device_name() const {
+  return person_ ? person_->name() : std::string_view(simulated_.name);
+}
 
 int HandChoice::losses() const {
   int losses = 0;

@@ -20,8 +20,8 @@ DeviceLimits shown(DeviceLimits limits) {
   return limits;
 }
 
-// Looking along `toward` with the patient's head up, or its front up where one looks along the body: x right, y up, z to
-// the user.
+// Looking along `toward` with the patient's head up, or its front up where one looks along the body: x right, y up, z
+// to the user.
 Eigen::Quaterniond view_along(const Vec3& toward) {
   Eigen::Matrix3d view;
   view.col(2) = -toward;
@@ -51,18 +51,27 @@ Result<Vec3> read_view(std::string_view text) {
     std::string_view name;
     double x, y, z;
   };
-  constexpr std::array<Named, 6> kViews{{{"front", 0, 1, 0}, {"back", 0, -1, 0}, {"left", -1, 0, 0}, {"right", 1, 0, 0}, {"top", 0, 0, -1}, {"bottom", 0, 0, 1}}};
+  constexpr std::array<Named, 6> kViews{{{"front", 0, 1, 0},
+                                         {"back", 0, -1, 0},
+                                         {"left", -1, 0, 0},
+                                         {"right", 1, 0, 0},
+                                         {"top", 0, 0, -1},
+                                         {"bottom", 0, 0, 1}}};
   for (const Named& view : kViews)
     if (view.name == text) return Vec3(view.x, view.y, view.z);
   Vec3 v;
   if (!read_numbers(text, v) || v.norm() < 1e-6)
-    return failure(ErrorCode::invalid_input, "--view must be front, back, left, right, top, bottom, or a direction x,y,z, not \"" + std::string(text) + '"');
+    return failure(
+        ErrorCode::invalid_input,
+        "--view must be front, back, left, right, top, bottom, or a direction x,y,z, not \"" + std::string(text) + '"');
   return v.normalized().eval();
 }
 
 Result<Vec3> read_point(std::string_view text, std::string_view option) {
   Vec3 v;
-  if (!read_numbers(text, v)) return failure(ErrorCode::invalid_input, std::string(option) + " must be a place x,y,z in millimetres, not \"" + std::string(text) + '"');
+  if (!read_numbers(text, v))
+    return failure(ErrorCode::invalid_input,
+                   std::string(option) + " must be a place x,y,z in millimetres, not \"" + std::string(text) + '"');
   return v;
 }
 
@@ -70,7 +79,7 @@ Result<ReadyPlan> make_free_hand(const FreeHandOptions& options, const Case& bon
   const Result<Tool> tool = find(options.tool);
   if (!tool) return tl::unexpected(tool.error());
   const Vec3 toward = options.toward.normalized();
-  const Result<Site> site = options.at_mm ? find_site_at(bone, *options.at_mm, toward) : find_site_toward(bone, toward);
+  const Result<Site> site = options.at_mm ? find_site_at(bone, *options.at_mm, toward) : find_site_toward(bone, -toward);
   if (!site) return tl::unexpected(site.error());
   ReadyPlan ready;
   ReadyStep step;
@@ -93,18 +102,24 @@ Result<ReadyPlan> make_free_hand(const FreeHandOptions& options, const Case& bon
 }
 
 FreeHandSession::FreeHandSession(ReadyPlan plan, HapticDevice& device, double force_scale)
-    : plan_(std::move(plan)), device_(device), limits_(shown(device.limits())),
-      loop_(loop_params(limits_.peak_n, limits_.continuous_n, limits_.stiffness_n_per_mm, force_scale, limits_.peak_nmm), plan_.tools) {}
+    : plan_(std::move(plan)),
+      device_(device),
+      limits_(shown(device.limits())),
+      loop_(
+          loop_params(limits_.peak_n, limits_.continuous_n, limits_.stiffness_n_per_mm, force_scale, limits_.peak_nmm),
+          plan_.tools) {}
 
 void FreeHandSession::take_up(const DeviceReading& reading, SurgeonOrder& order) noexcept {
   const ReadyStep& step = plan_.steps[0];
   const LoopParams& params = loop_.params();
   const Vec3 start_mm = step.site.entry_mm - step.stand_off_mm * step.site.axis;
-  // Bone mm for each mm of the handle: one where the device can show the coupling's whole stiffness and reaches far enough.
+  // Bone mm for each mm of the handle: one where the device can show the coupling's whole stiffness and reaches far
+  // enough.
   const double stiff_enough = limits_.stiffness_n_per_mm / (params.force_scale * params.stiffness_n_per_mm);
   const double reach_mm = std::max(step.stand_off_mm, std::min(step.site.thickness_mm, kMostDepth_mm) + kRoom_mm);
   WorkspaceMapping mapping;
-  mapping.align(step.rotation, std::max(std::min(1.0, stiff_enough), reach_mm / std::max(1.0, limits_.workspace_radius_mm)),
+  mapping.align(step.rotation,
+                std::max(std::min(1.0, stiff_enough), reach_mm / std::max(1.0, limits_.workspace_radius_mm)),
                 reading.pose_device_tool.position_mm, start_mm);
   const Pose pose_bone_tool{start_mm, mapping.pose_bone_tool(reading.pose_device_tool).rotation};
   loop_.take_up(0, pose_bone_tool, mapping);
@@ -113,7 +128,8 @@ void FreeHandSession::take_up(const DeviceReading& reading, SurgeonOrder& order)
   order.rotation = pose_bone_tool.rotation;
 }
 
-SessionTick FreeHandSession::tick(const Patch& patch, bool link_ok, int periods, const std::vector<PlacedGuide>* room_guides) noexcept {
+SessionTick FreeHandSession::tick(const Patch& patch, bool link_ok, int periods,
+                                  const std::vector<PlacedGuide>* room_guides) noexcept {
   SessionTick result;
   const DeviceReading reading = device_.read();
   const bool usable = reading.usable();

@@ -1,5 +1,5 @@
-// A person's own hand at a device: no plan, the handle drives the tool, its pedal or button the spindle, its clutch moves
-// the handle without the tool. While the device is not there the tool waits where it is, as under a held clutch.
+// A person's own hand at a device: no plan, the handle drives the tool, its pedal or button the spindle, its clutch
+// moves the handle without the tool. While the device is not there the tool waits where it is, as under a held clutch.
 #pragma once
 #include <optional>
 
@@ -9,11 +9,11 @@ namespace osteon::haptic {
 
 struct FreeHandOptions {
   std::string tool;
-  double spindle_rpm = 0;             // with the pedal all the way down; 0: the tool's own
+  double spindle_rpm = 0;  // with the pedal all the way down; 0: the tool's own
   double wear = 1;
-  std::string law = {};               // force law by which the tool resists; empty: the tool's own
-  Vec3 toward{0, 1, 0};               // where the user looks, patient's frame: from the front unless said otherwise
-  std::optional<Vec3> at_mm;          // the tool waits over this place; none: over the bone's middle
+  std::string law = {};       // force law by which the tool resists; empty: the tool's own
+  Vec3 toward{0, 1, 0};       // where the user looks, patient's frame: from the front unless said otherwise
+  std::optional<Vec3> at_mm;  // the tool waits over this place; none: over the bone's middle
 };
 
 // "front", "back", "left", "right", "top", "bottom", of the patient, from where the user looks; or "x,y,z", where to.
@@ -23,7 +23,8 @@ struct FreeHandOptions {
 [[nodiscard]] Result<Vec3> read_point(std::string_view text, std::string_view option);
 
 // A plan of one step without end: the tool, and where it is taken up. Error invalid_input or not_found.
-[[nodiscard]] Result<ReadyPlan> make_free_hand(const FreeHandOptions& options, const Case& bone, const ToolFinder& find = find_tool);
+[[nodiscard]] Result<ReadyPlan> make_free_hand(const FreeHandOptions& options, const Case& bone,
+                                               const ToolFinder& find = find_tool);
 
 class FreeHandSession final : public Session {
  public:
@@ -31,7 +32,8 @@ class FreeHandSession final : public Session {
   // all of it, and shown none.
   FreeHandSession(ReadyPlan plan, HapticDevice& device, double force_scale);
 
-  SessionTick tick(const Patch& patch, bool link_ok, int periods = 1, const std::vector<PlacedGuide>* room_guides = nullptr) noexcept override;
+  SessionTick tick(const Patch& patch, bool link_ok, int periods = 1,
+                   const std::vector<PlacedGuide>* room_guides = nullptr) noexcept override;
   [[nodiscard]] bool done() const noexcept override { return false; }
   [[nodiscard]] bool endless() const noexcept override { return true; }
   [[nodiscard]] HapticLoop& loop() noexcept override { return loop_; }

@@ -8,9 +8,12 @@ Result<std::unique_ptr<CombinedDevice>> CombinedDevice::make(std::vector<std::un
   auto result = std::unique_ptr<CombinedDevice>(new CombinedDevice);
   std::string names;
   for (const auto& part : parts) names += (names.empty() ? "" : "+") + std::string(part->name());
-  const auto wrong = [&](const std::string& why) { return failure(ErrorCode::invalid_input, "--device " + names + ": " + why); };
+  const auto wrong = [&](const std::string& why) {
+    return failure(ErrorCode::invalid_input, "--device " + names + ": " + why);
+  };
   if (parts.empty()) return wrong("it names no device; name one, e.g. phantom");
-  if (!parts[0]->info().places) return wrong("the first device must be one for the hand, such as phantom, falcon or spacemouse");
+  if (!parts[0]->info().places)
+    return wrong("the first device must be one for the hand, such as phantom, falcon or spacemouse");
   for (std::size_t i = 1; i < parts.size(); ++i) {
     HapticDevice& part = *parts[i];
     const DeviceInfo info = part.info();
@@ -21,7 +24,8 @@ Result<std::unique_ptr<CombinedDevice>> CombinedDevice::make(std::vector<std::un
       if (result->turning_) return wrong("two devices for the rotation; name one");
       result->turning_ = &part;
     } else {
-      return wrong(std::string(part.name()) + " cannot be added to " + std::string(parts[0]->name()) + "; add a spacemouse for the rotation or a pedal for the spindle");
+      return wrong(std::string(part.name()) + " cannot be added to " + std::string(parts[0]->name()) +
+                   "; add a spacemouse for the rotation or a pedal for the spindle");
     }
   }
   result->name_ = names;
@@ -53,7 +57,8 @@ DeviceReading CombinedDevice::read() noexcept {
   DeviceReading reading = parts_[0]->read();
   if (!turning_ && !pedal_) return reading;
   const auto join_buttons = [&](std::uint32_t buttons) {
-    if (pedal_ && (buttons & kSpindlePedal)) buttons = (buttons & ~static_cast<std::uint32_t>(kSpindlePedal)) | kClutchButton;
+    if (pedal_ && (buttons & kSpindlePedal))
+      buttons = (buttons & ~static_cast<std::uint32_t>(kSpindlePedal)) | kClutchButton;
     return buttons;
   };
   reading.buttons = join_buttons(reading.buttons);

@@ -31,8 +31,10 @@ void DeviceConnection::tell_advice() {
   const std::string now = device_.advice();
   if (now == advice_) return;
   advice_ = now;
-  if (now.empty()) notice_(DeviceEvent::ready, device_.name(), "it is ready");
-  else notice_(DeviceEvent::advice, device_.name(), now);
+  if (now.empty())
+    notice_(DeviceEvent::ready, device_.name(), "it is ready");
+  else
+    notice_(DeviceEvent::advice, device_.name(), now);
 }
 
 void DeviceConnection::keep() {
@@ -57,7 +59,8 @@ void DeviceConnection::keep() {
     } else {
       const Result<void> opened = device_.open();
       if (!opened) {
-        if (opened.error().message != told && losses_ > 0) notice_(DeviceEvent::advice, device_.name(), told = opened.error().message);
+        if (opened.error().message != told && losses_ > 0)
+          notice_(DeviceEvent::advice, device_.name(), told = opened.error().message);
         continue;
       }
       connected_ = true;

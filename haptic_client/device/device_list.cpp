@@ -26,8 +26,10 @@ struct Kind {
 Made make_numbered_force_dimension(const std::string& argument, const DeviceOptions& options) {
   int number = 0;
   const auto [end, wrong] = std::from_chars(argument.data(), argument.data() + argument.size(), number);
-  if (!argument.empty() && (wrong != std::errc{} || end != argument.data() + argument.size() || number < 0 || number > 15))
-    return failure(ErrorCode::invalid_input, "--device force-dimension:" + argument + ": the number of the device must be from 0 to 15");
+  if (!argument.empty() &&
+      (wrong != std::errc{} || end != argument.data() + argument.size() || number < 0 || number > 15))
+    return failure(ErrorCode::invalid_input,
+                   "--device force-dimension:" + argument + ": the number of the device must be from 0 to 15");
   return make_force_dimension({.library = options.libdhd, .number = number});
 }
 
@@ -40,16 +42,24 @@ Made make_recorded(const std::string& argument, const DeviceOptions&) {
 
 constexpr std::array<Kind, 7> kKinds{{
     {"phantom", "PHANToM Omni, Touch, Desktop, Premium (OpenHaptics)", "NAME of the vendor's setup",
-     [](const std::string& argument, const DeviceOptions& options) -> Made { return make_openhaptics({options.libhd, argument}); },
-     [](const DeviceOptions& options) { return look_for_openhaptics({options.libhd, {}}); }},
+     [](const std::string& argument, const DeviceOptions& options) -> Made {
+       return make_openhaptics({options.libhd, argument});
+     },
+     [](const DeviceOptions& options) {
+       return look_for_openhaptics({options.libhd, {}});
+     }},
     {"force-dimension", "omega, sigma, delta (libdhd)", "NUMBER", make_numbered_force_dimension,
      [](const DeviceOptions& options) { return look_for_force_dimension({.library = options.libdhd}); }},
     {"falcon", "Novint Falcon (USB)", "",
-     [](const std::string&, const DeviceOptions& options) -> Made { return make_falcon({.firmware = options.falcon_firmware}); },
+     [](const std::string&, const DeviceOptions& options) -> Made {
+       return make_falcon({.firmware = options.falcon_firmware});
+     },
      [](const DeviceOptions&) { return look_for_falcon(); }},
     {"spacemouse", "SpaceMouse: six degrees of freedom without force, or the rotation for another", "",
-     [](const std::string&, const DeviceOptions&) -> Made { return make_space_mouse(); }, [](const DeviceOptions&) { return look_for_space_mouse(); }},
-    {"pedal", "foot pedal, a switch for the spindle", "", [](const std::string&, const DeviceOptions&) -> Made { return make_foot_pedal(); },
+     [](const std::string&, const DeviceOptions&) -> Made { return make_space_mouse(); },
+     [](const DeviceOptions&) { return look_for_space_mouse(); }},
+    {"pedal", "foot pedal, a switch for the spindle", "",
+     [](const std::string&, const DeviceOptions&) -> Made { return make_foot_pedal(); },
      [](const DeviceOptions&) { return look_for_foot_pedals(); }},
     {"pedal-axis", "a joystick's axis as a proportional pedal for the spindle", "",
      [](const std::string&, const DeviceOptions&) -> Made {
@@ -63,7 +73,8 @@ constexpr std::array<Kind, 7> kKinds{{
 
 std::string all_names() {
   std::string names = "simulated, simulated-3.3N";
-  for (const Kind& kind : kKinds) names += ", " + std::string(kind.name) + (kind.argument.empty() ? "" : "[:" + std::string(kind.argument) + ']');
+  for (const Kind& kind : kKinds)
+    names += ", " + std::string(kind.name) + (kind.argument.empty() ? "" : "[:" + std::string(kind.argument) + ']');
   return names;
 }
 
@@ -74,10 +85,12 @@ Made make_one(std::string_view text, const DeviceOptions& options) {
   for (const Kind& kind : kKinds) {
     if (kind.name != name) continue;
     if (kind.argument.empty() && colon != std::string_view::npos)
-      return failure(ErrorCode::invalid_input, "--device " + std::string(text) + ": nothing may follow " + std::string(name) + "; leave out the colon");
+      return failure(ErrorCode::invalid_input, "--device " + std::string(text) + ": nothing may follow " +
+                                                   std::string(name) + "; leave out the colon");
     return kind.make(argument, options);
   }
-  return failure(ErrorCode::not_found, "there is no device \"" + std::string(name) + "\"; choose among " + all_names() + ", joined by \"+\"");
+  return failure(ErrorCode::not_found,
+                 "there is no device \"" + std::string(name) + "\"; choose among " + all_names() + ", joined by \"+\"");
 }
 
 }  // namespace
@@ -99,7 +112,9 @@ Result<std::unique_ptr<CombinedDevice>> make_devices(std::string_view names, con
 
 std::vector<DeviceLine> look_for_devices(const DeviceOptions& options) {
   std::vector<DeviceLine> lines;
-  lines.push_back({"simulated", "a hand of our own making, as strong as the drilling of bone; needs a plan", {{"always there"}, ""}});
+  lines.push_back({"simulated",
+                   "a hand of our own making, as strong as the drilling of bone; needs a plan",
+                   {{"always there"}, ""}});
   lines.push_back({"simulated-3.3N", "the same at a desktop device's force", {{"always there"}, ""}});
   for (const Kind& kind : kKinds)
     if (kind.look) lines.push_back({kind.name, kind.what, kind.look(options)});

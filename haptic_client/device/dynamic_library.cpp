@@ -11,7 +11,8 @@ Result<DynamicLibrary> DynamicLibrary::load(const LibraryWanted& wanted) {
   if (!wanted.file.empty()) {
     std::error_code ignored;
     if (!std::filesystem::exists(wanted.file, ignored))
-      return failure(ErrorCode::not_found, "there is no file " + wanted.file.string() + " to load " + wanted.what + " from; correct the path, or " + wanted.remedy);
+      return failure(ErrorCode::not_found, "there is no file " + wanted.file.string() + " to load " + wanted.what +
+                                               " from; correct the path, or " + wanted.remedy);
     // Without a slash the dynamic linker would look elsewhere.
     names.push_back(std::filesystem::absolute(wanted.file).string());
   } else {
@@ -25,7 +26,8 @@ Result<DynamicLibrary> DynamicLibrary::load(const LibraryWanted& wanted) {
     if (library.handle_) return library;
     const char* why = ::dlerror();
     const std::string text = why ? why : "it cannot be loaded";
-    // "NAME: cannot open ..." is said of the library itself; of anything else it says that it is there and lacks something.
+    // "NAME: cannot open ..." is said of the library itself; of anything else it says that it is there and lacks
+    // something.
     const bool absent = text.starts_with(name + ": cannot open shared object file");
     if (!absent && wrong.empty()) wrong = text;
   }

@@ -61,7 +61,10 @@ Result<const Library*> load(const std::filesystem::path& file) {
   need("dhdGetButtonMask", c.button_mask);
   need("dhdErrorGetLast", c.last_error);
   need("dhdErrorGetStr", c.error_text);
-  if (missing) return failure(ErrorCode::unsupported, library->name() + " is not a Force Dimension library of version 3: it has no " + missing + "; " + kRemedy);
+  if (missing)
+    return failure(
+        ErrorCode::unsupported,
+        library->name() + " is not a Force Dimension library of version 3: it has no " + missing + "; " + kRemedy);
   return &(loaded[file] = result);
 }
 
@@ -70,20 +73,31 @@ Result<const Library*> load(const std::filesystem::path& file) {
 std::optional<DeviceLimits> limits_of(int type) {
   DeviceLimits limits;
   switch (type) {
-    case dhd::kDelta3: limits = {.peak_n = 20.0, .stiffness_n_per_mm = 5.0, .workspace_radius_mm = 150.0}; break;
-    case dhd::kDelta6: limits = {.peak_n = 20.0, .stiffness_n_per_mm = 5.0, .workspace_radius_mm = 150.0, .peak_nmm = 200.0}; break;
+    case dhd::kDelta3:
+      limits = {.peak_n = 20.0, .stiffness_n_per_mm = 5.0, .workspace_radius_mm = 150.0};
+      break;
+    case dhd::kDelta6:
+      limits = {.peak_n = 20.0, .stiffness_n_per_mm = 5.0, .workspace_radius_mm = 150.0, .peak_nmm = 200.0};
+      break;
     case dhd::kOmega:
     case dhd::kOmega3:
     case dhd::kOmega6:
     case dhd::kOmega6Left:
     case dhd::kOmega7:
-    case dhd::kOmega7Left: limits = {.peak_n = 12.0, .stiffness_n_per_mm = 5.0, .workspace_radius_mm = 75.0}; break;
+    case dhd::kOmega7Left:
+      limits = {.peak_n = 12.0, .stiffness_n_per_mm = 5.0, .workspace_radius_mm = 75.0};
+      break;
     case dhd::kSigma6:
     case dhd::kSigma6Left:
     case dhd::kSigma7:
-    case dhd::kSigma7Left: limits = {.peak_n = 12.0, .stiffness_n_per_mm = 4.0, .workspace_radius_mm = 90.0, .peak_nmm = 200.0}; break;
-    case dhd::kFalcon: limits = {.peak_n = 8.0, .stiffness_n_per_mm = 3.0, .workspace_radius_mm = 40.0}; break;
-    default: return std::nullopt;
+    case dhd::kSigma7Left:
+      limits = {.peak_n = 12.0, .stiffness_n_per_mm = 4.0, .workspace_radius_mm = 90.0, .peak_nmm = 200.0};
+      break;
+    case dhd::kFalcon:
+      limits = {.peak_n = 8.0, .stiffness_n_per_mm = 3.0, .workspace_radius_mm = 40.0};
+      break;
+    default:
+      return std::nullopt;
   }
   limits.damping_n_s_per_mm = 0.03;
   limits.continuous_n = limits.peak_n / 3.0;
@@ -113,8 +127,12 @@ class ForceDimension final : public HapticDevice {
     const int there = call_->device_count();
     if (options_.number >= there) {
       call_ = nullptr;
-      return failure(ErrorCode::not_found, "there " + std::string(there == 1 ? "is 1 Force Dimension device" : "are " + std::to_string(std::max(0, there)) + " Force Dimension devices") +
-                                               " and number " + std::to_string(options_.number) + " is wanted; check power, cable and its USB permissions");
+      return failure(ErrorCode::not_found, "there " +
+                                               std::string(there == 1 ? "is 1 Force Dimension device"
+                                                                      : "are " + std::to_string(std::max(0, there)) +
+                                                                            " Force Dimension devices") +
+                                               " and number " + std::to_string(options_.number) +
+                                               " is wanted; check power, cable and its USB permissions");
     }
     const int id = call_->open_id(static_cast<char>(options_.number));
     if (id < 0) {
@@ -136,7 +154,9 @@ class ForceDimension final : public HapticDevice {
     const std::optional<DeviceLimits> known = limits_of(type);
     if (!known) {
       close();
-      return failure(ErrorCode::unsupported, "the device \"" + info_.model + "\" is of a kind that is not known here (type " + std::to_string(type) + "); use another device");
+      return failure(ErrorCode::unsupported, "the device \"" + info_.model +
+                                                 "\" is of a kind that is not known here (type " +
+                                                 std::to_string(type) + "); use another device");
     }
     limits_ = *known;
     info_.torque_axes = limits_.peak_nmm > 0.0 && call_->has_active_wrist(id_) ? 3 : 0;
@@ -164,9 +184,13 @@ class ForceDimension final : public HapticDevice {
 
   Result<void> tend() override {
     if (!open_) return failure(ErrorCode::unavailable, "the Force Dimension device is not open");
-    if (lost_) return failure(ErrorCode::unavailable, "the Force Dimension device is lost: " + force_dimension_error(error_, call_->error_text(error_)).message);
+    if (lost_)
+      return failure(ErrorCode::unavailable, "the Force Dimension device is lost: " +
+                                                 force_dimension_error(error_, call_->error_text(error_)).message);
     const bool calibrated = calibrated_;
-    advice_ = calibrated ? "" : "move the device's handle gently to all ends of its range until its light stops blinking, or run the vendor's HapticInit";
+    advice_ = calibrated ? ""
+                         : "move the device's handle gently to all ends of its range until its light stops blinking, "
+                           "or run the vendor's HapticInit";
     // Motors are on once the device knows where it is.
     if (calibrated && !force_on_) force_on_ = call_->enable_force(1, id_) >= 0;
     return {};
@@ -186,10 +210,12 @@ class ForceDimension final : public HapticDevice {
     advice_.clear();
     exchange_.forget_output();
     stop_ = {call_, id_};
-    emergency_.emplace([](void* what) {
-      const auto* stop = static_cast<const Stop*>(what);
-      stop->call->stop(stop->id);
-    }, &stop_);
+    emergency_.emplace(
+        [](void* what) {
+          const auto* stop = static_cast<const Stop*>(what);
+          stop->call->stop(stop->id);
+        },
+        &stop_);
     thread_ = std::thread([this] { cycle_thread(); });
   }
 
@@ -230,10 +256,13 @@ class ForceDimension final : public HapticDevice {
     const Vec3 place(x, y, z);
     bool good = got >= 0 && place.allFinite() && axes.allFinite() && std::abs(axes.determinant() - 1.0) < 0.05;
     if (good) {
-      // The handle's −x is taken for where its tip is, its frame the device's where it points away. (Unverified on a device.)
+      // The handle's −x is taken for where its tip is, its frame the device's where it points away. (Unverified on a
+      // device.)
       Eigen::Matrix3d ours;
-      for (int column = 0; column < 3; ++column) ours.col(column) = from_force_dimension(axes * to_force_dimension(Vec3::Unit(column)));
-      reading.pose_device_tool = {1e3 * from_force_dimension(place), (Eigen::Quaterniond(ours) * pointing_away()).normalized()};
+      for (int column = 0; column < 3; ++column)
+        ours.col(column) = from_force_dimension(axes * to_force_dimension(Vec3::Unit(column)));
+      reading.pose_device_tool = {1e3 * from_force_dimension(place),
+                                  (Eigen::Quaterniond(ours) * pointing_away()).normalized()};
       const unsigned buttons = call_->button_mask(id_);
       reading.buttons = (buttons & 1 ? kSpindlePedal : 0u) | (buttons & 2 ? kClutchButton : 0u);
     }
@@ -286,17 +315,27 @@ Error force_dimension_error(int code, const char* vendors_text) {
   };
   switch (code) {
     case dhd::kCommunication:
-    case dhd::kTimeout: return say(ErrorCode::unavailable, "the device does not answer any more; check its cable and power");
+    case dhd::kTimeout:
+      return say(ErrorCode::unavailable, "the device does not answer any more; check its cable and power");
     case dhd::kBusy:
-    case dhd::kInUse: return say(ErrorCode::unavailable, "another program uses the device; end that program");
-    case dhd::kNoDriver: return say(ErrorCode::unavailable, "the driver is not installed or this user may not use USB devices; install the vendor's udev rule");
-    case dhd::kNoDevice: return say(ErrorCode::unavailable, "no device is connected; check its cable and power");
-    case dhd::kNotReady: return say(ErrorCode::unavailable, "the device is not ready; switch its power on and wait until its light is steady");
-    default: return say(ErrorCode::internal, "the driver reports an error that it should not; report it with this number");
+    case dhd::kInUse:
+      return say(ErrorCode::unavailable, "another program uses the device; end that program");
+    case dhd::kNoDriver:
+      return say(ErrorCode::unavailable,
+                 "the driver is not installed or this user may not use USB devices; install the vendor's udev rule");
+    case dhd::kNoDevice:
+      return say(ErrorCode::unavailable, "no device is connected; check its cable and power");
+    case dhd::kNotReady:
+      return say(ErrorCode::unavailable,
+                 "the device is not ready; switch its power on and wait until its light is steady");
+    default:
+      return say(ErrorCode::internal, "the driver reports an error that it should not; report it with this number");
   }
 }
 
-std::unique_ptr<HapticDevice> make_force_dimension(const ForceDimensionOptions& options) { return std::make_unique<ForceDimension>(options); }
+std::unique_ptr<HapticDevice> make_force_dimension(const ForceDimensionOptions& options) {
+  return std::make_unique<ForceDimension>(options);
+}
 
 DeviceFinding look_for_force_dimension(const ForceDimensionOptions& options) {
   DeviceFinding finding;
@@ -311,7 +350,8 @@ DeviceFinding look_for_force_dimension(const ForceDimensionOptions& options) {
     const int id = call.open_id(static_cast<char>(i));
     if (id < 0) {
       const int code = call.last_error();
-      finding.missing = "number " + std::to_string(i) + ": " + force_dimension_error(code, call.error_text(code)).message;
+      finding.missing =
+          "number " + std::to_string(i) + ": " + force_dimension_error(code, call.error_text(code)).message;
       continue;
     }
     unsigned short serial = 0;

@@ -9,10 +9,12 @@ inline constexpr int kMostStatus = 16;
 // Places in the status.
 inline constexpr int kPower = 0, kConnected = 1, kReset = 3, kErrorStatus = 9;
 // System types.
-inline constexpr int kOmega = 32, kOmega3 = 33, kOmega6 = 34, kOmega7 = 35, kOmega6Left = 36, kOmega7Left = 37, kFalcon = 60,
-                     kDelta3 = 63, kDelta6 = 64, kSigma7 = 104, kSigma7Left = 105, kSigma6 = 106, kSigma6Left = 107;
+inline constexpr int kOmega = 32, kOmega3 = 33, kOmega6 = 34, kOmega7 = 35, kOmega6Left = 36, kOmega7Left = 37,
+                     kFalcon = 60, kDelta3 = 63, kDelta6 = 64, kSigma7 = 104, kSigma7Left = 105, kSigma6 = 106,
+                     kSigma6Left = 107;
 // Errors.
-inline constexpr int kNoError = 0, kCommunication = 2, kBusy = 3, kNoDriver = 4, kNoDevice = 5, kTimeout = 7, kNotReady = 12, kInUse = 20;
+inline constexpr int kNoError = 0, kCommunication = 2, kBusy = 3, kNoDriver = 4, kNoDevice = 5, kTimeout = 7,
+                     kNotReady = 12, kInUse = 20;
 
 struct Api {
   int (*device_count)();

@@ -20,12 +20,13 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr const char* kNames[] = {"libHD.so", "libHD.so.3.4", "libHD.so.3.3", "libHD.so.3.2", "libHD.so.3.0"};
-constexpr const char* kRemedy = "install the vendor's OpenHaptics for Linux and the driver of your device, or name the library with --libhd";
-constexpr int kWarmSamples = 2000;       // [A] after a warning the motors count as warm for two seconds
-constexpr double kHottest = 0.9;         // [A] of the motors' temperature, 1 being too hot
-constexpr int kTemperatureSamples = 100; // between two looks at it
-constexpr int kBadFramesToLose = 50;     // [A] without a good one between them
-constexpr int kMostErrors = 16;          // taken off the library's stack at a time
+constexpr const char* kRemedy =
+    "install the vendor's OpenHaptics for Linux and the driver of your device, or name the library with --libhd";
+constexpr int kWarmSamples = 2000;        // [A] after a warning the motors count as warm for two seconds
+constexpr double kHottest = 0.9;          // [A] of the motors' temperature, 1 being too hot
+constexpr int kTemperatureSamples = 100;  // between two looks at it
+constexpr int kBadFramesToLose = 50;      // [A] without a good one between them
+constexpr int kMostErrors = 16;           // taken off the library's stack at a time
 
 struct Library {
   DynamicLibrary library;
@@ -66,7 +67,8 @@ Result<const Library*> load(const std::filesystem::path& file) {
   need("hdScheduleAsynchronous", c.schedule_asynchronous);
   need("hdUnschedule", c.unschedule);
   if (missing)
-    return failure(ErrorCode::unsupported, library->name() + " is not OpenHaptics' libHD: it has no " + missing + "; " + kRemedy);
+    return failure(ErrorCode::unsupported,
+                   library->name() + " is not OpenHaptics' libHD: it has no " + missing + "; " + kRemedy);
   return &(loaded[file] = result);
 }
 
@@ -101,7 +103,8 @@ class OpenHaptics final : public HapticDevice {
     close();
     const Result<const Library*> library = load(options_.library);
     if (!library) return tl::unexpected(library.error());
-    if (in_use.exchange(true)) return failure(ErrorCode::exists, "a PHANToM is already open in this program; name one only");
+    if (in_use.exchange(true))
+      return failure(ErrorCode::exists, "a PHANToM is already open in this program; name one only");
     owns_ = true;
     call_ = &(*library)->call;
     take_error(*call_);  // of whoever used the library before
@@ -109,8 +112,10 @@ class OpenHaptics final : public HapticDevice {
     if (const unsigned code = take_error(*call_); code != hd::kNoError || device_ == hd::kNoDevice) {
       const Error why = sentence(code == hd::kNoError ? hd::kDeviceFault : code);
       close();
-      return failure(ErrorCode::unavailable, "the PHANToM " + (options_.device.empty() ? std::string("set up as default") : '"' + options_.device + '"') +
-                                                 " cannot be opened: " + why.message);
+      return failure(ErrorCode::unavailable,
+                     "the PHANToM " +
+                         (options_.device.empty() ? std::string("set up as default") : '"' + options_.device + '"') +
+                         " cannot be opened: " + why.message);
     }
     call_->make_current_device(device_);
     if (Result<void> read = read_itself(); !read) {
@@ -151,7 +156,8 @@ class OpenHaptics final : public HapticDevice {
     if (const unsigned code = lost_; code != hd::kNoError) return tl::unexpected(sentence(code));
     silent_ = frames == frames_seen_ ? silent_ + 1 : 0;
     frames_seen_ = frames;
-    if (silent_ >= 3) return failure(ErrorCode::unavailable, "the PHANToM's servo loop has stopped; check its cable and power");
+    if (silent_ >= 3)
+      return failure(ErrorCode::unavailable, "the PHANToM's servo loop has stopped; check its cable and power");
     calibrate();
     return {};
   }
@@ -173,7 +179,8 @@ class OpenHaptics final : public HapticDevice {
     info_.model = text_of(*call_, hd::kModel);
     info_.serial = text_of(*call_, hd::kSerial);
     info_.driver = text_of(*call_, hd::kDriverVersion);
-    info_.torque_axes = 0;  // the few with six motors are driven as if they had three: nothing published tells their torque
+    info_.torque_axes =
+        0;  // the few with six motors are driven as if they had three: nothing published tells their torque
     // Arrays longer than any the library fills, should a device have more motors than we know of.
     std::array<double, 16> value{};
     const auto number = [&](hd::Enum what) {
@@ -199,8 +206,11 @@ class OpenHaptics final : public HapticDevice {
     styles_ = static_cast<hd::Enum>(integers[0]);
     if (const unsigned code = take_error(*call_); code != hd::kNoError) return tl::unexpected(sentence(code));
     const auto sensible = [](double v, double most) { return std::isfinite(v) && v > 0.0 && v <= most; };
-    if (!sensible(limits_.peak_n, 100.0) || !sensible(limits_.stiffness_n_per_mm, 100.0) || !sensible(limits_.workspace_radius_mm, 2000.0))
-      return failure(ErrorCode::unsupported, "the PHANToM \"" + info_.model + "\" does not tell its force, stiffness and workspace; update its driver");
+    if (!sensible(limits_.peak_n, 100.0) || !sensible(limits_.stiffness_n_per_mm, 100.0) ||
+        !sensible(limits_.workspace_radius_mm, 2000.0))
+      return failure(
+          ErrorCode::unsupported,
+          "the PHANToM \"" + info_.model + "\" does not tell its force, stiffness and workspace; update its driver");
     // One that does not say what it can hold is taken at a quarter of its peak. [A]
     if (!sensible(limits_.continuous_n, limits_.peak_n)) limits_.continuous_n = 0.25 * limits_.peak_n;
     return {};
@@ -219,8 +229,10 @@ class OpenHaptics final : public HapticDevice {
     call_->enable(hd::kForceRamping);
     // Before anything can go wrong: motors must not outlive us, and a scheduler that was never stopped leaves some
     // devices in error 0x0303.
-    emergency_.emplace([](void* call) { static_cast<const hd::Api*>(call)->stop_scheduler(); }, const_cast<hd::Api*>(call_));
-    scheduled_ = call_->schedule_asynchronous([](void* self) { return static_cast<OpenHaptics*>(self)->servo(); }, this, hd::kHighestPriority);
+    emergency_.emplace([](void* call) { static_cast<const hd::Api*>(call)->stop_scheduler(); },
+                       const_cast<hd::Api*>(call_));
+    scheduled_ = call_->schedule_asynchronous([](void* self) { return static_cast<OpenHaptics*>(self)->servo(); }, this,
+                                              hd::kHighestPriority);
     running_ = true;
     call_->start_scheduler();
     if (const unsigned code = take_error(*call_); code != hd::kNoError && code != hd::kWarmMotors) {
@@ -236,15 +248,22 @@ class OpenHaptics final : public HapticDevice {
   void calibrate() {
     call_->make_current_device(device_);
     hd::Enum state = call_->check_calibration();
-    if (state == hd::kNeedsUpdate || (state == hd::kNeedsManual && (styles_ & hd::kEncoderReset) && reset_pressed_.exchange(false))) {
-      call_->update_calibration(styles_ & hd::kAutomatic ? hd::kAutomatic : styles_ & hd::kInkwell ? hd::kInkwell : hd::kEncoderReset);
+    if (state == hd::kNeedsUpdate ||
+        (state == hd::kNeedsManual && (styles_ & hd::kEncoderReset) && reset_pressed_.exchange(false))) {
+      call_->update_calibration(styles_ & hd::kAutomatic ? hd::kAutomatic
+                                : styles_ & hd::kInkwell ? hd::kInkwell
+                                                         : hd::kEncoderReset);
       state = call_->check_calibration();
     }
     reset_pressed_ = false;
-    if (state == hd::kCalibrated) advice_.clear();
-    else if (state == hd::kNeedsManual && (styles_ & hd::kInkwell)) advice_ = "put the stylus into its inkwell for a second, then take it out";
-    else if (state == hd::kNeedsManual) advice_ = "hold the PHANToM's arms at right angles, as in its manual, and press the front button";
-    else advice_ = "move the PHANToM's handle slowly until it has found its place";
+    if (state == hd::kCalibrated)
+      advice_.clear();
+    else if (state == hd::kNeedsManual && (styles_ & hd::kInkwell))
+      advice_ = "put the stylus into its inkwell for a second, then take it out";
+    else if (state == hd::kNeedsManual)
+      advice_ = "hold the PHANToM's arms at right angles, as in its manual, and press the front button";
+    else
+      advice_ = "move the PHANToM's handle slowly until it has found its place";
     calibrated_ = state == hd::kCalibrated;
   }
 
@@ -351,25 +370,41 @@ Error openhaptics_error(unsigned code, const char* vendors_text) {
     return Error{kind, what + " (OpenHaptics error " + number + own + ")"};
   };
   switch (code) {
-    case hd::kWarmMotors: return say(ErrorCode::unavailable, "the motors are warm; rest the device for some minutes");
+    case hd::kWarmMotors:
+      return say(ErrorCode::unavailable, "the motors are warm; rest the device for some minutes");
     case hd::kForceExceeded:
     case 0x0202:
     case 0x0203:
-    case hd::kForceErrorsEnd: return say(ErrorCode::unavailable, "the device was asked for more force than it allows; it works on with its continuous force");
-    case hd::kDeviceFault: return say(ErrorCode::unavailable, "no device answers; check its power and cable, and name it as in the vendor's setup program");
-    case hd::kDeviceInUse: return say(ErrorCode::unavailable, "another program uses the device; end that program");
-    case hd::kCommunication: return say(ErrorCode::unavailable, "the device does not answer any more; check its cable and power");
+    case hd::kForceErrorsEnd:
+      return say(ErrorCode::unavailable,
+                 "the device was asked for more force than it allows; it works on with its continuous force");
+    case hd::kDeviceFault:
+      return say(ErrorCode::unavailable,
+                 "no device answers; check its power and cable, and name it as in the vendor's setup program");
+    case hd::kDeviceInUse:
+      return say(ErrorCode::unavailable, "another program uses the device; end that program");
+    case hd::kCommunication:
+      return say(ErrorCode::unavailable, "the device does not answer any more; check its cable and power");
     case hd::kCommunicationSetup:
-      return say(ErrorCode::unavailable, "the device's connection is not set up, as after a program that was killed; unplug it, plug it in and run the vendor's setup program");
-    case hd::kTimer: return say(ErrorCode::unavailable, "the driver's timer failed; end what loads this computer, or restart it");
-    case hd::kBadHandle: return say(ErrorCode::unavailable, "the driver does not know the device any more; open it again");
-    case hd::kSchedulerFull: return say(ErrorCode::unavailable, "the driver's scheduler is full; end other programs that use the device");
-    case hd::kLicence: return say(ErrorCode::unavailable, "OpenHaptics finds no licence; install the vendor's licence file");
-    default: return say(ErrorCode::internal, "the driver reports an error that it should not; report it with this number");
+      return say(ErrorCode::unavailable,
+                 "the device's connection is not set up, as after a program that was killed; unplug it, plug it in and "
+                 "run the vendor's setup program");
+    case hd::kTimer:
+      return say(ErrorCode::unavailable, "the driver's timer failed; end what loads this computer, or restart it");
+    case hd::kBadHandle:
+      return say(ErrorCode::unavailable, "the driver does not know the device any more; open it again");
+    case hd::kSchedulerFull:
+      return say(ErrorCode::unavailable, "the driver's scheduler is full; end other programs that use the device");
+    case hd::kLicence:
+      return say(ErrorCode::unavailable, "OpenHaptics finds no licence; install the vendor's licence file");
+    default:
+      return say(ErrorCode::internal, "the driver reports an error that it should not; report it with this number");
   }
 }
 
-std::unique_ptr<HapticDevice> make_openhaptics(const OpenHapticsOptions& options) { return std::make_unique<OpenHaptics>(options); }
+std::unique_ptr<HapticDevice> make_openhaptics(const OpenHapticsOptions& options) {
+  return std::make_unique<OpenHaptics>(options);
+}
 
 DeviceFinding look_for_openhaptics(const OpenHapticsOptions& options) {
   DeviceFinding finding;
@@ -391,7 +426,8 @@ DeviceFinding look_for_openhaptics(const OpenHapticsOptions& options) {
     finding.missing = openhaptics_error(why, call.get_error_string(why)).message;
   } else {
     call.make_current_device(device);
-    finding.found.push_back(text_of(call, hd::kModel) + ", serial " + text_of(call, hd::kSerial) + ", driver " + text_of(call, hd::kDriverVersion));
+    finding.found.push_back(text_of(call, hd::kModel) + ", serial " + text_of(call, hd::kSerial) + ", driver " +
+                            text_of(call, hd::kDriverVersion));
   }
   if (device != hd::kNoDevice) call.disable_device(device);
   take_error(call);

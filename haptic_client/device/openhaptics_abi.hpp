@@ -24,9 +24,10 @@ inline constexpr CallbackCode kDone = 0, kContinue = 1;
 inline constexpr unsigned short kHighestPriority = 65535;
 
 // To read.
-inline constexpr Enum kButtons = 0x2000, kTransform = 0x2052, kModel = 0x2501, kDriverVersion = 0x2502, kSerial = 0x2504,
-                      kUsableWorkspace = 0x2551, kCalibrationStyle = 0x2555, kMaxStiffness = 0x2602,
-                      kMaxForce = 0x2603, kMaxContinuousForce = 0x2604, kMotorTemperature = 0x2605, kMaxDamping = 0x2609;
+inline constexpr Enum kButtons = 0x2000, kTransform = 0x2052, kModel = 0x2501, kDriverVersion = 0x2502,
+                      kSerial = 0x2504, kUsableWorkspace = 0x2551, kCalibrationStyle = 0x2555, kMaxStiffness = 0x2602,
+                      kMaxForce = 0x2603, kMaxContinuousForce = 0x2604, kMotorTemperature = 0x2605,
+                      kMaxDamping = 0x2609;
 // To write.
 inline constexpr Enum kForce = 0x2700;
 // To enable.

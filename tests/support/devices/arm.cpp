@@ -15,7 +15,8 @@ void* map(const char* file, bool make) noexcept {
   const int descriptor = ::open(file, O_RDWR | O_CLOEXEC | (make ? O_CREAT | O_TRUNC : 0), 0600);
   if (descriptor < 0) return nullptr;
   void* place = nullptr;
-  if (!make || ::ftruncate(descriptor, sizeof(ArmControl)) == 0) place = ::mmap(nullptr, sizeof(ArmControl), PROT_READ | PROT_WRITE, MAP_SHARED, descriptor, 0);
+  if (!make || ::ftruncate(descriptor, sizeof(ArmControl)) == 0)
+    place = ::mmap(nullptr, sizeof(ArmControl), PROT_READ | PROT_WRITE, MAP_SHARED, descriptor, 0);
   ::close(descriptor);
   return place == MAP_FAILED ? nullptr : place;
 }
@@ -46,14 +47,17 @@ void ArmStrings::hand(double x_mm, double y_mm, double z_mm) const noexcept {
   control_->hand_mm[2] = z_mm;
 }
 
-double ArmStrings::force_n() const noexcept { return std::hypot(control_->force_n[0], control_->force_n[1], control_->force_n[2]); }
+double ArmStrings::force_n() const noexcept {
+  return std::hypot(control_->force_n[0], control_->force_n[1], control_->force_n[2]);
+}
 
 ArmControl* find_arm() noexcept {
   const char* file = std::getenv(kArmVariable);
   return file ? static_cast<ArmControl*>(map(file, false)) : nullptr;
 }
 
-void Arm::step(ArmControl& control, const std::array<double, 3>& force_n, const std::array<double, 3>& torque_nmm) noexcept {
+void Arm::step(ArmControl& control, const std::array<double, 3>& force_n,
+               const std::array<double, 3>& torque_nmm) noexcept {
   constexpr double kTime_s = 1e-3;
   const double size = std::hypot(force_n[0], force_n[1], force_n[2]);
   const double share = size > kPeak_n ? kPeak_n / size : 1.0;

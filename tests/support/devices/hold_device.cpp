@@ -1,5 +1,5 @@
-// A program that holds a haptic device with force on it and then ends in the way it is told: for tests of what becomes of
-// the motors. hold_device phantom|force-dimension LIBRARY wait|exit|abort|crash|check
+// A program that holds a haptic device with force on it and then ends in the way it is told: for tests of what becomes
+// of the motors. hold_device phantom|force-dimension LIBRARY wait|exit|abort|crash|check
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -20,8 +20,10 @@ int main(int argc, char** argv) {
   if (argc != 4) return 2;
   const std::string kind = argv[1], end = argv[3];
   std::unique_ptr<HapticDevice> device;
-  if (kind == "phantom") device = make_openhaptics({argv[2], {}});
-  else device = make_force_dimension({.library = argv[2]});
+  if (kind == "phantom")
+    device = make_openhaptics({argv[2], {}});
+  else
+    device = make_force_dimension({.library = argv[2]});
   const StopSignal stop;
   DeviceConnection connection(*device, [](DeviceEvent, std::string_view, const std::string&) {});
   if (const Result<void> started = connection.start(); !started) {

@@ -1,5 +1,5 @@
-// Our stand-in for OpenHaptics' libHD.so, with a simulated arm behind it and the failures that a test asks for. It keeps
-// to what the vendor's library demands of its caller, and counts every breach.
+// Our stand-in for OpenHaptics' libHD.so, with a simulated arm behind it and the failures that a test asks for. It
+// keeps to what the vendor's library demands of its caller, and counts every breach.
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -147,12 +147,16 @@ HDErrorInfo hdGetError() {
   return {code, -1, kHandle};
 }
 
-const char* hdGetErrorString(unsigned code) { return code == 0 ? "no error" : code == 0x0200 ? "stand-in: warm" : "stand-in: error"; }
+const char* hdGetErrorString(unsigned code) {
+  return code == 0 ? "no error" : code == 0x0200 ? "stand-in: warm" : "stand-in: error";
+}
 
 void hdEnable(unsigned what) {
   if (!opened()) return;
-  if (what == 0x4000) world().control->motors_on = 1;
-  else if (what != 0x4001 && what != 0x4002) misuse(0x0100);
+  if (what == 0x4000)
+    world().control->motors_on = 1;
+  else if (what != 0x4001 && what != 0x4002)
+    misuse(0x0100);
 }
 
 void hdDisable(unsigned what) {
@@ -163,10 +167,17 @@ void hdGetIntegerv(unsigned what, int* values) {
   if (!opened()) return;
   ArmControl& c = *world().control;
   switch (what) {
-    case 0x2000: values[0] = c.plugged ? c.buttons.load() : 0; break;
-    case 0x2554: values[0] = c.output_axes; break;
-    case 0x2555: values[0] = c.style; break;
-    default: misuse(0x0100);
+    case 0x2000:
+      values[0] = c.plugged ? c.buttons.load() : 0;
+      break;
+    case 0x2554:
+      values[0] = c.output_axes;
+      break;
+    case 0x2555:
+      values[0] = c.style;
+      break;
+    default:
+      misuse(0x0100);
   }
 }
 
@@ -180,10 +191,22 @@ void hdGetDoublev(unsigned what, double* values) {
       if (!w.in_frame) misuse(0x0102);
       const double q[4] = {c.rotation[0], c.rotation[1], c.rotation[2], c.rotation[3]};
       const double s = 2.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-      const double m[16] = {1 - s * (q[2] * q[2] + q[3] * q[3]), s * (q[1] * q[2] + q[3] * q[0]), s * (q[1] * q[3] - q[2] * q[0]), 0,
-                            s * (q[1] * q[2] - q[3] * q[0]), 1 - s * (q[1] * q[1] + q[3] * q[3]), s * (q[2] * q[3] + q[1] * q[0]), 0,
-                            s * (q[1] * q[3] + q[2] * q[0]), s * (q[2] * q[3] - q[1] * q[0]), 1 - s * (q[1] * q[1] + q[2] * q[2]), 0,
-                            w.arm.position_mm()[0], w.arm.position_mm()[1], w.arm.position_mm()[2], 1};
+      const double m[16] = {1 - s * (q[2] * q[2] + q[3] * q[3]),
+                            s * (q[1] * q[2] + q[3] * q[0]),
+                            s * (q[1] * q[3] - q[2] * q[0]),
+                            0,
+                            s * (q[1] * q[2] - q[3] * q[0]),
+                            1 - s * (q[1] * q[1] + q[3] * q[3]),
+                            s * (q[2] * q[3] + q[1] * q[0]),
+                            0,
+                            s * (q[1] * q[3] + q[2] * q[0]),
+                            s * (q[2] * q[3] - q[1] * q[0]),
+                            1 - s * (q[1] * q[1] + q[2] * q[2]),
+                            0,
+                            w.arm.position_mm()[0],
+                            w.arm.position_mm()[1],
+                            w.arm.position_mm()[2],
+                            1};
       std::copy(m, m + 16, values);
       break;
     }
@@ -192,12 +215,23 @@ void hdGetDoublev(unsigned what, double* values) {
       std::copy(box, box + 6, values);
       break;
     }
-    case 0x2602: limit(Arm::kStiffness_n_per_mm); break;
-    case 0x2603: limit(Arm::kPeak_n); break;
-    case 0x2604: limit(Arm::kContinuous_n); break;
-    case 0x2605: std::fill(values, values + 3, c.temperature.load()); break;
-    case 0x2609: limit(0.002); break;
-    default: misuse(0x0100);
+    case 0x2602:
+      limit(Arm::kStiffness_n_per_mm);
+      break;
+    case 0x2603:
+      limit(Arm::kPeak_n);
+      break;
+    case 0x2604:
+      limit(Arm::kContinuous_n);
+      break;
+    case 0x2605:
+      std::fill(values, values + 3, c.temperature.load());
+      break;
+    case 0x2609:
+      limit(0.002);
+      break;
+    default:
+      misuse(0x0100);
   }
 }
 
@@ -205,18 +239,26 @@ void hdSetDoublev(unsigned what, const double* values) {
   World& w = world();
   if (!opened()) return;
   if (!w.in_frame) misuse(0x0102);
-  if (what == 0x2700) std::copy(values, values + 3, w.force.begin());
-  else if (what == 0x2701) std::copy(values, values + 3, w.torque.begin());
-  else misuse(0x0100);
+  if (what == 0x2700)
+    std::copy(values, values + 3, w.force.begin());
+  else if (what == 0x2701)
+    std::copy(values, values + 3, w.torque.begin());
+  else
+    misuse(0x0100);
 }
 
 const char* hdGetString(unsigned what) {
   if (!opened()) return nullptr;
   switch (what) {
-    case 0x2501: return "Stand-in Arm";
-    case 0x2502: return "1.0";
-    case 0x2504: return "0001";
-    default: misuse(0x0100); return nullptr;
+    case 0x2501:
+      return "Stand-in Arm";
+    case 0x2502:
+      return "1.0";
+    case 0x2504:
+      return "0001";
+    default:
+      misuse(0x0100);
+      return nullptr;
   }
 }
 
@@ -230,7 +272,8 @@ void hdUpdateCalibration(unsigned style) {
   if (!opened()) return;
   ArmControl& c = *w.control;
   if (!(static_cast<unsigned>(c.style.load()) & style)) misuse(0x0101);
-  // An encoder reset takes the handle's place as it is; anything else is possible only when the device has asked for it.
+  // An encoder reset takes the handle's place as it is; anything else is possible only when the device has asked for
+  // it.
   if (c.calibration == 1 || style == 1) c.calibration = 0;
 }
 
@@ -249,8 +292,10 @@ void hdStopScheduler() {
   World& w = world();
   if (!w.running.exchange(false)) return;
   ++w.control->scheduler_stops;
-  if (w.scheduler.get_id() == std::this_thread::get_id()) w.scheduler.detach();
-  else w.scheduler.join();
+  if (w.scheduler.get_id() == std::this_thread::get_id())
+    w.scheduler.detach();
+  else
+    w.scheduler.join();
   for (auto& f : w.control->force_n) f = 0.0;  // the vendor's servo loop ends with the motors off
 }
 

@@ -47,7 +47,8 @@ TEST(DeviceExchange, ASilentDeviceIsNotTrusted) {
   reading.buttons = kSpindlePedal;
   reading.pedal = 0.5;
   exchange.publish(reading);
-  for (int i = 0; i < DeviceExchange::kReadsWithoutSample; ++i) EXPECT_EQ(exchange.read().status, DeviceStatus::ok) << i;
+  for (int i = 0; i < DeviceExchange::kReadsWithoutSample; ++i)
+    EXPECT_EQ(exchange.read().status, DeviceStatus::ok) << i;
   const DeviceReading late = exchange.read();
   EXPECT_EQ(late.status, DeviceStatus::fault);
   EXPECT_EQ(late.spindle(), 0.0);
@@ -159,7 +160,10 @@ Parts put_together() {
   Parts parts;
   auto hand = std::make_unique<Puppet>("hand", DeviceInfo{.model = "H", .serial = {}, .driver = {}, .turns = false});
   auto turn = std::make_unique<Puppet>("turn", DeviceInfo{.model = "T", .serial = {}, .driver = {}, .force_axes = 0});
-  auto foot = std::make_unique<Puppet>("foot", DeviceInfo{.model = "F", .serial = {}, .driver = {}, .places = false, .turns = false, .pedals = true, .force_axes = 0});
+  auto foot = std::make_unique<Puppet>(
+      "foot",
+      DeviceInfo{
+          .model = "F", .serial = {}, .driver = {}, .places = false, .turns = false, .pedals = true, .force_axes = 0});
   parts.hand = hand.get();
   parts.turn = turn.get();
   parts.foot = foot.get();
@@ -242,7 +246,9 @@ TEST(DynamicLibrary, TellsMissingFromWrong) {
   const auto missing = DynamicLibrary::load({"the vendor's thing", {}, kNames, "install it"});
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().code, ErrorCode::not_found);
-  EXPECT_EQ(missing.error().message, "the vendor's thing is not installed (looked for libosteon-nowhere.so.1, libosteon-nowhere.so.2); install it");
+  EXPECT_EQ(
+      missing.error().message,
+      "the vendor's thing is not installed (looked for libosteon-nowhere.so.1, libosteon-nowhere.so.2); install it");
   constexpr const char* kSecond[] = {"libosteon-nowhere.so.1", "libm.so.6"};
   const auto found = DynamicLibrary::load({"the vendor's thing", {}, kSecond, "install it"});
   ASSERT_TRUE(found);

@@ -1,9 +1,10 @@
-// A person's hand at a device, on virtual time: where the tool is taken up, what clutch and pedal do, and what becomes of
-// force and tool while the device is away.
+// A person's hand at a device, on virtual time: where the tool is taken up, what clutch and pedal do, and what becomes
+// of force and tool while the device is away.
 #include "haptic_client/control/free_hand.hpp"
 
 #include <gtest/gtest.h>
 
+#include "common/core/check.hpp"
 #include "haptic_client/control/patch_builder.hpp"
 #include "tests/support/allocation_counter.hpp"
 #include "tests/unit/haptic_client/bench.hpp"
@@ -27,15 +28,16 @@ class Handle final : public HapticDevice {
 class FreeHand : public ::testing::Test {
  protected:
   // From the top of the block, which is entered along +z: the user looks that way.
-  void begin(const char* tool = "drill-3.2", const char* view = "bottom") {
-    FreeHandOptions options{.tool = tool, .toward = *read_view(view), .at_mm = Vec3(1, 2, 0)};
+  void begin(const char* tool = "drill-3.2", const char* view = "bottom", const Vec3& at_mm = {1, 2, 0}) {
+    FreeHandOptions options{.tool = tool, .toward = *read_view(view), .at_mm = at_mm};
     Result<ReadyPlan> plan = make_free_hand(options, bone_);
-    ASSERT_TRUE(plan) << plan.error().message;
+    OSTEON_CHECK(plan.has_value());
     handle_.reading.pose_device_tool = {{5, 6, 7}, pointing_away()};
     session_ = std::make_unique<FreeHandSession>(std::move(*plan), handle_, 0.0);
   }
   SessionTick tick() {
-    if (session_->loop().mapping().scale() > 0.0 && taken_) builder_.build(field_, session_->loop().tool(0), last_.report.pose_bone_proxy, patch_);
+    if (session_->loop().mapping().scale() > 0.0 && taken_)
+      builder_.build(field_, session_->loop().tool(0), last_.report.pose_bone_proxy, patch_);
     last_ = session_->tick(patch_, true);
     taken_ |= last_.order.take_up;
     return last_;
@@ -77,7 +79,7 @@ TEST_F(FreeHand, TheToolIsTakenUpOverItsPlaceWhereverTheHandleIs) {
 }
 
 TEST_F(FreeHand, TheHeadIsUpOnTheUsersScreen) {
-  begin("drill-3.2", "front");
+  begin("drill-3.2", "front", {1, 2, 15});
   tick();
   Vec3 before = tip();
   move_by({0, 3, 0}, 30);  // up
@@ -192,8 +194,24 @@ TEST(FreeHandView, IsNamedOrGiven) {
   EXPECT_EQ(*read_view("top"), Vec3(0, 0, -1));
   EXPECT_EQ(*read_view("0,0,-2"), Vec3(0, 0, -1));
   EXPECT_EQ(*read_point("1.5,-2,3e1", "--at"), Vec3(1.5, -2, 30));
-  for (const char* wrong : {"", "above", "1,2", "1,2,3,4", "0,0,0", "1,,2", "1,2,x", "nan,0,1"}) EXPECT_FALSE(read_view(wrong)) << wrong;
+  for (const char* wrong : {"", "above", "1,2", "1,2,3,4", "0,0,0", "1,,2", "1,2,x", "nan,0,1"})
+    EXPECT_FALSE(read_view(wrong)) << wrong;
   EXPECT_NE(read_point("1;2;3", "--at").error().message.find("--at"), std::string::npos);
+}
+
+// Without a place of its own the tool is taken up over the side from which the user looks.
+TEST_F(FreeHand, LooksAtTheBonesMiddle) {
+  FreeHandOptions options;
+  options.tool = "drill-3.2";
+  const std::pair<const char*, Vec3> views[] = {{"top", {0, 0, 30}},  {"bottom", {0, 0, 0}}, {"front", {0, -6, 15}},
+                                                {"back", {0, 6, 15}}, {"left", {6, 0, 15}},  {"right", {-6, 0, 15}}};
+  for (const auto& [view, entry] : views) {
+    options.toward = *read_view(view);
+    const Result<ReadyPlan> plan = make_free_hand(options, bone_);
+    ASSERT_TRUE(plan) << plan.error().message;
+    EXPECT_NEAR((plan->steps[0].site.entry_mm - entry).norm(), 0.0, 0.3) << view;
+    EXPECT_EQ(plan->steps[0].site.axis, options.toward);
+  }
 }
 
 TEST(FreeHandTool, IsNamedWhereItIsNotKnown) {
