@@ -84,7 +84,8 @@ bool make_texts(hid_t file, const char* path, const std::vector<std::string>& te
   std::size_t longest = 1;
   for (const std::string& text : texts) longest = std::max(longest, text.size());
   std::vector<char> flat(longest * texts.size(), '\0');
-  for (std::size_t i = 0; i < texts.size(); ++i) std::copy(texts[i].begin(), texts[i].end(), flat.begin() + static_cast<std::ptrdiff_t>(i * longest));
+  for (std::size_t i = 0; i < texts.size(); ++i)
+    std::copy(texts[i].begin(), texts[i].end(), flat.begin() + static_cast<std::ptrdiff_t>(i * longest));
   const hsize_t count = texts.size();
   const Hdf5Handle type = text_type(longest), space(H5Screate_simple(1, &count, nullptr), H5Sclose);
   const Hdf5Handle dataset = make_dataset(file, path, type.id(), space.id(), H5P_DEFAULT);
@@ -97,12 +98,30 @@ struct Names {
 
 template <class T>
 hid_t native();
-template <> hid_t native<float>() { return H5T_NATIVE_FLOAT; }
-template <> hid_t native<double>() { return H5T_NATIVE_DOUBLE; }
-template <> hid_t native<std::int64_t>() { return H5T_NATIVE_INT64; }
-template <> hid_t native<std::uint64_t>() { return H5T_NATIVE_UINT64; }
-template <> hid_t native<std::uint32_t>() { return H5T_NATIVE_UINT32; }
-template <> hid_t native<std::uint8_t>() { return H5T_NATIVE_UINT8; }
+template <>
+hid_t native<float>() {
+  return H5T_NATIVE_FLOAT;
+}
+template <>
+hid_t native<double>() {
+  return H5T_NATIVE_DOUBLE;
+}
+template <>
+hid_t native<std::int64_t>() {
+  return H5T_NATIVE_INT64;
+}
+template <>
+hid_t native<std::uint64_t>() {
+  return H5T_NATIVE_UINT64;
+}
+template <>
+hid_t native<std::uint32_t>() {
+  return H5T_NATIVE_UINT32;
+}
+template <>
+hid_t native<std::uint8_t>() {
+  return H5T_NATIVE_UINT8;
+}
 
 // An array that grows by rows, and the rows of it that are not written yet.
 template <class Row>
@@ -111,11 +130,11 @@ struct Column {
   std::function<void(const Row&, std::vector<std::byte>&)> take;
   int width = 1;
   std::size_t value_bytes = 0;
-  Hdf5Handle type;          // of a value; native integers and floats are not owned
+  Hdf5Handle type;  // of a value; native integers and floats are not owned
   hid_t type_id = -1;
   Hdf5Handle dataset;
   std::vector<std::byte> waiting;
-  hsize_t rows = 0;         // written
+  hsize_t rows = 0;  // written
 };
 
 template <class T>
@@ -179,7 +198,8 @@ bool make_column(hid_t file, Column<Row>& made, hsize_t chunk_rows) {
   const hsize_t now[] = {0, width}, most[] = {H5S_UNLIMITED, width}, chunk[] = {chunk_rows, width};
   const Hdf5Handle space(H5Screate_simple(rank, now, most), H5Sclose), creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
   // Compressed as its neighbours' recordings are; poses hardly change from one row to the next.
-  if (H5Pset_chunk(creation.id(), rank, chunk) < 0 || H5Pset_shuffle(creation.id()) < 0 || H5Pset_deflate(creation.id(), 1) < 0) return false;
+  if (H5Pset_chunk(creation.id(), rank, chunk) < 0 || H5Pset_shuffle(creation.id()) < 0 || H5Pset_deflate(creation.id(), 1) < 0)
+    return false;
   made.dataset = make_dataset(file, made.path, made.type_id, space.id(), creation.id());
   if (!made.dataset.ok()) return false;
   const hid_t id = made.dataset.id();
@@ -227,7 +247,7 @@ struct RecordFile::Impl {
   Hdf5Handle hash, room_seq, rows_dropped, finished;
   std::vector<Column<TickRow>> columns;  // the last is the time
   std::vector<Column<TakeUp>> take_ups;
-  std::vector<std::string> laws;         // each once
+  std::vector<std::string> laws;  // each once
   std::vector<std::uint8_t> law_of_tool;
   std::size_t waiting = 0;
   std::uint64_t rows = 0, seen = 0;
@@ -256,9 +276,10 @@ struct RecordFile::Impl {
 tl::unexpected<Error> RecordFile::Impl::failed(const char* what) {
   const int why = errno;
   abandoned = true;
-  const std::string reason = why == ENOSPC || why == EDQUOT || why == EFBIG ? "the disk is full (" + std::string(std::strerror(why)) + ")"
-                             : why != 0                                     ? std::string(std::strerror(why))
-                                                                            : "HDF5 gives no reason";
+  const std::string reason = why == ENOSPC || why == EDQUOT || why == EFBIG
+                                 ? "the disk is full (" + std::string(std::strerror(why)) + ")"
+                             : why != 0 ? std::string(std::strerror(why))
+                                        : "HDF5 gives no reason";
   return failure(ErrorCode::internal, "the recording " + path.string() + " cannot be " + what + ": " + reason);
 }
 
@@ -270,7 +291,8 @@ void RecordFile::Impl::make_columns() {
                         [](const R& r) { return numbers(r.reading.pose_device_tool); }));
   add(column<double, R>("high_frequency_poses/device_pose/pose", "mm, mm, mm, 1, 1, 1, 1", kBone, "the tool as the hand holds it",
                         [](const R& r) { return numbers(r.report.pose_bone_device); }));
-  add(column<double, R>("high_frequency_poses/drill_pose/pose", "mm, mm, mm, 1, 1, 1, 1", kBone, "the tool as the bone lets it be: the proxy",
+  add(column<double, R>("high_frequency_poses/drill_pose/pose", "mm, mm, mm, 1, 1, 1, 1", kBone,
+                        "the tool as the bone lets it be: the proxy",
                         [](const R& r) { return numbers(r.report.pose_bone_proxy); }));
   add(column<float, R>("drill_force_feedback/wrench", "N, N, N, N.mm, N.mm, N.mm", kDevice, "shown by the device to the hand",
                        [](const R& r) { return wrench(r.rendered.force_n, r.rendered.torque_nmm); }));
@@ -280,40 +302,56 @@ void RecordFile::Impl::make_columns() {
                        [](const R& r) { return wrench(r.report.force_physical_n, r.report.torque_physical_nmm); }));
   add(column<float, R>("drill_force_physical/cutting_force", "N, N, N", kBone, "of the tool on the bone, by the law alone",
                        [](const R& r) { return numbers(r.report.cutting_force_n); }));
-  add(column<std::int64_t, R>("data/mono_ns", "ns", "", "the machine's monotonic clock, as in every log of the session", [](const R& r) { return r.mono_ns; }));
-  add(column<std::uint64_t, R>(recording::kTick, "1", "", "number of the tick and of its cutting state", [](const R& r) { return r.report.state_seq; }));
+  add(column<std::int64_t, R>("data/mono_ns", "ns", "", "the machine's monotonic clock, as in every log of the session",
+                              [](const R& r) { return r.mono_ns; }));
+  add(column<std::uint64_t, R>(recording::kTick, "1", "", "number of the tick and of its cutting state",
+                               [](const R& r) { return r.report.state_seq; }));
   add(column<float, R>("data/spindle_rpm", "1/min", "", "speed of the spindle", [](const R& r) { return r.report.spindle_rpm; }));
-  add(column<double, R>("data/commanded_rpm", "1/min", "", "speed that the pedal asks for", [](const R& r) { return r.commanded_rpm; }));
-  add(column<float, R>("data/feed", "mm/s", "", "into bone, along the direction of cutting", [](const R& r) { return r.report.feed_mm_per_s; }));
-  add(column<float, R>("data/density", "g/cm3", "", "of the bone being cut, weighted by engaged area", [](const R& r) { return r.report.density_g_cm3; }));
-  add(column<float, R>("data/engaged", "1", "", "share of the leading area that is in bone", [](const R& r) { return r.report.engaged; }));
-  add(column<float, R>("data/torque", "N.mm", "", "that the bone takes from the spindle", [](const R& r) { return r.report.torque_nmm; }));
-  add(column<float, R>("data/cutting_work", "mJ", "", "of the law's force over the way cut in the tick", [](const R& r) { return r.report.cutting_work_mj; }));
+  add(column<double, R>("data/commanded_rpm", "1/min", "", "speed that the pedal asks for",
+                        [](const R& r) { return r.commanded_rpm; }));
+  add(column<float, R>("data/feed", "mm/s", "", "into bone, along the direction of cutting",
+                       [](const R& r) { return r.report.feed_mm_per_s; }));
+  add(column<float, R>("data/density", "g/cm3", "", "of the bone being cut, weighted by engaged area",
+                       [](const R& r) { return r.report.density_g_cm3; }));
+  add(column<float, R>("data/engaged", "1", "", "share of the leading area that is in bone",
+                       [](const R& r) { return r.report.engaged; }));
+  add(column<float, R>("data/torque", "N.mm", "", "that the bone takes from the spindle",
+                       [](const R& r) { return r.report.torque_nmm; }));
+  add(column<float, R>("data/cutting_work", "mJ", "", "of the law's force over the way cut in the tick",
+                       [](const R& r) { return r.report.cutting_work_mj; }));
   add(column<float, R>("data/coupling_energy", "mJ", "", "given out by the coupling in this contact, less what the hand put in",
                        [](const R& r) { return r.report.energy.episode_mj; }));
-  add(column<float, R>("data/offset", "mm, mm, mm", kBone, "of the hand's place: slack and what returned bone would have stretched",
+  add(column<float, R>("data/offset", "mm, mm, mm", kBone,
+                       "of the hand's place: slack and what returned bone would have stretched",
                        [](const R& r) { return numbers(r.report.offset_mm); }));
-  add(column<float, R>("data/depth", "mm", "", "of the tip below the entry of the step under way", [](const R& r) { return r.depth_mm; }));
+  add(column<float, R>("data/depth", "mm", "", "of the tip below the entry of the step under way",
+                       [](const R& r) { return r.depth_mm; }));
   add(column<float, R>("data/device_depth", "mm", "", "the same of the hand", [](const R& r) { return r.device_depth_mm; }));
   add(column<float, R>("data/force_scale", "1", "", "s: rendered over physical force", [s](const R&) { return s; }));
   add(column<float, R>("data/guide_play", "mm", "", "while guided: how far the tip may be off the opening's middle",
                        [](const R& r) { return r.report.guide_play_mm; }));
-  add(enumeration<R>("data/state", "what the tool does to the bone",
-                     {{{"idle", 1}, {"free", 2}, {"cutting", 3}, {"rubbing", 4}}}, [](const R& r) { return static_cast<int>(r.report.phase); }));
+  add(enumeration<R>("data/state", "what the tool does to the bone", {{{"idle", 1}, {"free", 2}, {"cutting", 3}, {"rubbing", 4}}},
+                     [](const R& r) { return static_cast<int>(r.report.phase); }));
   Names phases;
-  for (int i = 0; i <= static_cast<int>(SurgeonPhase::free_hand); ++i) phases.values.emplace_back(name(static_cast<SurgeonPhase>(i)), i);
-  add(enumeration<R>("data/phase", "what the step under way is at", phases, [](const R& r) { return static_cast<int>(r.phase); }));
+  for (int i = 0; i <= static_cast<int>(SurgeonPhase::free_hand); ++i)
+    phases.values.emplace_back(name(static_cast<SurgeonPhase>(i)), i);
+  add(enumeration<R>("data/phase", "what the step under way is at", phases,
+                     [](const R& r) { return static_cast<int>(r.phase); }));
   add(column<std::uint32_t, R>("data/step", "1", "", "of the plan, from 0", [](const R& r) { return r.step; }));
-  add(column<std::uint8_t, R>("data/tool", "1", "", "in hand: its place in metadata/tools", [](const R& r) { return r.report.tool; }));
+  add(column<std::uint8_t, R>("data/tool", "1", "", "in hand: its place in metadata/tools",
+                              [](const R& r) { return r.report.tool; }));
   add(column<std::uint8_t, R>("data/law", "1", "", "by which it cuts: its place in metadata/laws", [this](const R& r) {
     const auto tool = static_cast<std::size_t>(r.report.tool);
     return tool < law_of_tool.size() ? law_of_tool[tool] : std::uint8_t{0};
   }));
   add(column<std::uint32_t, R>("data/events", "1", "", "bits: what the loop met in the tick, named in metadata/event_bits",
                                [](const R& r) { return r.report.events; }));
-  add(column<std::uint32_t, R>(recording::kButtons, "1", "", "bits: 1 clutch, 2 spindle", [](const R& r) { return r.reading.buttons; }));
-  add(column<double, R>(recording::kPedal, "1", "", "of a proportional pedal, 0 to 1", [](const R& r) { return r.reading.pedal; }));
-  add(enumeration<R>(recording::kDeviceStatus, "whether the device works", {{{"ok", 0}, {"warm", 1}, {"fault", 2}, {"absent", 3}}},
+  add(column<std::uint32_t, R>(recording::kButtons, "1", "", "bits: 1 clutch, 2 spindle",
+                               [](const R& r) { return r.reading.buttons; }));
+  add(column<double, R>(recording::kPedal, "1", "", "of a proportional pedal, 0 to 1",
+                        [](const R& r) { return r.reading.pedal; }));
+  add(enumeration<R>(recording::kDeviceStatus, "whether the device works",
+                     {{{"ok", 0}, {"warm", 1}, {"fault", 2}, {"absent", 3}}},
                      [](const R& r) { return static_cast<int>(r.reading.status); }));
   add(enumeration<R>(recording::kCalibration, "whether the device knows where its handle is", {{{"done", 0}, {"pending", 1}}},
                      [](const R& r) { return static_cast<int>(r.reading.calibration); }));
@@ -322,18 +360,25 @@ void RecordFile::Impl::make_columns() {
 
   using T = TakeUp;
   const auto change = [this](auto&& made) { take_ups.push_back(std::forward<decltype(made)>(made)); };
-  change(column<std::uint64_t, T>("burr_change/row", "1", "", "row of data from which on the tool is in hand", [](const T& t) { return t.row; }));
-  change(column<std::uint8_t, T>("burr_change/tool", "1", "", "its place in metadata/tools", [](const T& t) { return t.tick.report.tool; }));
-  change(column<double, T>("burr_change/burr_size", "mm", "", "diameter of its cutting part", [](const T& t) { return t.diameter_mm; }));
+  change(column<std::uint64_t, T>("burr_change/row", "1", "", "row of data from which on the tool is in hand",
+                                  [](const T& t) { return t.row; }));
+  change(column<std::uint8_t, T>("burr_change/tool", "1", "", "its place in metadata/tools",
+                                 [](const T& t) { return t.tick.report.tool; }));
+  change(column<double, T>("burr_change/burr_size", "mm", "", "diameter of its cutting part",
+                           [](const T& t) { return t.diameter_mm; }));
   change(column<double, T>("burr_change/pose", "mm, mm, mm, 1, 1, 1, 1", kBone, "where it was taken up",
                            [](const T& t) { return numbers(t.tick.taken_up_at); }));
-  change(column<double, T>("burr_change/view", "1, 1, 1, 1", "bone from device", "rotation of the workspace: qx, qy, qz, qw", [](const T& t) {
-    const Eigen::Quaterniond& q = t.tick.mapping.view();
-    return std::array{q.x(), q.y(), q.z(), q.w()};
-  }));
-  change(column<double, T>("burr_change/scale", "1", "", "mm of the tool for each mm of the handle", [](const T& t) { return t.tick.mapping.scale(); }));
-  change(column<double, T>("burr_change/anchor_device", "mm, mm, mm", kDevice, "this place of the handle", [](const T& t) { return numbers(t.tick.mapping.device_mm()); }));
-  change(column<double, T>("burr_change/anchor_bone", "mm, mm, mm", kBone, "is that place of the tip", [](const T& t) { return numbers(t.tick.mapping.bone_mm()); }));
+  change(column<double, T>("burr_change/view", "1, 1, 1, 1", "bone from device", "rotation of the workspace: qx, qy, qz, qw",
+                           [](const T& t) {
+                             const Eigen::Quaterniond& q = t.tick.mapping.view();
+                             return std::array{q.x(), q.y(), q.z(), q.w()};
+                           }));
+  change(column<double, T>("burr_change/scale", "1", "", "mm of the tool for each mm of the handle",
+                           [](const T& t) { return t.tick.mapping.scale(); }));
+  change(column<double, T>("burr_change/anchor_device", "mm, mm, mm", kDevice, "this place of the handle",
+                           [](const T& t) { return numbers(t.tick.mapping.device_mm()); }));
+  change(column<double, T>("burr_change/anchor_bone", "mm, mm, mm", kBone, "is that place of the tip",
+                           [](const T& t) { return numbers(t.tick.mapping.bone_mm()); }));
   change(column<double, T>("burr_change/time_stamp", "s", "UTC, since 1970-01-01", "when", [](const T& t) { return t.time_s; }));
 }
 
@@ -342,13 +387,21 @@ bool RecordFile::Impl::make_metadata() {
   if (!group.ok()) return false;
   const hid_t g = group.id();
   const DeviceLimits& d = info.limits;
-  const std::pair<const char*, double> numbers_of_device[] = {
-      {recording::kPeak, d.peak_n}, {recording::kContinuous, d.continuous_n}, {recording::kStiffness, d.stiffness_n_per_mm},
-      {recording::kWorkspace, d.workspace_radius_mm}, {recording::kDamping, d.damping_n_s_per_mm}, {recording::kPeakTorque, d.peak_nmm},
-      {recording::kContinuousTorque, d.continuous_nmm}, {recording::kMiddleX, d.workspace_middle_mm.x()},
-      {recording::kMiddleY, d.workspace_middle_mm.y()}, {recording::kMiddleZ, d.workspace_middle_mm.z()},
-      {recording::kForceAxes, info.device_info.force_axes}, {recording::kTorqueAxes, info.device_info.torque_axes},
-      {recording::kForceScale, info.loop.force_scale}, {"tick_s", info.loop.dt_s}, {"pitch_mm", info.pitch_mm}};
+  const std::pair<const char*, double> numbers_of_device[] = {{recording::kPeak, d.peak_n},
+                                                              {recording::kContinuous, d.continuous_n},
+                                                              {recording::kStiffness, d.stiffness_n_per_mm},
+                                                              {recording::kWorkspace, d.workspace_radius_mm},
+                                                              {recording::kDamping, d.damping_n_s_per_mm},
+                                                              {recording::kPeakTorque, d.peak_nmm},
+                                                              {recording::kContinuousTorque, d.continuous_nmm},
+                                                              {recording::kMiddleX, d.workspace_middle_mm.x()},
+                                                              {recording::kMiddleY, d.workspace_middle_mm.y()},
+                                                              {recording::kMiddleZ, d.workspace_middle_mm.z()},
+                                                              {recording::kForceAxes, info.device_info.force_axes},
+                                                              {recording::kTorqueAxes, info.device_info.torque_axes},
+                                                              {recording::kForceScale, info.loop.force_scale},
+                                                              {"tick_s", info.loop.dt_s},
+                                                              {"pitch_mm", info.pitch_mm}};
   bool ok = set_text(g, recording::kDevice, info.device) && set_text(g, recording::kModel, info.device_info.model) &&
             set_text(g, recording::kCaseHash, info.case_hash) && set_text(g, "case_title", info.case_title) &&
             set_integer(g, "author", static_cast<std::int64_t>(info.author));
@@ -364,8 +417,9 @@ bool RecordFile::Impl::make_metadata() {
   const Hdf5Handle voxel = make_value(file.id(), "metadata/voxel_volume", H5T_NATIVE_DOUBLE, &voxel_mm3);
   const Hdf5Handle readme_type = text_type(std::strlen(kReadme));
   const Hdf5Handle readme = make_value(file.id(), "metadata/README", readme_type.id(), kReadme);
-  ok = ok && voxel.ok() && readme.ok() && set_text(voxel.id(), "units", "mm3") && make_texts(file.id(), "metadata/tools", tools) &&
-       make_texts(file.id(), "metadata/laws", laws) && make_texts(file.id(), "metadata/event_bits", event_names());
+  ok = ok && voxel.ok() && readme.ok() && set_text(voxel.id(), "units", "mm3") &&
+       make_texts(file.id(), "metadata/tools", tools) && make_texts(file.id(), "metadata/laws", laws) &&
+       make_texts(file.id(), "metadata/event_bits", event_names());
   // What only the end can say: there from the start, because nothing new may appear while others read.
   const std::string nothing(64, '\0');
   const std::uint64_t zero = 0;
@@ -381,10 +435,13 @@ bool RecordFile::Impl::make_metadata() {
 
 // The same array under the names that each group of the layout knows it by.
 bool RecordFile::Impl::make_links() {
-  for (const char* group : {"high_frequency_poses/handle_pose", "high_frequency_poses/device_pose", "high_frequency_poses/drill_pose",
-                            "drill_force_feedback", "drill_force_physical"})
-    if (H5Lcreate_hard(file.id(), recording::kTime, file.id(), (std::string(group) + "/time_stamp").c_str(), H5P_DEFAULT, H5P_DEFAULT) < 0) return false;
-  return H5Lcreate_hard(file.id(), "high_frequency_poses/drill_pose/pose", file.id(), "data/pose_drill", H5P_DEFAULT, H5P_DEFAULT) >= 0;
+  for (const char* group : {"high_frequency_poses/handle_pose", "high_frequency_poses/device_pose",
+                            "high_frequency_poses/drill_pose", "drill_force_feedback", "drill_force_physical"})
+    if (H5Lcreate_hard(file.id(), recording::kTime, file.id(), (std::string(group) + "/time_stamp").c_str(), H5P_DEFAULT,
+                       H5P_DEFAULT) < 0)
+      return false;
+  return H5Lcreate_hard(file.id(), "high_frequency_poses/drill_pose/pose", file.id(), "data/pose_drill", H5P_DEFAULT,
+                        H5P_DEFAULT) >= 0;
 }
 
 Result<void> RecordFile::Impl::create() {
@@ -398,8 +455,10 @@ Result<void> RecordFile::Impl::create() {
   if (!file.ok()) return failed("made");
   const auto wall = std::chrono::system_clock::now().time_since_epoch();
   const auto mono = std::chrono::steady_clock::now().time_since_epoch();
-  epoch_minus_mono_s = 1e-9 * static_cast<double>(std::chrono::nanoseconds(wall).count() - std::chrono::nanoseconds(mono).count());
-  if (!set_text(file.id(), recording::kFormatName, recording::kFormat) || !set_integer(file.id(), recording::kVersionName, recording::kVersion) ||
+  epoch_minus_mono_s =
+      1e-9 * static_cast<double>(std::chrono::nanoseconds(wall).count() - std::chrono::nanoseconds(mono).count());
+  if (!set_text(file.id(), recording::kFormatName, recording::kFormat) ||
+      !set_integer(file.id(), recording::kVersionName, recording::kVersion) ||
       !set_text(file.id(), "began", utc(std::chrono::duration_cast<std::chrono::seconds>(wall).count())) || !make_metadata())
     return failed("made");
   make_columns();
@@ -429,7 +488,8 @@ RecordFile::RecordFile(RecordFile&&) noexcept = default;
 RecordFile& RecordFile::operator=(RecordFile&&) noexcept = default;
 std::uint64_t RecordFile::rows_written() const { return impl_->rows; }
 
-Result<RecordFile> RecordFile::create(const std::filesystem::path& file, const RecordingInfo& info, std::uint64_t keep_free_bytes) {
+Result<RecordFile> RecordFile::create(const std::filesystem::path& file, const RecordingInfo& info,
+                                      std::uint64_t keep_free_bytes) {
   auto impl = std::make_unique<Impl>();
   impl->path = file;
   impl->info = info;
@@ -452,7 +512,8 @@ Result<void> RecordFile::append(std::span<const TickRow> rows) {
     if (++impl.waiting < kChunkRows) continue;
     // Stopped in time, the file can still be closed as it should be, and others have a little left.
     struct statvfs disk {};
-    if (statvfs(impl.path.c_str(), &disk) == 0 && static_cast<std::uint64_t>(disk.f_bavail) * disk.f_frsize < impl.keep_free_bytes)
+    if (statvfs(impl.path.c_str(), &disk) == 0 &&
+        static_cast<std::uint64_t>(disk.f_bavail) * disk.f_frsize < impl.keep_free_bytes)
       return failure(ErrorCode::internal, "the recording " + impl.path.string() + " ends here: the disk is all but full");
     if (!impl.write_all()) return impl.failed("continued");
   }

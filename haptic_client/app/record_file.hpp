@@ -15,31 +15,31 @@ namespace osteon::haptic {
 
 // What stays the same for a whole session.
 struct RecordingInfo {
-  std::string device;               // as --device named it
+  std::string device;  // as --device named it
   DeviceInfo device_info;
   DeviceLimits limits;
   LoopParams loop;
   std::string case_hash, case_title;
-  double pitch_mm = 0;              // h of the case
+  double pitch_mm = 0;  // h of the case
   std::uint64_t author = 0;
   struct Item {
     std::string name;
-    std::string law;                // by which it cuts
+    std::string law;  // by which it cuts
     double diameter_mm = 0;
   };
-  std::vector<Item> tools;          // by their place in the session
+  std::vector<Item> tools;  // by their place in the session
 };
 
 // Known when the session ends.
 struct RecordingEnd {
-  std::string field_hash;           // of the whole bone
+  std::string field_hash;  // of the whole bone
   std::uint64_t room_seq = 0;
   std::uint64_t rows_dropped = 0;
 };
 
 class RecordFile {
  public:
-  static constexpr std::size_t kChunkRows = 500;  // rows are written so many at a time; a killed writer loses fewer
+  static constexpr std::size_t kChunkRows = 500;               // rows are written so many at a time; a killed writer loses fewer
   static constexpr std::uint64_t kKeepFree_bytes = 16u << 20;  // of the disk; a recording ends before it fills the last of it
 
   // Begins a recording; what was in the file is gone. Error internal: it cannot be made, and why.

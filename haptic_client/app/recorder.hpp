@@ -42,7 +42,7 @@ class Recorder {
   std::thread thread_;
   Outcome outcome_;
 
-  std::mutex mutex_;                // guards the rest
+  std::mutex mutex_;  // guards the rest
   std::condition_variable wake_;
   std::vector<TickRow> waiting_;
   std::uint64_t dropped_ = 0;

@@ -19,12 +19,15 @@ class Reader {
   bool open() {
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
     std::error_code none;
-    if (!std::filesystem::is_regular_file(path_, none)) return wrong(ErrorCode::not_found, "there is no file " + path_.string() + "; give one that --record wrote");
-    if (H5Fis_hdf5(path_.c_str()) <= 0) return wrong(ErrorCode::invalid_input, path_.string() + " is not an HDF5 file; give one that --record wrote");
+    if (!std::filesystem::is_regular_file(path_, none))
+      return wrong(ErrorCode::not_found, "there is no file " + path_.string() + "; give one that --record wrote");
+    if (H5Fis_hdf5(path_.c_str()) <= 0)
+      return wrong(ErrorCode::invalid_input, path_.string() + " is not an HDF5 file; give one that --record wrote");
     // One that is being written, or whose writer was killed, opens only so; one of another program perhaps only otherwise.
     file_ = Hdf5Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY | H5F_ACC_SWMR_READ, H5P_DEFAULT), H5Fclose);
     if (!file_.ok()) file_ = Hdf5Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
-    if (!file_.ok()) return wrong(ErrorCode::invalid_input, name_ + " cannot be opened: it is damaged, or another program has it open");
+    if (!file_.ok())
+      return wrong(ErrorCode::invalid_input, name_ + " cannot be opened: it is damaged, or another program has it open");
     return true;
   }
 
@@ -73,7 +76,8 @@ class Reader {
     hsize_t size[2] = {0, 1};
     const int rank = H5Sget_simple_extent_ndims(space.id());
     if (rank < 1 || rank > 2 || H5Sget_simple_extent_dims(space.id(), size, nullptr) != rank || size[1] != width) {
-      wrong(ErrorCode::invalid_input, name_ + ": the dataset \"" + path + "\" has not " + std::to_string(width) + " values in a row");
+      wrong(ErrorCode::invalid_input,
+            name_ + ": the dataset \"" + path + "\" has not " + std::to_string(width) + " values in a row");
       return {};
     }
     if (size[0] < rows) {
@@ -96,7 +100,9 @@ class Reader {
     if (!error_) error_ = Error{code, sentence};
     return false;
   }
-  bool damaged(const char* what) { return wrong(ErrorCode::invalid_input, name_ + ": \"" + what + "\" cannot be read; the file is damaged"); }
+  bool damaged(const char* what) {
+    return wrong(ErrorCode::invalid_input, name_ + ": \"" + what + "\" cannot be read; the file is damaged");
+  }
   [[nodiscard]] bool ok() const { return !error_; }
   [[nodiscard]] const Error& error() const { return *error_; }
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -106,12 +112,14 @@ class Reader {
   Hdf5Handle find(const char* group, const char* name) {
     Hdf5Handle attribute(H5Aopen_by_name(file_.id(), group, name, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
     if (!attribute.ok())
-      wrong(ErrorCode::invalid_input, name_ + " has no attribute \"" + name + "\" of \"" + group + "\"; it is not what --record writes");
+      wrong(ErrorCode::invalid_input,
+            name_ + " has no attribute \"" + name + "\" of \"" + group + "\"; it is not what --record writes");
     return attribute;
   }
   Hdf5Handle find_dataset(const char* path) {
     Hdf5Handle dataset(H5Dopen2(file_.id(), path, H5P_DEFAULT), H5Dclose);
-    if (!dataset.ok()) wrong(ErrorCode::invalid_input, name_ + " has no dataset \"" + path + "\"; it is not what --record writes");
+    if (!dataset.ok())
+      wrong(ErrorCode::invalid_input, name_ + " has no dataset \"" + path + "\"; it is not what --record writes");
     return dataset;
   }
 
@@ -131,7 +139,8 @@ DeviceLimits limits_of(Reader& reader) {
   limits.damping_n_s_per_mm = reader.number(g, recording::kDamping);
   limits.peak_nmm = reader.number(g, recording::kPeakTorque);
   limits.continuous_nmm = reader.number(g, recording::kContinuousTorque);
-  limits.workspace_middle_mm = {reader.number(g, recording::kMiddleX), reader.number(g, recording::kMiddleY), reader.number(g, recording::kMiddleZ)};
+  limits.workspace_middle_mm = {reader.number(g, recording::kMiddleX), reader.number(g, recording::kMiddleY),
+                                reader.number(g, recording::kMiddleZ)};
   return limits;
 }
 
@@ -158,11 +167,13 @@ std::vector<DeviceReading> readings_of(Reader& reader) {
     reading.calibration = static_cast<Calibration>(calibration[i]);
     reading.sample = i + 1;
     const bool well = reading.pose_device_tool.position_mm.allFinite() &&
-                      std::abs(reading.pose_device_tool.rotation.squaredNorm() - 1.0) < 1e-6 && pedal[i] >= 0.0 && pedal[i] <= 1.0 &&
-                      status[i] <= static_cast<int>(DeviceStatus::absent) && calibration[i] <= static_cast<int>(Calibration::pending) &&
+                      std::abs(reading.pose_device_tool.rotation.squaredNorm() - 1.0) < 1e-6 && pedal[i] >= 0.0 &&
+                      pedal[i] <= 1.0 && status[i] <= static_cast<int>(DeviceStatus::absent) &&
+                      calibration[i] <= static_cast<int>(Calibration::pending) &&
                       (i == 0 || (ticks[i] > ticks[i - 1] && ticks[i] - ticks[i - 1] < kMostLost));
     if (!well) {
-      reader.wrong(ErrorCode::invalid_input, reader.name() + ": row " + std::to_string(i) + " is no reading of a device; the file is damaged");
+      reader.wrong(ErrorCode::invalid_input,
+                   reader.name() + ": row " + std::to_string(i) + " is no reading of a device; the file is damaged");
       break;
     }
     if (i > 0)
@@ -178,10 +189,12 @@ Result<RecordedSession> read_recording(const std::filesystem::path& file) {
   Reader reader(file);
   if (!reader.open()) return tl::unexpected(reader.error());
   if (!reader.has(recording::kFormatName) || reader.text(".", recording::kFormatName) != recording::kFormat)
-    return failure(ErrorCode::invalid_input, file.string() + " is HDF5, but no recording of Osteon; give one that --record wrote");
+    return failure(ErrorCode::invalid_input,
+                   file.string() + " is HDF5, but no recording of Osteon; give one that --record wrote");
   const int version = static_cast<int>(reader.number(".", recording::kVersionName));
   if (reader.ok() && version != recording::kVersion)
-    return failure(ErrorCode::unsupported, reader.name() + " is of version " + std::to_string(version) + " of the format; this program reads version " +
+    return failure(ErrorCode::unsupported, reader.name() + " is of version " + std::to_string(version) +
+                                               " of the format; this program reads version " +
                                                std::to_string(recording::kVersion));
   RecordedSession session;
   const char* g = recording::kMetadata;
@@ -206,7 +219,8 @@ Result<RecordedSession> read_recording(const std::filesystem::path& file) {
   return session;
 }
 
-RecordedDevice::RecordedDevice(std::string name, RecordedSession session) : name_(std::move(name)), session_(std::move(session)) {}
+RecordedDevice::RecordedDevice(std::string name, RecordedSession session)
+    : name_(std::move(name)), session_(std::move(session)) {}
 
 DeviceReading RecordedDevice::read() noexcept {
   if (!over()) return session_.readings[next_++];

@@ -13,9 +13,9 @@ namespace osteon::haptic {
 // What a recording says of the session that it is of.
 struct RecordedSession {
   std::string device, device_model;
-  std::string case_hash;         // of the bone, in hexadecimal digits
-  std::string field_hash;        // of the bone as it was left; empty: the recording has no end
-  double force_scale = 0;        // s
+  std::string case_hash;   // of the bone, in hexadecimal digits
+  std::string field_hash;  // of the bone as it was left; empty: the recording has no end
+  double force_scale = 0;  // s
   DeviceLimits limits;
   DeviceInfo info;
   std::vector<DeviceReading> readings;  // one for each tick from the first row on; a lost row shows the one before
@@ -44,7 +44,7 @@ class RecordedDevice final : public HapticDevice {
  private:
   std::string name_;
   RecordedSession session_;
-  std::size_t next_ = 0;     // haptic thread
+  std::size_t next_ = 0;  // haptic thread
 };
 
 // `recorded:FILE` after its colon. Errors: those of read_recording().

@@ -23,12 +23,17 @@ class RecordedRoom : public testing::Test {
     step["feed_mm_per_s"] = 4.0;
     const auto plan = stage / (name + "-plan.json");
     std::ofstream(plan) << json{{"steps", json::array({step})}};
-    return {"--server", stage.address(), "--plan", plan, "--summary", stage / (name + ".json"), "--cache", stage / "cache", "--record", stage / (name + ".h5")};
+    return {"--server", stage.address(),       "--plan", plan, "--summary", stage / (name + ".json"), "--cache", stage / "cache",
+            "--record", stage / (name + ".h5")};
   }
   // What Debian's Python says of a recording `f`, as JSON.
   static json ask(const std::filesystem::path& file, const std::string& expression) {
-    const RunResult answer = run(OSTEON_PYTHON, {"-c", "import sys, json, h5py, numpy as np\nf = h5py.File(sys.argv[1], 'r', swmr=True)\n"
-                                                       "n = len(f['data/time'])\nprint(json.dumps(" + expression + "))", file});
+    const RunResult answer =
+        run(OSTEON_PYTHON, {"-c",
+                            "import sys, json, h5py, numpy as np\nf = h5py.File(sys.argv[1], 'r', swmr=True)\n"
+                            "n = len(f['data/time'])\nprint(json.dumps(" +
+                                expression + "))",
+                            file});
     EXPECT_EQ(answer.exit_code, 0) << answer.err;
     return json::parse(answer.out, nullptr, false);
   }
@@ -52,8 +57,9 @@ TEST_F(RecordedRoom, HoldsEveryTickAndIsPlayedAgainInAnotherRoom) {
   // Chi (7.3) at 1000 rpm and 4 mm/s in the far cortex, along the tool's axis: the bone pushes back, against +z of the tool.
   const double thrust_n = 134.6 * std::pow(1000.0, -0.3327) * std::pow(4.0, 0.5189) * std::pow(1.9, 1.1841);
   const std::string far = "(lambda d: (d > 26.5) & (d < 29.5) & (d >= np.maximum.accumulate(d)))(f['data/depth'][:])";
-  EXPECT_NEAR(ask(file, "float(np.mean(np.linalg.norm(f['drill_force_physical/wrench'][:, :3], axis=1)[" + far + "]))").get<double>(), thrust_n,
-              0.06 * thrust_n);
+  EXPECT_NEAR(
+      ask(file, "float(np.mean(np.linalg.norm(f['drill_force_physical/wrench'][:, :3], axis=1)[" + far + "]))").get<double>(),
+      thrust_n, 0.06 * thrust_n);
   EXPECT_EQ(stage.server().terminate(), 0);
 
   stage.start_server({});
@@ -64,8 +70,10 @@ TEST_F(RecordedRoom, HoldsEveryTickAndIsPlayedAgainInAnotherRoom) {
   const json replayed = read_json(stage / "again.json");
   // The same handle, tick by tick; patches come when real threads bring them, so cuts agree to their size, not to the bit.
   EXPECT_EQ(ask(stage / "again.h5", "int((f['high_frequency_poses/handle_pose/pose'][:n] == h5py.File('" + file.string() +
-                                        "', 'r')['high_frequency_poses/handle_pose/pose'][:n]).all())"), 1);
-  EXPECT_NEAR(replayed["removed_mm3"].get<double>(), summary["removed_mm3"].get<double>(), 0.01 * summary["removed_mm3"].get<double>());
+                                        "', 'r')['high_frequency_poses/handle_pose/pose'][:n]).all())"),
+            1);
+  EXPECT_NEAR(replayed["removed_mm3"].get<double>(), summary["removed_mm3"].get<double>(),
+              0.01 * summary["removed_mm3"].get<double>());
   EXPECT_GT(summary["removed_mm3"].get<double>(), 200.0);
 }
 
@@ -73,7 +81,8 @@ TEST_F(RecordedRoom, OfAKilledClientCanBeRead) {
   const Stage stage(24.0);
   Process haptic = stage.start("osteon-haptic", arguments(stage, "killed", 0.0));
   const auto deadline = std::chrono::steady_clock::now() + 60s;
-  while (std::chrono::steady_clock::now() < deadline && !std::filesystem::exists(stage / "killed.h5")) std::this_thread::sleep_for(20ms);
+  while (std::chrono::steady_clock::now() < deadline && !std::filesystem::exists(stage / "killed.h5"))
+    std::this_thread::sleep_for(20ms);
   std::this_thread::sleep_for(5s);
   ASSERT_TRUE(haptic.running());
   haptic.signal(SIGKILL);
@@ -90,7 +99,8 @@ TEST_F(RecordedRoom, OnAFullDiskTheSessionGoesOn) {
   const Stage stage(24.0);
   // The case is fetched first, where files may be large.
   std::ofstream(stage / "wait.json") << json{{"steps", json::array({{{"action", "wait"}, {"seconds", 0.1}}})}};
-  Process first = stage.start("osteon-haptic", {"--server", stage.address(), "--plan", stage / "wait.json", "--cache", stage / "cache"});
+  Process first =
+      stage.start("osteon-haptic", {"--server", stage.address(), "--plan", stage / "wait.json", "--cache", stage / "cache"});
   ASSERT_EQ(first.wait(60s), 0) << first.err();
   // Files may not grow beyond 400 kB; the signal that comes with it is ignored, as where a disk is full.
   const std::string command = "trap '' XFSZ; ulimit -f 800; exec \"$@\"";

@@ -39,15 +39,18 @@ PlanStep drill_step(HandKind hand) {
 // A hole through the layered block.
 struct Hole {
   double force_n[3] = {}, feed_mm_per_s[3] = {};  // near cortex, medulla, far cortex
-  double ramp_mm = 0;           // of the tip while more and more of the point is engaged: see Ramp
-  double after_exit_n = 0;      // the largest force once the cone has left
+  double ramp_mm = 0;                             // of the tip while more and more of the point is engaged: see Ramp
+  double after_exit_n = 0;                        // the largest force once the cone has left
   double plunge_mm = 0, after_exit_mm = 0;
   bool completed = false;
   json curve = {{"time_s", json::array()}, {"depth_mm", json::array()}, {"force_n", json::array()}, {"engaged", json::array()}};
 
   [[nodiscard]] json numbers() const {
-    json out{{"ramp_mm", rounded(ramp_mm)}, {"after_exit_n", rounded(after_exit_n)}, {"plunge_mm", rounded(plunge_mm)},
-             {"after_exit_mm", rounded(after_exit_mm)}, {"completed", completed}};
+    json out{{"ramp_mm", rounded(ramp_mm)},
+             {"after_exit_n", rounded(after_exit_n)},
+             {"plunge_mm", rounded(plunge_mm)},
+             {"after_exit_mm", rounded(after_exit_mm)},
+             {"completed", completed}};
     for (const double f : force_n) out["force_n"].push_back(rounded(f));
     for (const double v : feed_mm_per_s) out["feed_mm_per_s"].push_back(rounded(v));
     return out;
@@ -161,8 +164,11 @@ json steps() {
     const char* what;
     double dt_s, pitch_mm;
   };
-  const Case cases[] = {{"1 kHz, 0.5 mm", 1e-3, 0.5}, {"0.5 kHz, 0.5 mm", 2e-3, 0.5}, {"2 kHz, 0.5 mm", 5e-4, 0.5},
-                        {"1 kHz, 0.25 mm", 1e-3, 0.25}, {"1 kHz, 1 mm", 1e-3, 1.0}};
+  const Case cases[] = {{"1 kHz, 0.5 mm", 1e-3, 0.5},
+                        {"0.5 kHz, 0.5 mm", 2e-3, 0.5},
+                        {"2 kHz, 0.5 mm", 5e-4, 0.5},
+                        {"1 kHz, 0.25 mm", 1e-3, 0.25},
+                        {"1 kHz, 1 mm", 1e-3, 1.0}};
   const HandKind hands[] = {HandKind::rig, HandKind::expert, HandKind::novice};
   std::vector<json> runs(std::size(cases) * std::size(hands));
   tbb::parallel_for(std::size_t{0}, runs.size(), [&](std::size_t i) {
@@ -257,7 +263,8 @@ json guided() {
       bench.run([&](const SessionTick& tick) {
         const Vec3& tip = tick.report.pose_bone_proxy.position_mm;
         if (tick.order.phase != SurgeonPhase::feed && tick.order.phase != SurgeonPhase::push) return;
-        if (tip.z() > 0.0) most = std::max(most, (tip - *place.entry.point_mm).head<2>().norm() / play_mm(tip.z()));
+        if (tip.z() > 0.0)
+          most = std::max(most, (tip - *place.entry.point_mm).head<2>().norm() / (play_mm(tip.z()) + kQuantum_mm));
       });
       json run{{"hand", hand == HandKind::rig ? "rig" : hand == HandKind::expert ? "expert" : "novice"}, {"guided", through}};
       double excess_mm = -1e9;
@@ -271,7 +278,8 @@ json guided() {
       }
       run["most_of_play"] = rounded(most);
       run["cut_excess_mm"] = rounded(excess_mm);
-      run["completed"] = bench.session().done() && std::ranges::all_of(bench.session().surgeon().results(), &StepResult::completed);
+      run["completed"] =
+          bench.session().done() && std::ranges::all_of(bench.session().surgeon().results(), &StepResult::completed);
       out["runs"].push_back(run);
     }
   return out;
@@ -282,7 +290,8 @@ json guided() {
 
 int main(int argc, char** argv) {
   using namespace osteon::haptic::test;
-  const std::pair<const char*, nlohmann::json (*)()> parts[] = {{"rig", rig}, {"hands", hands}, {"steps", steps}, {"profiles", profiles}, {"guided", guided}};
+  const std::pair<const char*, nlohmann::json (*)()> parts[] = {
+      {"rig", rig}, {"hands", hands}, {"steps", steps}, {"profiles", profiles}, {"guided", guided}};
   for (const auto& [name, run] : parts)
     if (argc == 2 && std::strcmp(argv[1], name) == 0) {
       std::printf("%s\n", run().dump().c_str());

@@ -100,8 +100,8 @@ def profiles(run):
         force = {key: np.abs(one[key]) for key in ("total_n", "x_n", "y_n", "z_n")}
         cutting = force["total_n"] > 0.1
         mean = {key: float(f[cutting].mean()) if cutting.any() else None for key, f in force.items()}
-        rows.append((kind, *(f"{v:.2f}" for v in (mean["total_n"], force["total_n"].max(), mean["x_n"], mean["y_n"], mean["z_n"])),
-                     one["removed_mm3"]))
+        shown = (mean["total_n"], force["total_n"].max(), mean["x_n"], mean["y_n"], mean["z_n"])
+        rows.append((kind, *(f"{v:.2f}" for v in shown), one["removed_mm3"]))
         values[f"feel_{kind}_force"] = (mean["total_n"], None, 0.0, float(force["total_n"].max()))
     run.tables.append((f"forces of a round burr on cortical bone, simulated device; pictures: {', '.join(pictures)}", rows))
     return values
@@ -113,8 +113,8 @@ def guided(run):
     most = {way: [r["most_of_play"] for r in out["runs"] if r["guided"] is way] for way in (True, False)}
     run.tables.append((f"guided drilling with a trembling hand, simulated device; picture: {picture}",
                        [("hand", "through the sleeve", "cuts off the line", "beyond the play", "tool as a part of the play")] + [
-                           (r["hand"], "yes" if r["guided"] else "no", f"{max(r['off_mm']):.3f} mm", f"{r['cut_excess_mm']:.4f} mm",
-                            f"{r['most_of_play']:.4f}") for r in out["runs"]]))
+                           (r["hand"], "yes" if r["guided"] else "no", f"{max(r['off_mm']):.3f} mm",
+                            f"{r['cut_excess_mm']:.4f} mm", f"{r['most_of_play']:.4f}") for r in out["runs"]]))
     excess = {way: [r["cut_excess_mm"] for r in out["runs"] if r["guided"] is way] for way in (True, False)}
     return {"feel_guided_of_play": (max(most[True]), min(most[False])),
             "feel_guided_excess": (max(excess[True]), min(excess[False]))}

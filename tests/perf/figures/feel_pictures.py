@@ -52,7 +52,8 @@ def hands(out, file):
         curve = out[who]["curve"]
         time = np.array(curve["time_s"])
         began = time[np.argmax(np.array(curve["engaged"]) > 0)]
-        depth_axes.plot(time - began, curve["depth_mm"], color=colour, lw=1.1, label=f"{who}: plunge {out[who]['plunge_mm']:.1f} mm")
+        depth_axes.plot(time - began, curve["depth_mm"], color=colour, lw=1.1,
+                        label=f"{who}: plunge {out[who]['plunge_mm']:.1f} mm")
         force_axes.plot(curve["depth_mm"], curve["force_n"], color=colour, lw=0.9, label=who)
     for depth in (0, 5, 25, 30):
         depth_axes.axhline(depth, color=BONE, lw=0.8)
@@ -87,8 +88,8 @@ def profile(out, file):
         one.set_ylabel("force, N")
         one.set_title(label, fontsize=10, loc="left")
     axes[-1].set_xlabel("time, s")
-    figure.suptitle(f"{out['kind']} of cortical bone, {out['tool']}, {out['sweep_mm_per_s']:g} mm/s: force of the bone on the tool",
-                    fontsize=11)
+    figure.suptitle(f"{out['kind']} of cortical bone, {out['tool']}, {out['sweep_mm_per_s']:g} mm/s: force of the bone on "
+                    "the tool", fontsize=11)
     save(figure, file)
 
 
@@ -99,7 +100,8 @@ def guided(out, file):
         axes.plot(one["depth_mm"][::3], one["off_mm"][::3], marks[one["hand"]], color=STEEL if one["guided"] else ACCENT, ms=3,
                   mew=0.6, alpha=0.7, label=f"{one['hand']}, {'through the sleeve' if one['guided'] else 'by eye'}")
     depth = np.array([0.0, 30.0])
-    axes.plot(depth, out["play_mm"] * (1 + 2 * depth / out["sleeve_mm"]), color="black", lw=1.2, ls="--", label="play c (1 + 2 L / L_sleeve)")
+    play = out["play_mm"] * (1 + 2 * depth / out["sleeve_mm"])
+    axes.plot(depth, play, color="black", lw=1.2, ls="--", label="play c (1 + 2 L / L_sleeve)")
     axes.set_xlabel("depth L of the tip, mm")
     axes.set_ylabel("off the planned line, mm")
     axes.set_title("cuts of a hand that strays by up to 1.2 mm", fontsize=10, loc="left")

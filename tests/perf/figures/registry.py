@@ -89,9 +89,10 @@ FIGURES = [
            "feel_rig", ("<=", 3.0)),
     Figure("feel_rig_medullary_error", "percent", "feed rig on virtual time: thrust in the medullary layer against 3.25 N",
            "feel_rig", ("<=", 3.0)),
-    Figure("feel_rig_force_ratio", "ratio", "thrust in the cortical layers over that in the medullary one", "feel_rig", (">=", 8.0)),
-    Figure("feel_rig_ramp_error", "ratio", "way of the tip from touching to its whole point in bone against the cone's height, as "
-           "a part of half the drill's pitch", "feel_rig", ("<=", 1.0)),
+    Figure("feel_rig_force_ratio", "ratio", "thrust in the cortical layers over that in the medullary one", "feel_rig",
+           (">=", 8.0)),
+    Figure("feel_rig_ramp_error", "ratio", "way of the tip while more and more of its point is in bone (by the root of the "
+           "engaged share) against the cone's height, as a part of half the drill's pitch", "feel_rig", ("<=", 1.0)),
     Figure("feel_rig_after_exit", "n", "largest thrust once the cone has left the bone", "feel_rig", ("==", 0)),
     Figure("feel_expert_plunge_error", "percent", "expert's plunge on virtual time against 6.0 mm", "feel_hands", ("<=", 15.0)),
     Figure("feel_novice_plunge_error", "percent", "novice's plunge on virtual time against 14.4 mm", "feel_hands", ("<=", 15.0)),
@@ -100,15 +101,16 @@ FIGURES = [
     Figure("feel_plunge_wrong_ways", "count", "of eight sweeps (push, wear, stiffness and damping of the hand; expert, novice) "
            "those in which the plunge does not rise with push and wear and fall with stiffness and damping", "feel_hands",
            ("==", 0)),
-    Figure("feel_tick_change", "percent", "largest change of any force, feed and plunge of rig, expert and novice at 0.5 and 2 kHz "
-           "against 1 kHz", "feel_steps", ("<=", 3.0)),
-    Figure("feel_pitch_change", "percent", "the same with a bone at 0.25 and 1 mm against one at 0.5 mm", "feel_steps", ("<=", 3.0)),
+    Figure("feel_tick_change", "percent", "largest change of any force, feed and plunge of rig, expert and novice at 0.5 and "
+           "2 kHz against 1 kHz", "feel_steps", ("<=", 3.0)),
+    Figure("feel_pitch_change", "percent", "the same with a bone at 0.25 and 1 mm against one at 0.5 mm", "feel_steps",
+           ("<=", 3.0)),
     Figure("feel_burring_force", "n", "mean force while a round burr takes 0.5 mm off cortical bone", "feel_profiles"),
     Figure("feel_milling_force", "n", "mean force while it mills a slot of 2.5 mm, in passes", "feel_profiles"),
     Figure("feel_guided_excess", "mm", "how far the cuts of a trembling hand through a sleeve lie beyond its play c (1 + 2 L / "
            "L_sleeve); paths of cuts are simplified by up to 0.01 mm", "feel_guided", ("<=", 0.01), baseline="by eye"),
-    Figure("feel_guided_of_play", "ratio", "how far the drill itself gets off the planned line, as a part of that play",
-           "feel_guided", ("<=", 1.0), baseline="by eye"),
+    Figure("feel_guided_of_play", "ratio", "how far the drill itself gets off the planned line, as a part of that play and a "
+           "pose's quantum", "feel_guided", ("<=", 1.0), baseline="by eye"),
     # The force laws by themselves.
     Figure("laws_listed", "count", "force laws that can be chosen", "laws", (">=", 9)),
     Figure("laws_chi_error", "percent", "Chi's thrust at 0.3 to 2.0 g/cm3, 1000 rpm, 1 mm/s, against the points of "

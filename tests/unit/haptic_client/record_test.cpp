@@ -25,7 +25,11 @@ RecordingInfo info_of_a_session() {
   RecordingInfo info;
   info.device = "simulated";
   info.device_info.model = "a hand of numbers";
-  info.limits = {.peak_n = 8.5, .continuous_n = 1.4, .stiffness_n_per_mm = 0.8, .workspace_radius_mm = 120.0, .damping_n_s_per_mm = 0.002,
+  info.limits = {.peak_n = 8.5,
+                 .continuous_n = 1.4,
+                 .stiffness_n_per_mm = 0.8,
+                 .workspace_radius_mm = 120.0,
+                 .damping_n_s_per_mm = 0.002,
                  .workspace_middle_mm = {1, 2, 3}};
   info.loop.force_scale = 0.0466;
   info.case_hash = std::string(64, 'c');
@@ -36,7 +40,9 @@ RecordingInfo info_of_a_session() {
   return info;
 }
 
-Vec3 vector(Random& random, double most) { return {random.between(-most, most), random.between(-most, most), random.between(-most, most)}; }
+Vec3 vector(Random& random, double most) {
+  return {random.between(-most, most), random.between(-most, most), random.between(-most, most)};
+}
 
 Pose pose(Random& random) {
   const Vec3 v = vector(random, 1.0);
@@ -137,7 +143,8 @@ TEST(Recording, LostRowsDoNotShiftTheRest) {
   ASSERT_TRUE(session) << session.error().message;
   const int shown[] = {0, 1, 2, 2, 2, 2, 6, 7};
   ASSERT_EQ(session->readings.size(), std::size(shown));
-  for (std::size_t i = 0; i < std::size(shown); ++i) expect_same(session->readings[i], row(static_cast<std::uint64_t>(shown[i])).reading);
+  for (std::size_t i = 0; i < std::size(shown); ++i)
+    expect_same(session->readings[i], row(static_cast<std::uint64_t>(shown[i])).reading);
 }
 
 // The lines of the README, word for word apart from the file's name.
@@ -164,7 +171,8 @@ TEST(Recording, IsLaidOutAsItSays) {
   const TickRow some = row(1234);
   char expected[256];
   std::snprintf(expected, sizeof expected, "%.6f,%.6f,%.6f,%.6f,%.6f", some.report.pose_bone_proxy.position_mm.x(),
-                some.report.pose_bone_proxy.rotation.w(), some.report.force_physical_n.z(), some.rendered.force_n.y(), some.report.density_g_cm3);
+                some.report.pose_bone_proxy.rotation.w(), some.report.force_physical_n.z(), some.rendered.force_n.y(),
+                some.report.density_g_cm3);
   const auto read = python(R"(
 import sys, h5py, numpy as np
 f = h5py.File(sys.argv[1], "r")
@@ -177,7 +185,8 @@ for name, frame in poses.items():
     assert (f["high_frequency_poses"][name]["time_stamp"][:] == f["data/time"][:]).all()
 for group, frame in {"drill_force_feedback": "device", "drill_force_physical": "bone"}.items():
     wrench = f[group]["wrench"]
-    assert wrench.shape == (1300, 6) and wrench.attrs["frame"] == frame and wrench.attrs["units"].startswith("N, N, N, N.mm"), group
+    assert wrench.shape == (1300, 6) and wrench.attrs["frame"] == frame, group
+    assert wrench.attrs["units"].startswith("N, N, N, N.mm"), group
     assert len(f[group]["time_stamp"]) == 1300
 rows = []
 def look(name, item):
@@ -195,13 +204,15 @@ assert [t.decode() for t in f["metadata/tools"][:]] == ["drill-3.2", "burr-round
 assert [t.decode() for t in f["metadata/laws"][:]] == ["chi", "milling"]
 assert f["data/law"][699] == 0 and f["data/law"][700] == 1 and f["burr_change/burr_size"][:].tolist() == [3.2, 5.0]
 assert f["burr_change/row"][:].tolist() == [0, 700] and f["burr_change/scale"][0] == 1.5
-assert f["metadata/voxel_volume"][()] == 0.125 and f["metadata"].attrs["force_scale"] == 0.0466 and b"bone" in f["metadata/README"][()]
+assert f["metadata/voxel_volume"][()] == 0.125 and f["metadata"].attrs["force_scale"] == 0.0466
+assert b"bone" in f["metadata/README"][()]
 assert f["metadata/field_hash"][()].decode() == 64 * "f" and f["metadata/room_seq"][()] == 321 and f["metadata/finished"][()] == 1
 assert f["drill_force_physical/wrench"][5, 3:].tolist() == [6, 2, 3]
 i = 1234
 print("%.6f,%.6f,%.6f,%.6f,%.6f" % (f["high_frequency_poses/drill_pose/pose"][i, 0], f["data/pose_drill"][i, 6],
       f["drill_force_physical/wrench"][i, 2], f["drill_force_feedback/wrench"][i, 1], f["data/density"][i]))
-)", temp / "a.h5");
+)",
+                           temp / "a.h5");
   ASSERT_EQ(read.exit_code, 0) << read.err;
   double got[5], want[5];
   ASSERT_EQ(std::sscanf(read.out.c_str(), "%lf,%lf,%lf,%lf,%lf", &got[0], &got[1], &got[2], &got[3], &got[4]), 5);
@@ -274,9 +285,11 @@ TEST(Recording, AKilledWriterLeavesWhatItWrote) {
     EXPECT_EQ(session->field_hash, "");
     most = std::max(most, static_cast<std::uint64_t>(rows));
     if (trial != 0) continue;
-    const auto read = python("import sys, h5py\nf = h5py.File(sys.argv[1], 'r', swmr=True)\n"
-                             "n = len(f['data/time'])\nassert n >= 500\n"
-                             "assert (f['data/state_seq'][:n] == range(1, n + 1)).all() and f['metadata/finished'][()] == 0\n", file);
+    const auto read = python(
+        "import sys, h5py\nf = h5py.File(sys.argv[1], 'r', swmr=True)\n"
+        "n = len(f['data/time'])\nassert n >= 500\n"
+        "assert (f['data/state_seq'][:n] == range(1, n + 1)).all() and f['metadata/finished'][()] == 0\n",
+        file);
     EXPECT_EQ(read.exit_code, 0) << read.err;
   }
   EXPECT_GT(most, 500u);
@@ -286,10 +299,12 @@ TEST(Recording, CanBeReadWhileItGrows) {
   const TempDir temp;
   Writer writer(temp / "a.h5");
   ASSERT_GT(writer.rows(), 0u);
-  const auto read = python("import sys, time, h5py\nf = h5py.File(sys.argv[1], 'r', swmr=True)\nt = f['data/time']\n"
-                           "first, until = len(t), time.time() + 20\n"
-                           "while len(t) <= first and time.time() < until:\n  time.sleep(0.01)\n  t.refresh()\n"
-                           "print(first, len(t))\nassert len(t) > first\n", temp / "a.h5");
+  const auto read = python(
+      "import sys, time, h5py\nf = h5py.File(sys.argv[1], 'r', swmr=True)\nt = f['data/time']\n"
+      "first, until = len(t), time.time() + 20\n"
+      "while len(t) <= first and time.time() < until:\n  time.sleep(0.01)\n  t.refresh()\n"
+      "print(first, len(t))\nassert len(t) > first\n",
+      temp / "a.h5");
   EXPECT_EQ(read.exit_code, 0) << read.err;
 }
 
@@ -327,7 +342,8 @@ TEST(Recording, AFullDiskIsSaidInASentenceAndLeavesWhatWasWritten) {
         appended = recording->append({&one, 1});
       }
       ASSERT_FALSE(appended);
-      EXPECT_EQ(appended.error().message, "the recording " + (temp / "a.h5").string() + " cannot be continued: the disk is full (File too large)");
+      EXPECT_EQ(appended.error().message,
+                "the recording " + (temp / "a.h5").string() + " cannot be continued: the disk is full (File too large)");
       fitted = recording->rows_written();
     }
     const auto session = read_recording(temp / "a.h5");
@@ -354,7 +370,9 @@ TEST(Recording, LeavesALittleOfTheDisk) {
     EXPECT_EQ(i, RecordFile::kChunkRows);
     EXPECT_EQ(appended.error().message, "the recording " + (temp / "a.h5").string() + " ends here: the disk is all but full");
   }
-  const auto read = python("import sys, h5py\nf = h5py.File(sys.argv[1], 'r')\nassert len(f['data/time']) == 0 and f['metadata/finished'][()] == 0", temp / "a.h5");
+  const auto read = python(
+      "import sys, h5py\nf = h5py.File(sys.argv[1], 'r')\nassert len(f['data/time']) == 0 and f['metadata/finished'][()] == 0",
+      temp / "a.h5");
   EXPECT_EQ(read.exit_code, 0) << read.err;
 }
 
@@ -430,7 +448,8 @@ TEST_F(WrongFile, IsNoHdf5) {
   expect(ErrorCode::invalid_input, "is not an HDF5 file");
 }
 TEST_F(WrongFile, IsOfAnotherProgram) {
-  const auto made = python("import sys, h5py\nf = h5py.File(sys.argv[1], 'w')\nf['drill_force_feedback/wrench'] = [[0.0] * 6]", temp_ / "a.h5");
+  const auto made =
+      python("import sys, h5py\nf = h5py.File(sys.argv[1], 'w')\nf['drill_force_feedback/wrench'] = [[0.0] * 6]", temp_ / "a.h5");
   ASSERT_EQ(made.exit_code, 0) << made.err;
   expect(ErrorCode::invalid_input, "no recording of Osteon");
 }

@@ -62,7 +62,8 @@ struct Session {
 };
 
 // A session with the simulated hand, recorded.
-Session record(const Case& bone, const std::vector<PlanStep>& plan, const SimulatedDeviceParams& device, const std::filesystem::path& file) {
+Session record(const Case& bone, const std::vector<PlanStep>& plan, const SimulatedDeviceParams& device,
+               const std::filesystem::path& file) {
   Bench bench(bone, plan, device);
   Result<RecordFile> recording = RecordFile::create(file, info_of(bench));
   EXPECT_TRUE(recording) << recording.error().message;
