@@ -44,8 +44,8 @@ std::vector<HidFound> list_hid_devices() {
   std::vector<HidFound> found;
   hid_device_info* const list = hid_enumerate(0, 0);
   for (const hid_device_info* info = list; info != nullptr; info = info->next) {
-    found.push_back({info->path == nullptr ? std::string() : info->path, narrow(info->product_string), narrow(info->serial_number),
-                     info->vendor_id, info->product_id, info->usage_page, info->usage});
+    found.push_back({info->path == nullptr ? std::string() : info->path, narrow(info->product_string),
+                     narrow(info->serial_number), info->vendor_id, info->product_id, info->usage_page, info->usage});
   }
   hid_free_enumeration(list);
   return found;

@@ -110,10 +110,16 @@ std::vector<HidField> hid_input_fields(std::span<const std::uint8_t> descriptor)
         for (std::uint32_t i = 0; i < globals.count; ++i, end += globals.bits) {
           const std::optional<std::uint32_t> usage = locals.usage_of(i);
           if ((data & kConstant) || !(data & kVariable) || !usage || globals.bits == 0 || globals.bits > 32) continue;
-          HidField field{static_cast<std::uint16_t>(*usage >> 16), static_cast<std::uint16_t>(*usage), globals.report, end, globals.bits,
-                         globals.lowest, globals.highest};
+          HidField field{static_cast<std::uint16_t>(*usage >> 16),
+                         static_cast<std::uint16_t>(*usage),
+                         globals.report,
+                         end,
+                         globals.bits,
+                         globals.lowest,
+                         globals.highest};
           // "0 to 255" in one byte reads as −1: the largest is not negative where the smallest is not.
-          if (field.lowest >= 0 && field.highest < field.lowest) field.highest = static_cast<std::int32_t>(globals.highest_unsigned);
+          if (field.lowest >= 0 && field.highest < field.lowest)
+            field.highest = static_cast<std::int32_t>(globals.highest_unsigned);
           fields.push_back(field);
           if (fields.size() >= kMostFields) return fields;
         }

@@ -28,7 +28,8 @@ constexpr std::chrono::milliseconds kLookAgain{1000}, kLookAfter{100};  // for o
 
 bool is_space_mouse(const HidFound& device) {
   const auto known = [&](const auto& models) { return std::find(models.begin(), models.end(), device.model) != models.end(); };
-  const bool one = (device.vendor == kLogitech && known(kLogitechModels)) || (device.vendor == k3Dconnexion && known(k3DconnexionModels));
+  const bool one = (device.vendor == kLogitech && known(kLogitechModels)) ||
+                   (device.vendor == k3Dconnexion && known(k3DconnexionModels));
   // A receiver has other collections beside the cap's; where the system tells no usage it is the only one.
   return one && (device.usage_page == 0 || (device.usage_page == kDesktopPage && device.usage == kMultiAxis));
 }
@@ -82,7 +83,8 @@ struct SpaceMouseWatch::State {
   }
   void run() {
     do {
-      const Result<HidFound> found = port.open(true, {.moved = [this](const SpaceMouseState& state) { states.store(state); }, .lost = {}});
+      const Result<HidFound> found =
+          port.open(true, {.moved = [this](const SpaceMouseState& state) { states.store(state); }, .lost = {}});
       if (!found) continue;
       say((found->product.empty() ? "SpaceMouse" : found->product) + " moves the camera");
       Result<void> health;

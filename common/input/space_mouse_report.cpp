@@ -36,7 +36,8 @@ bool take_report(SpaceMouseState& state, std::span<const std::uint8_t> report) n
     case kButtons: {
       if (report.size() < 2) return false;
       std::uint32_t bits = 0;
-      for (std::size_t i = 1; i < std::min<std::size_t>(report.size(), 5); ++i) bits |= static_cast<std::uint32_t>(report[i]) << (8 * (i - 1));
+      for (std::size_t i = 1; i < std::min<std::size_t>(report.size(), 5); ++i)
+        bits |= static_cast<std::uint32_t>(report[i]) << (8 * (i - 1));
       state.buttons = bits;
       return true;
     }

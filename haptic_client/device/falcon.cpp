@@ -49,7 +49,8 @@ class Falcon final : public HapticDevice {
     if (runs && !*runs) {
       if (image.empty())
         return failure(ErrorCode::not_found,
-                       "the Falcon waits for its firmware; name the file of its driver with --falcon-firmware, as the licence allows no copy here");
+                       "the Falcon waits for its firmware; name the file of its driver with --falcon-firmware, as the "
+                       "licence allows no copy here");
       if (Result<void> loaded = usb->load(image); !loaded) return loaded;
       runs = usb->runs(kStartsPatience);
       if (runs && !*runs)
@@ -104,7 +105,9 @@ class Falcon final : public HapticDevice {
         command.motors = {};
         exchange_.go(DeviceStatus::fault);
         if (now - heard > kSilencePatience)
-          return lose({ErrorCode::unavailable, "the Falcon has stopped answering; unplug it, switch its power off and on, and plug it in again"});
+          return lose(
+              {ErrorCode::unavailable,
+               "the Falcon has stopped answering; unplug it, switch its power off and on, and plug it in again"});
         continue;
       }
       heard = now;
@@ -175,11 +178,13 @@ Result<std::vector<std::uint8_t>> read_falcon_firmware(const std::filesystem::pa
   std::error_code error;
   const auto status = std::filesystem::status(file, error);
   if (!std::filesystem::exists(status)) return failure(ErrorCode::not_found, named + " is not there; name a file that is");
-  if (!std::filesystem::is_regular_file(status)) return failure(ErrorCode::invalid_input, named + " is not a file; name the image itself");
+  if (!std::filesystem::is_regular_file(status))
+    return failure(ErrorCode::invalid_input, named + " is not a file; name the image itself");
   const std::uintmax_t size = std::filesystem::file_size(file, error);
   if (error || size == 0 || size > kLargestImage)
-    return failure(ErrorCode::invalid_input, named + " has " + (error ? std::string("an unknown number of") : std::to_string(size)) +
-                                                 " bytes, which no image of it has; name the image that belongs to the device");
+    return failure(ErrorCode::invalid_input,
+                   named + " has " + (error ? std::string("an unknown number of") : std::to_string(size)) +
+                       " bytes, which no image of it has; name the image that belongs to the device");
   std::vector<std::uint8_t> image(static_cast<std::size_t>(size));
   std::ifstream in(file, std::ios::binary);
   if (!in.read(reinterpret_cast<char*>(image.data()), static_cast<std::streamsize>(image.size())))

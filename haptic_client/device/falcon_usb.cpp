@@ -45,18 +45,21 @@ struct DeviceList {
 
 bool is_falcon(libusb_device* device) {
   libusb_device_descriptor descriptor{};
-  return libusb_get_device_descriptor(device, &descriptor) == 0 && descriptor.idVendor == kVendor && descriptor.idProduct == kProduct;
+  return libusb_get_device_descriptor(device, &descriptor) == 0 && descriptor.idVendor == kVendor &&
+         descriptor.idProduct == kProduct;
 }
 
 std::string place_of(libusb_device* device) {
-  return "USB bus " + std::to_string(libusb_get_bus_number(device)) + ", device " + std::to_string(libusb_get_device_address(device));
+  return "USB bus " + std::to_string(libusb_get_bus_number(device)) + ", device " +
+         std::to_string(libusb_get_device_address(device));
 }
 
 std::string serial_of(libusb_device* device, libusb_device_handle* handle) {
   libusb_device_descriptor descriptor{};
   std::array<unsigned char, 128> text{};
   if (libusb_get_device_descriptor(device, &descriptor) != 0 || descriptor.iSerialNumber == 0) return {};
-  const int size = libusb_get_string_descriptor_ascii(handle, descriptor.iSerialNumber, text.data(), static_cast<int>(text.size()));
+  const int size =
+      libusb_get_string_descriptor_ascii(handle, descriptor.iSerialNumber, text.data(), static_cast<int>(text.size()));
   return size > 0 ? std::string(reinterpret_cast<const char*>(text.data()), static_cast<std::size_t>(size)) : std::string();
 }
 
@@ -130,7 +133,8 @@ struct FalconUsb::Wire {
 
   Result<void> set(std::span<const FalconSetting> settings) {
     for (const FalconSetting& setting : settings) {
-      const int code = libusb_control_transfer(handle, kSettingType, setting.request, setting.value, 0, nullptr, 0, in_ms(kSettingPatience));
+      const int code = libusb_control_transfer(handle, kSettingType, setting.request, setting.value, 0, nullptr, 0,
+                                               in_ms(kSettingPatience));
       if (code < 0) return went_wrong("setting", code);
     }
     return {};
@@ -142,7 +146,8 @@ struct FalconUsb::Wire {
     int sent = 0;
     const int code = libusb_bulk_transfer(handle, kOut, copy.data(), static_cast<int>(bytes.size()), &sent, in_ms(kEchoPatience));
     if (code < 0) return went_wrong("writing to", code);
-    if (sent != static_cast<int>(bytes.size())) return unavailable(std::string("the Falcon took only a part of what was sent; ") + kReplug);
+    if (sent != static_cast<int>(bytes.size()))
+      return unavailable(std::string("the Falcon took only a part of what was sent; ") + kReplug);
     return {};
   }
 
@@ -187,10 +192,12 @@ std::uint64_t FalconUsb::broken_frames() const noexcept { return wire_->reader.b
 
 Result<FalconUsb> FalconUsb::open() {
   auto wire = std::make_unique<Wire>();
-  if (wire->out.raw == nullptr || wire->in.raw == nullptr) return failure(ErrorCode::internal, "libusb has no memory for its transfers");
+  if (wire->out.raw == nullptr || wire->in.raw == nullptr)
+    return failure(ErrorCode::internal, "libusb has no memory for its transfers");
   if (const int code = libusb_init(&wire->context); code != 0) {
     wire->context = nullptr;
-    return failure(ErrorCode::internal, std::string("libusb does not start (") + libusb_error_name(code) + "); is this machine's USB in order?");
+    return failure(ErrorCode::internal, std::string("libusb does not start (") + libusb_error_name(code) +
+                                            "); is this machine's USB in order?");
   }
   const DeviceList devices(wire->context);
   int why = LIBUSB_ERROR_NOT_FOUND;
@@ -215,7 +222,8 @@ Result<FalconUsb> FalconUsb::open() {
   }
   if (where.empty()) return failure(ErrorCode::not_found, "no Novint Falcon is there; plug it in and switch its power on");
   if (why == LIBUSB_ERROR_ACCESS)
-    return unavailable("no permission to use the Falcon at " + where + "; install deploy/udev/70-osteon-devices.rules and plug it in again");
+    return unavailable("no permission to use the Falcon at " + where +
+                       "; install deploy/udev/70-osteon-devices.rules and plug it in again");
   if (why == LIBUSB_ERROR_BUSY) return unavailable("another program uses the Falcon at " + where + "; end it");
   return went_wrong("opening", why);
 }
@@ -271,7 +279,8 @@ Result<void> FalconUsb::load(std::span<const std::uint8_t> image) {
   std::uint8_t ready = 0;
   const Result<std::size_t> heard = wire.receive(std::span(&ready, 1), kEchoPatience);
   if (!heard) return tl::unexpected(heard.error());
-  if (*heard != 1 || ready != kFalconReady) return unavailable(std::string("the Falcon is not ready for its firmware; ") + kReplug);
+  if (*heard != 1 || ready != kFalconReady)
+    return unavailable(std::string("the Falcon is not ready for its firmware; ") + kReplug);
 
   for (std::size_t at = 0; at < image.size(); at += kFalconPiece) {
     const auto piece = image.subspan(at, std::min(kFalconPiece, image.size() - at));
@@ -280,8 +289,10 @@ Result<void> FalconUsb::load(std::span<const std::uint8_t> image) {
     const Result<std::size_t> size = wire.receive(std::span(echo).first(piece.size()), kEchoPatience);
     if (!size) return tl::unexpected(size.error());
     if (*size != piece.size() || !std::equal(piece.begin(), piece.end(), echo.begin()))
-      return failure(ErrorCode::unsupported, "the Falcon did not take its firmware: of the piece at byte " + std::to_string(at) +
-                                                 (*size < piece.size() ? " not everything came back; " : " something else came back; ") + kReplug);
+      return failure(ErrorCode::unsupported,
+                     "the Falcon did not take its firmware: of the piece at byte " + std::to_string(at) +
+                         (*size < piece.size() ? " not everything came back; " : " something else came back; ") +
+                         kReplug);
   }
   return {};
 }
@@ -292,13 +303,15 @@ Result<std::optional<FalconState>> FalconUsb::exchange(const FalconCommand& comm
   if (!wire.out.pending) {
     const FalconFrame frame = encode(command);
     std::copy(frame.begin(), frame.end(), wire.out.bytes.begin());
-    if (Result<void> ok = wire.check("writing to", wire.out.submit(wire.handle, kOut, frame.size())); !ok) return tl::unexpected(ok.error());
+    if (Result<void> ok = wire.check("writing to", wire.out.submit(wire.handle, kOut, frame.size())); !ok)
+      return tl::unexpected(ok.error());
   }
   bool writing = wire.out.pending;
   std::optional<FalconState> newest;
   while (true) {
     if (!wire.in.pending && !newest)
-      if (Result<void> ok = wire.check("reading from", wire.in.submit(wire.handle, kIn, kPacket)); !ok) return tl::unexpected(ok.error());
+      if (Result<void> ok = wire.check("reading from", wire.in.submit(wire.handle, kIn, kPacket)); !ok)
+        return tl::unexpected(ok.error());
     const auto left = std::chrono::duration_cast<milliseconds>(deadline - Clock::now() + 999us);
     if (left <= 0ms) return newest;
     const bool reading = wire.in.pending;

@@ -19,8 +19,16 @@ constexpr std::size_t kSwitchReport = 2;
 constexpr std::uint8_t kSwitches = 7;
 constexpr auto kPause = 5ms;  // the haptic thread wants to hear from the device more often than it reports
 // As pedals are wired: accelerator, brake, throttle, slider, z, its rotation, x, y and theirs.
-constexpr std::array<HidUsage, 10> kAxes{{{kSimulation, 0xc4}, {kSimulation, 0xc5}, {kSimulation, 0xbb}, {kDesktop, 0x36}, {kDesktop, 0x32},
-                                          {kDesktop, 0x35}, {kDesktop, 0x30}, {kDesktop, 0x31}, {kDesktop, 0x33}, {kDesktop, 0x34}}};
+constexpr std::array<HidUsage, 10> kAxes{{{kSimulation, 0xc4},
+                                          {kSimulation, 0xc5},
+                                          {kSimulation, 0xbb},
+                                          {kDesktop, 0x36},
+                                          {kDesktop, 0x32},
+                                          {kDesktop, 0x35},
+                                          {kDesktop, 0x30},
+                                          {kDesktop, 0x31},
+                                          {kDesktop, 0x33},
+                                          {kDesktop, 0x34}}};
 
 bool is_switch(const HidFound& device) { return device.vendor == kSwitchVendor && device.model == kSwitchModel; }
 bool is_joystick(const HidFound& device) { return device.usage_page == kDesktop && device.usage == kJoystick; }
@@ -51,7 +59,9 @@ class FootPedal final : public HapticDevice {
       const std::vector<HidField> fields = hid_input_fields(port->descriptor());
       const HidUsage wanted{kDesktop, options_.axis_usage};
       const auto field = options_.axis_usage != 0 ? find_field(fields, {&wanted, 1}) : find_field(fields, kAxes);
-      if (!field) return failure(ErrorCode::unsupported, found->product + " at " + found->path + " has no such axis; choose another joystick");
+      if (!field)
+        return failure(ErrorCode::unsupported,
+                       found->product + " at " + found->path + " has no such axis; choose another joystick");
       field_ = *field;
     }
     info_.model = found->product.empty() ? "foot pedal" : found->product;
@@ -70,7 +80,9 @@ class FootPedal final : public HapticDevice {
     exchange_.go_absent();
   }
   Result<void> tend() override { return reader_.health(); }
-  [[nodiscard]] std::string advice() const override { return armed_ ? "" : "let the foot pedal go once; until then it turns nothing"; }
+  [[nodiscard]] std::string advice() const override {
+    return armed_ ? "" : "let the foot pedal go once; until then it turns nothing";
+  }
 
   DeviceReading read() noexcept override { return exchange_.read(); }
   void write(const DeviceOutput&) noexcept override {}
@@ -95,7 +107,13 @@ class FootPedal final : public HapticDevice {
   PedalAxis axis_;           // reading thread, while it runs
   std::uint8_t down_ = 0;    // reading thread
   std::atomic<bool> armed_{true};
-  DeviceInfo info_{.model = "foot pedal", .serial = {}, .driver = "hidapi", .places = false, .turns = false, .pedals = true, .force_axes = 0};
+  DeviceInfo info_{.model = "foot pedal",
+                   .serial = {},
+                   .driver = "hidapi",
+                   .places = false,
+                   .turns = false,
+                   .pedals = true,
+                   .force_axes = 0};
   DeviceExchange exchange_;
   HidReader reader_;         // last: its thread ends before what it uses
 };

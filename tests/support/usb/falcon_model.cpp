@@ -35,7 +35,8 @@ void FalconModel::set(int request, int value) {
   line_.clear();
   // Resetting by its line makes the boot loader begin anew.
   if (value == kBoot) forget_image();
-  if (value == kRun) loaded_ = std::string_view(reinterpret_cast<const char*>(image_.data()), image_.size()).starts_with(kRunningImage);
+  if (value == kRun)
+    loaded_ = std::string_view(reinterpret_cast<const char*>(image_.data()), image_.size()).starts_with(kRunningImage);
 }
 
 void FalconModel::take(std::span<const std::uint8_t> bytes) {

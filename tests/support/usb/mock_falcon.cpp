@@ -92,7 +92,8 @@ void MockFalcon::submit(Call* call) {
   Block block{umockdev_ioctl_data_resolve(arg, 0, sizeof(usbdevfs_urb), nullptr), nullptr, address};
   usbdevfs_urb* urb = urb_of(block.urb);
   if (urb->buffer_length > 0)
-    block.buffer = umockdev_ioctl_data_resolve(block.urb, offsetof(usbdevfs_urb, buffer), static_cast<gsize>(urb->buffer_length), nullptr);
+    block.buffer = umockdev_ioctl_data_resolve(block.urb, offsetof(usbdevfs_urb, buffer),
+                                               static_cast<gsize>(urb->buffer_length), nullptr);
   complete(call, 0);
   ++transfers;
   if (urb->type == USBDEVFS_URB_TYPE_CONTROL) return control(block);

@@ -29,13 +29,16 @@ MockHid::MockHid(UMockdevTestbed* testbed, const HidKind& kind) : testbed_(testb
   for (const std::uint8_t byte : kind.descriptor) hex += text("%02X", byte);
   // The kernel's chain: device, its interface, the HID layer's device, the node.
   std::string all = "P: " + usb + "\nE: DEVTYPE=usb_device\nE: SUBSYSTEM=usb\n";
-  all += text("A: idVendor=%04x\\n\nA: idProduct=%04x\\n\nA: product=%s\\n\nA: bcdDevice=0100\\n\n\n", kind.vendor, kind.model, kind.name.c_str());
+  all += text("A: idVendor=%04x\\n\nA: idProduct=%04x\\n\nA: product=%s\\n\nA: bcdDevice=0100\\n\n\n", kind.vendor,
+              kind.model, kind.name.c_str());
   all += "P: " + interface + "\nE: DEVTYPE=usb_interface\nE: SUBSYSTEM=usb\nA: bInterfaceNumber=00\\n\n\n";
   all += "P: " + interface + "/" + id + "\nE: SUBSYSTEM=hid\n";
   all += text("E: HID_ID=0003:%08X:%08X\nE: HID_NAME=%s\nE: HID_UNIQ=\n", kind.vendor, kind.model, kind.name.c_str());
   all += "H: report_descriptor=" + hex + "\n\n";
   all += "P: " + interface + "/" + id + text("/hidraw/hidraw%d\nN: hidraw%d\n", kind.node, kind.node);
-  all += text("E: SUBSYSTEM=hidraw\nE: DEVNAME=/dev/hidraw%d\nE: MAJOR=244\nE: MINOR=%d\nL: device=../../../", kind.node, kind.node) + id + "\n\n";
+  all += text("E: SUBSYSTEM=hidraw\nE: DEVNAME=/dev/hidraw%d\nE: MAJOR=244\nE: MINOR=%d\nL: device=../../../",
+              kind.node, kind.node) +
+         id + "\n\n";
   usb_path_ = "/sys" + usb;
   GError* error = nullptr;
   if (!umockdev_testbed_add_from_string(testbed, all.c_str(), &error)) {

@@ -44,7 +44,8 @@ std::recursive_mutex& node_lock() {
   return mutex;
 }
 
-MockNode::MockNode(UMockdevTestbed* testbed, const std::string& path) : testbed_(testbed), path_(path), base_(umockdev_ioctl_base_new()) {
+MockNode::MockNode(UMockdevTestbed* testbed, const std::string& path)
+    : testbed_(testbed), path_(path), base_(umockdev_ioctl_base_new()) {
   nodes().insert(this);
   char name[128];
   termios raw{};
@@ -79,7 +80,8 @@ MockNode::~MockNode() {
     complete(call, -1, ENODEV);
     return TRUE;
   };
-  for (const char* signal : {"handle-ioctl", "handle-read", "handle-write"}) g_signal_connect(base_, signal, G_CALLBACK(gone), nullptr);
+  for (const char* signal : {"handle-ioctl", "handle-read", "handle-write"})
+    g_signal_connect(base_, signal, G_CALLBACK(gone), nullptr);
   // The handler stays as long as clients use it: it is left to the process' end.
   close(master_);
   close(slave_);

@@ -112,8 +112,9 @@ class Host {
     if (what == "told") {
       const FalconModel::Told& told = model.told();
       std::ostringstream out;
-      out << told.frames << ' ' << told.bad_frames << ' ' << told.with_force << ' ' << told.motors[0] << ' ' << told.motors[1] << ' '
-          << told.motors[2] << ' ' << told.control << ' ' << told.image_bytes << ' ' << falcon_->transfers;
+      out << told.frames << ' ' << told.bad_frames << ' ' << told.with_force << ' ' << told.motors[0] << ' '
+          << told.motors[1] << ' ' << told.motors[2] << ' ' << told.control << ' ' << told.image_bytes << ' '
+          << falcon_->transfers;
       return out.str();
     }
     if (what == "power-cut") {

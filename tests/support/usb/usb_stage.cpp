@@ -72,8 +72,8 @@ std::string UsbStage::command(const std::string& line) {
 UsbStage::Told UsbStage::falcon_told() {
   Told told;
   std::istringstream words(command("falcon told"));
-  words >> told.frames >> told.bad_frames >> told.with_force >> told.motors[0] >> told.motors[1] >> told.motors[2] >> told.control >>
-      told.image_bytes >> told.transfers;
+  words >> told.frames >> told.bad_frames >> told.with_force >> told.motors[0] >> told.motors[1] >> told.motors[2] >>
+      told.control >> told.image_bytes >> told.transfers;
   return told;
 }
 
@@ -85,6 +85,8 @@ void UsbStage::report(const std::string& device, const std::vector<std::uint8_t>
 }
 
 void write_running_image(const std::filesystem::path& file, std::size_t size) { write_image(file, kRunningImage, size); }
-void write_other_image(const std::filesystem::path& file, std::size_t size) { write_image(file, "another device's firmware", size); }
+void write_other_image(const std::filesystem::path& file, std::size_t size) {
+  write_image(file, "another device's firmware", size);
+}
 
 }  // namespace osteon::test

@@ -36,7 +36,9 @@ TEST(FalconFrames, ThereAndBack) {
   std::mt19937 random(3);
   for (int i = 0; i < 10000; ++i) {
     const auto number = [&] { return static_cast<std::int16_t>(random()); };
-    const FalconState state{{number(), number(), number()}, static_cast<std::uint8_t>(random() & 15), static_cast<std::uint8_t>(random() & 7)};
+    const FalconState state{{number(), number(), number()},
+                            static_cast<std::uint8_t>(random() & 15),
+                            static_cast<std::uint8_t>(random() & 7)};
     const auto back = decode_state(encode(state));
     ASSERT_TRUE(back);
     EXPECT_EQ(back->encoders, state.encoders);

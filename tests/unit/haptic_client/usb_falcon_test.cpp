@@ -33,7 +33,9 @@ class FalconOnUsb : public testing::Test {
  protected:
   FalconOnUsb() : image_(folder_ / "falcon.bin") { test::write_running_image(image_, kImageBytes); }
 
-  std::unique_ptr<HapticDevice> device(const std::filesystem::path& image) { return make_falcon({.firmware = image, .priority = 0}); }
+  std::unique_ptr<HapticDevice> device(const std::filesystem::path& image) {
+    return make_falcon({.firmware = image, .priority = 0});
+  }
   AssertionResult opens(HapticDevice& falcon) {
     const Result<void> opened = falcon.open();
     return opened ? AssertionSuccess() : AssertionFailure() << opened.error().message;
@@ -91,7 +93,9 @@ TEST_F(FalconOnUsb, LoadsItsFirmwareHomesAndReadsPlaces) {
   EXPECT_LT((place - Vec3(0.0, 0.0, -30.0)).norm(), 0.1) << place.transpose();  // 120 mm, seen from the middle at 150 mm
 
   hold_at({0.02, 0.01, 0.12});
-  EXPECT_TRUE(reads(*falcon, [](const DeviceReading& r) { return (r.pose_device_tool.position_mm - Vec3(20.0, 10.0, -30.0)).norm() < 0.1; }));
+  EXPECT_TRUE(reads(*falcon, [](const DeviceReading& r) {
+    return (r.pose_device_tool.position_mm - Vec3(20.0, 10.0, -30.0)).norm() < 0.1;
+  }));
   usb_.command("falcon buttons 4");
   EXPECT_TRUE(reads(*falcon, [](const DeviceReading& r) { return r.buttons == kSpindlePedal; }));
   usb_.command("falcon buttons 9");

@@ -45,9 +45,10 @@ TEST_F(HidOnUsb, NothingIsThere) {
 }
 
 TEST_F(HidOnUsb, EveryKnownSpaceMouseIsFound) {
-  const char* const kIds[] = {"046d c603", "046d c605", "046d c606", "046d c621", "046d c623", "046d c625", "046d c626", "046d c627",
-                              "046d c628", "046d c629", "046d c62b", "046d c640", "256f c62e", "256f c62f", "256f c631", "256f c632",
-                              "256f c633", "256f c635", "256f c636", "256f c638", "256f c63a", "256f c652"};
+  const char* const kIds[] = {"046d c603", "046d c605", "046d c606", "046d c621", "046d c623", "046d c625",
+                              "046d c626", "046d c627", "046d c628", "046d c629", "046d c62b", "046d c640",
+                              "256f c62e", "256f c62f", "256f c631", "256f c632", "256f c633", "256f c635",
+                              "256f c636", "256f c638", "256f c63a", "256f c652"};
   int round = 0;
   for (const char* id : kIds) {
     ASSERT_EQ(usb_.command(std::string("plug spacemouse ") + id), "ok");
@@ -74,7 +75,9 @@ TEST_F(HidOnUsb, ASpaceMouseMovesAndTurnsAToolAndLightsUp) {
   usb_.report("spacemouse", {1, 0x5e, 0x01, 0, 0, 0, 0});  // all the way to the right
   EXPECT_TRUE(reads(*mouse, [](const DeviceReading& r) { return r.pose_device_tool.position_mm.x() > 5.0; }));
   usb_.report("spacemouse", {1, 0, 0, 0, 0, 0, 0, 0x5e, 0x01, 0, 0, 0, 0});  // about its x
-  EXPECT_TRUE(reads(*mouse, [&](const DeviceReading& r) { return r.pose_device_tool.rotation.angularDistance(start.rotation) > 0.05; }));
+  EXPECT_TRUE(reads(*mouse, [&](const DeviceReading& r) {
+    return r.pose_device_tool.rotation.angularDistance(start.rotation) > 0.05;
+  }));
   usb_.report("spacemouse", {1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0});
   usb_.report("spacemouse", {3, 1, 0});
   ASSERT_TRUE(reads(*mouse, [](const DeviceReading& r) { return r.buttons == kSpindlePedal; }));

@@ -24,7 +24,8 @@ constexpr auto kPatience = 20s;
 class Together : public testing::Test {
  protected:
   void SetUp() override {
-    for (const char* device : {"falcon loaded", "spacemouse", "switch"}) ASSERT_EQ(usb_.command(std::string("plug ") + device), "ok");
+    for (const char* device : {"falcon loaded", "spacemouse", "switch"})
+      ASSERT_EQ(usb_.command(std::string("plug ") + device), "ok");
     Result<std::unique_ptr<CombinedDevice>> made = make_devices("falcon+spacemouse+pedal", {});
     ASSERT_TRUE(made) << made.error().message;
     device_ = std::move(*made);
@@ -105,7 +106,8 @@ TEST_F(Together, WhateverIsUnpluggedComesBackByItself) {
 TEST_F(Together, AllAreListed) {
   int found = 0;
   for (const DeviceLine& line : look_for_devices({})) {
-    if (line.name == "falcon" || line.name == "spacemouse" || line.name == "pedal") found += static_cast<int>(line.finding.found.size());
+    if (line.name == "falcon" || line.name == "spacemouse" || line.name == "pedal")
+      found += static_cast<int>(line.finding.found.size());
   }
   EXPECT_EQ(found, 3);
 }

@@ -54,7 +54,8 @@ TEST(SpaceMouseReport, ButtonsOfAnyWidthAndBattery) {
 TEST(SpaceMouseReport, ShortAndForeignReportsChangeNothing) {
   SpaceMouseState state;
   ASSERT_TRUE(take_report(state, kRight));
-  for (const Report& report : {Report{}, Report{1}, Report{1, 0, 0, 0, 0, 0}, Report{2, 1, 1, 1}, Report{3}, Report{0x17}, Report{0x17, 200}, Report{9, 1, 2, 3}}) {
+  for (const Report& report : {Report{}, Report{1}, Report{1, 0, 0, 0, 0, 0}, Report{2, 1, 1, 1}, Report{3},
+                               Report{0x17}, Report{0x17, 200}, Report{9, 1, 2, 3}}) {
     EXPECT_FALSE(take_report(state, report));
   }
   EXPECT_EQ(state.push, Vec3(1, 0, 0));
