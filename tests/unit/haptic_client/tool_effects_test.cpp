@@ -1,0 +1,200 @@
+// What tools do to the hand beyond their law, in the whole loop: clogged flutes, the grab at breakthrough, a saw that
+// binds; and that a tool resists by the law that is chosen for it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "haptic_client/control/haptic_loop.hpp"
+#include "haptic_client/control/patch_builder.hpp"
+#include "haptic_client/control/replica.hpp"
+#include "haptic_client/control/session.hpp"
+#include "tests/support/scenes/bones.hpp"
+
+namespace osteon::haptic::test {
+namespace {
+
+// A slab from z = 0 to `deep_mm`, wide enough for the tool.
+Case slab(double deep_mm, double density_g_cm3, double pitch_mm = 0.5, double width_mm = 16.0) {
+  const double half = 0.5 * width_mm;
+  const auto surface = [=](const Vec3& p) {
+    return std::max({-p.z(), p.z() - deep_mm, std::abs(p.x()) - half, std::abs(p.y()) - half});
+  };
+  return osteon::test::make_bone({Vec3(-half - 3, -half - 3, -3), Vec3(half + 3, half + 3, deep_mm + 3)}, pitch_mm, surface,
+                                 [=](const Vec3&) { return density_g_cm3; });
+}
+
+// A machine holds the handle exactly where it is told, over the tool's axis.
+class Rig {
+ public:
+  Rig(Case bone, const Tool& tool, const LoopParams& params = {}, const char* law = nullptr, double wear = 1.0)
+      : replica_(std::move(bone), BodyId{}, box_with(tool)),
+        loop_(params, models(tool, replica_.predicted().bone().pitch_mm(), law, wear)) {
+    input_.pose_device_tool.position_mm = {0, 0, -0.5};
+    input_.spindle_rpm = tool.spindle_rpm;
+    loop_.take_up(0, input_.pose_device_tool, WorkspaceMapping{});
+    build(input_.pose_device_tool);
+    move({}, 0.5);
+  }
+  LoopReport tick() {
+    const LoopReport report = loop_.tick(input_, patch_);
+    CutPiece piece;
+    while (loop_.take_piece(piece)) {
+      const Cut cut = cut_of(piece, loop_.tool(0), AuthorId{1}, 0);
+      replica_.add_own(cut);
+      replica_.commit(RoomSeq{++seq_}, cut, true);
+    }
+    if (++ticks_ % 12 == 0) build(report.pose_bone_proxy);
+    return report;
+  }
+  std::vector<LoopReport> move(const Vec3& by_mm, double seconds) {
+    const Vec3 from = input_.pose_device_tool.position_mm;
+    const int ticks = static_cast<int>(1000 * seconds);
+    std::vector<LoopReport> reports;
+    for (int i = 1; i <= ticks; ++i) {
+      input_.pose_device_tool.position_mm = from + by_mm * i / ticks;
+      reports.push_back(tick());
+    }
+    return reports;
+  }
+  [[nodiscard]] HapticLoop& loop() { return loop_; }
+
+ private:
+  static std::vector<ToolModel> models(const Tool& tool, double pitch_mm, const char* law, double wear) {
+    std::vector<ToolModel> made;
+    made.emplace_back(tool, pitch_mm, wear);
+    if (law) made.back().law = find_force_law(law);
+    return made;
+  }
+  static std::shared_ptr<const ToolBox> box_with(const Tool& tool) {
+    auto box = std::make_shared<ToolBox>();
+    box->add(tool);
+    return box;
+  }
+  void build(const Pose& pose) {
+    for (const ChangedLeaves& change : replica_.take_changes())
+      builder_.changed(replica_.predicted().bone().pitch_mm(), change.level, change.origins);
+    builder_.build(replica_.predicted(), loop_.tool(0), pose, patch_);
+    patch_.own_cuts = replica_.last_own();
+  }
+  Replica replica_;
+  HapticLoop loop_;
+  PatchBuilder builder_;
+  Patch patch_;
+  LoopInput input_;
+  std::int64_t ticks_ = 0;
+  std::uint64_t seq_ = 0;
+};
+
+// Mean of what was cut between two depths of the tip.
+struct Mean {
+  double force_n = 0, torque_nmm = 0;
+  int ticks = 0;
+};
+Mean between(const std::vector<LoopReport>& reports, double low_mm, double high_mm) {
+  Mean mean;
+  for (const LoopReport& r : reports) {
+    const double z = r.pose_bone_proxy.position_mm.z();
+    if (r.phase != CuttingPhase::cutting || z < low_mm || z > high_mm) continue;
+    mean.force_n += r.cutting_force_n.norm();
+    mean.torque_nmm += r.torque_nmm;
+    ++mean.ticks;
+  }
+  if (mean.ticks > 0) {
+    mean.force_n /= mean.ticks;
+    mean.torque_nmm /= mean.ticks;
+  }
+  return mean;
+}
+
+// A feed of 1 mm/s at 1000 rpm into cortical bone, whatever the law: its own point of comparison.
+TEST(ToolEffects, AToolResistsByTheLawThatIsChosen) {
+  const Tool drill = *find_tool("drill-3.2");
+  LoopParams params;
+  params.peak_n = 200.0;
+  const struct { const char* law; double newtons; } kLaws[] = {
+      {nullptr, 28.9}, {"chi", 28.9}, {"allotta", 53.5}, {"spring-damper", 29.0}, {"multi-point", 28.9}};
+  for (const auto& chosen : kLaws) {
+    Rig rig(slab(12.0, 1.9), drill, params, chosen.law);
+    // The coupling's stretch settles within some force / K_c / feed, a second.
+    const Mean mean = between(rig.move({0, 0, 9.0}, 9.0), 5.0, 7.0);
+    ASSERT_GT(mean.ticks, 500) << (chosen.law ? chosen.law : "default");
+    // The spindle droops by some percent under the load.
+    EXPECT_NEAR(mean.force_n, chosen.newtons, 0.05 * chosen.newtons) << (chosen.law ? chosen.law : "default");
+  }
+}
+
+// 15 mm of cortical bone are ten diameters of a 1.5 mm drill: torque and thrust rise, and withdrawal clears it.
+TEST(ToolEffects, ADeepHoleClogsTheDrillUntilItIsDrawnBack) {
+  Tool thin = *find_tool("drill-3.2");
+  thin.diameter_mm = 1.5;
+  thin.shank_diameter_mm = 1.5;
+  Rig rig(slab(16.0, 1.9), thin);
+  const auto first = rig.move({0, 0, 13.0}, 13.0);
+  const Mean shallow = between(first, 2.0, 6.0), deep = between(first, 11.5, 12.4);
+  ASSERT_GT(deep.ticks, 200);
+  // At 12 mm the flutes are full to 0.8: 1 + 5 (0.8 - 0.5)/0.5 = 4 times the torque of the thrust, which is 1.3 times.
+  EXPECT_NEAR(deep.force_n / shallow.force_n, 1.3, 0.06);
+  EXPECT_NEAR(deep.torque_nmm / shallow.torque_nmm, 1.3 * 4.0, 0.5);
+  rig.move({0, 0, -6.0}, 0.6);
+  rig.move({0, 0, 5.9}, 0.6);
+  const Mean cleared = between(rig.move({0, 0, 1.5}, 1.5), 12.6, 13.5);
+  ASSERT_GT(cleared.ticks, 200);
+  EXPECT_NEAR(cleared.torque_nmm / shallow.torque_nmm, 1.0, 0.06);
+}
+
+// The motor's port pulls a drill forward while its rim is left, no longer, and not on the way in.
+TEST(ToolEffects, ADrillGrabsWhenItBreaksThrough) {
+  const Tool drill = *find_tool("drill-3.2");
+  Rig rig(slab(4.0, 1.9), drill);
+  double in_mm = 1e9, out_mm = -1e9, largest = 0.0;
+  for (const LoopReport& r : rig.move({0, 0, 7.5}, 7.5)) {
+    // Trembling has no mean and is small beside a pull that lasts.
+    const double pull = r.motor_device_n.z();
+    if (pull < 2.0) continue;
+    in_mm = std::min(in_mm, r.pose_bone_proxy.position_mm.z());
+    out_mm = std::max(out_mm, r.pose_bone_proxy.position_mm.z());
+    largest = std::max(largest, pull);
+  }
+  EXPECT_GT(largest, 2.0);
+  EXPECT_LE(largest, 0.3 * 30.0);  // friction times the normal force
+  // From the point's coming out to the cone's end, 0.96 mm further.
+  EXPECT_GT(in_mm, 3.9);
+  EXPECT_LT(out_mm, 5.2);
+}
+
+// A blade pressed on the side of its kerf jams, and goes on when the hand lets it straighten.
+TEST(ToolEffects, ASawThatIsPressedAsideBinds) {
+  const Tool saw = *find_tool("saw-oscillating-2");
+  Rig rig(slab(12.0, 0.6, 0.5, 30.0), saw);
+  rig.move({0, 0, 4.0}, 2.0);
+  const auto cutting = rig.move({0, 0, 1.0}, 0.5);
+  const auto feed = [](const std::vector<LoopReport>& reports) {
+    double way = 0.0;
+    for (const LoopReport& r : reports) way += r.moved_mm.z();
+    return way;
+  };
+  EXPECT_GT(feed(cutting), 0.5);
+  // 0.9 mm aside at 50 N/mm: 45 N on the wall.
+  rig.move({0, 0.9, 0}, 0.2);
+  EXPECT_LT(feed(rig.move({0, 0, 0.5}, 0.5)), 0.1);
+  rig.move({0, -0.9, 0}, 0.2);
+  EXPECT_GT(feed(rig.move({0, 0, 0.5}, 0.5)), 0.3);
+}
+
+// With the effects off, a tool is as its law says.
+TEST(ToolEffects, CanBeSwitchedOff) {
+  Tool thin = *find_tool("drill-3.2");
+  thin.diameter_mm = 1.5;
+  thin.shank_diameter_mm = 1.5;
+  LoopParams params;
+  params.tool_effects = false;
+  Rig rig(slab(16.0, 1.9), thin, params);
+  const auto reports = rig.move({0, 0, 13.0}, 13.0);
+  EXPECT_NEAR(between(reports, 11.5, 12.4).torque_nmm / between(reports, 2.0, 6.0).torque_nmm, 1.0, 0.03);
+}
+
+}  // namespace
+}  // namespace osteon::haptic::test
