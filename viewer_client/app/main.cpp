@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "common/input/space_mouse.hpp"
 #include "common/runtime/command_line.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
@@ -36,11 +37,13 @@ constexpr const char* kScriptHelp =
     "  screenshot FILE.png\n"
     "  status FILE.json                      blocks, triangles, hash and times so far\n"
     "  quit                                  as does the script's end\n"
-    "Mouse: left turns, middle or shift-left shifts, right or wheel goes nearer. Keys: O overview, T tool, Q quit.";
+    "Mouse: left turns, middle or shift-left shifts, right or wheel goes nearer. Keys: O overview, T tool, Q quit.\n"
+    "SpaceMouse (--spacemouse): the bone follows the cap; first button overview, second tool.";
 
 struct Arguments {
   std::string server, size = "1280x720", script, screenshot, frame_log, summary;
   double patience_s = 5.0;
+  bool space_mouse = false;
 };
 
 Result<WindowOptions> window_options(const std::string& size) {
@@ -107,6 +110,11 @@ Result<void> run(const Arguments& arguments) {
         request);
   };
   options.looked = [&watch = **watch, seen_from](const CameraView& view) { watch.look(seen_from(view)); };
+  std::optional<SpaceMouseWatch> cap;
+  if (arguments.space_mouse) {
+    cap.emplace([](const std::string& sentence) { log::info(sentence); });
+    options.cap = [&cap] { return cap->cap(); };
+  }
   options.answers = !arguments.script.empty();
   options.stop_at_error = scripted && arguments.script != "-";
   auto viewer = Viewer::make(options, **window, inbox, std::move(script));
@@ -148,6 +156,7 @@ int main(int argc, char** argv) {
   app.add_option("--screenshot", arguments.screenshot,
                  "Without a script: wait for the surface, save the whole bone as PNG, exit. With one: save the last "
                  "picture");
+  app.add_flag("--spacemouse", arguments.space_mouse, "A SpaceMouse moves the camera, whenever one is plugged in");
   app.add_option("--frame-log", arguments.frame_log, "CSV: when each event's surface came in and was drawn");
   app.add_option("--summary", arguments.summary, "JSON written at the end: blocks, triangles, hash, times");
   app.add_option("--patience", arguments.patience_s, "Seconds to wait for the server")

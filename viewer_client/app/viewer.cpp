@@ -60,11 +60,29 @@ Result<Viewer::State> Viewer::turn(bool interrupted) {
   if (events.wants_overview) dirty_ = obey(LookAtWhole{}).has_value();
   if (events.wants_tool && !states_.empty()) dirty_ = obey(LookAtTool{kToolKeyDistance_mm}).has_value();
 
+  if (options_.cap) follow_cap();
   receive();
   draw_if_due(false);
   const auto state = obey_script();
   if (options_.looked) options_.looked(window_->camera());
   return state;
+}
+
+void Viewer::follow_cap() {
+  constexpr double kRest = 0.05, kLongestTurn_s = 0.1;
+  constexpr std::uint32_t kWhole = 1, kTool = 2;
+  const auto now = Clock::now();
+  const double dt_s = std::min(kLongestTurn_s, std::chrono::duration<double>(now - capped_).count());
+  capped_ = now;
+  const SpaceMouseState cap = options_.cap();
+  const std::uint32_t pressed = cap.buttons & ~cap_buttons_;
+  cap_buttons_ = cap.buttons;
+  if (pressed & kWhole) dirty_ = obey(LookAtWhole{}).has_value();
+  if ((pressed & kTool) && !states_.empty()) dirty_ = obey(LookAtTool{kToolKeyDistance_mm}).has_value();
+  const Vec3 push = beyond_rest(cap.push, kRest), twist = beyond_rest(cap.twist, kRest);
+  if (push.isZero() && twist.isZero()) return;
+  window_->look(held_by_cap(window_->camera(), push, twist, dt_s));
+  dirty_ = true;
 }
 
 void Viewer::receive() {

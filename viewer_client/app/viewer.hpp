@@ -11,6 +11,7 @@
 
 #include "common/core/result.hpp"
 #include "common/geometry/lattice.hpp"
+#include "common/input/space_mouse_report.hpp"
 #include "common/runtime/tick_stats.hpp"
 #include "viewer_client/app/script.hpp"
 #include "viewer_client/render/window.hpp"
@@ -25,6 +26,7 @@ struct ViewerOptions {
   bool answers = false;             // say ok or error on standard output after each command
   bool stop_at_error = false;       // a command that fails ends the run
   std::function<void(const CameraView&)> looked;  // hears after every turn where the window looks
+  std::function<SpaceMouseState()> cap;           // moves the camera; its first button shows the whole, its second the tool
   // Asks the room and waits for its answer: the place of the event.
   std::function<Result<RoomSeq>(const RoomRequest&)> ask;
 };
@@ -48,6 +50,7 @@ class Viewer {
   Viewer(const ViewerOptions& options, BoneWindow& window, Inbox& inbox, std::optional<ScriptReader> script);
 
   void receive();
+  void follow_cap();
   void rebuild();
   void draw_if_due(bool at_once);
   void draw_now();
@@ -63,6 +66,8 @@ class Viewer {
   Inbox* inbox_;
   std::optional<ScriptReader> script_;
   std::ofstream frame_log_;
+  std::chrono::steady_clock::time_point capped_;  // when the cap was last asked
+  std::uint32_t cap_buttons_ = 0;
 
   SurfaceScene scene_;
   std::vector<CuttingState> states_;

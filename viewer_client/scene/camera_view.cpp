@@ -45,4 +45,25 @@ CameraView beside_tool(const Pose& pose_bone_tool, double distance_mm) {
   return view;
 }
 
+CameraView held_by_cap(const CameraView& view, const Vec3& push, const Vec3& twist, double dt_s) {
+  constexpr double kDistancesPerSecond = 0.5, kNearerPerSecond = 0.8, kRadPerSecond = 1.2;  // [A]
+  const Vec3 back = view.eye_mm - view.target_mm;
+  const double distance_mm = back.norm();
+  if (!(distance_mm > 0.0)) return view;
+  Eigen::Matrix3d seen;  // columns: right, up and to the eye, in the bone's frame
+  seen.col(2) = back / distance_mm;
+  seen.col(1) = across(view.up, seen.col(2), across(Vec3::UnitZ(), seen.col(2), Vec3::UnitX()));
+  seen.col(0) = seen.col(1).cross(seen.col(2));
+
+  CameraView moved = view;
+  const double angle = kRadPerSecond * dt_s * twist.norm();
+  const Eigen::AngleAxisd turn(-angle, angle > 0.0 ? Vec3(seen * twist.normalized()) : Vec3(Vec3::UnitX()));
+  const Vec3 aside = -kDistancesPerSecond * dt_s * distance_mm * (seen * Vec3(push.x(), push.y(), 0.0));
+  const double nearer = std::exp(-kNearerPerSecond * dt_s * push.z());
+  moved.target_mm = view.target_mm + aside;
+  moved.eye_mm = moved.target_mm + turn * (nearer * back);
+  moved.up = turn * Vec3(seen.col(1));
+  return moved;
+}
+
 }  // namespace osteon

@@ -23,4 +23,8 @@ struct CameraView {
 // hole.
 [[nodiscard]] CameraView beside_tool(const Pose& pose_bone_tool, double distance_mm);
 
+// The view after the bone was held for a while by a cap that is pushed and twisted, parts of the whole way −1 … 1 in what one
+// sees: x right, y up, z to the eye. The bone follows the cap, so the camera goes the other way; the nearer, the slower.
+[[nodiscard]] CameraView held_by_cap(const CameraView& view, const Vec3& push, const Vec3& twist, double dt_s);
+
 }  // namespace osteon

@@ -182,6 +182,44 @@ TEST(CameraView, BesideToolSeesTheTipFromBehindTheTool) {
   }
 }
 
+// A point as it is seen: right, up and towards the eye from where the camera looks.
+Vec3 seen(const CameraView& view, const Vec3& point) {
+  const Vec3 back = (view.eye_mm - view.target_mm).normalized();
+  const Vec3 up = (view.up - view.up.dot(back) * back).normalized();
+  const Vec3 off = point - view.target_mm;
+  return {off.dot(up.cross(back)), off.dot(up), off.dot(back)};
+}
+
+TEST(CameraView, TheBoneFollowsTheCap) {
+  const CameraView before{Vec3(30.0, -200.0, 80.0), Vec3(5.0, 10.0, -20.0), Vec3(0.1, 0.2, 1.0), 0.5};
+  const Vec3 point(12.0, 40.0, -3.0), twist = Vec3(0.3, -0.8, 0.5).normalized();
+  const double distance_mm = (before.eye_mm - before.target_mm).norm();
+
+  // A twist turns what one sees about the middle of the picture, right-handed about the cap's own axis.
+  const CameraView turned = held_by_cap(before, Vec3::Zero(), twist, 0.25);
+  const double angle =
+      Eigen::Quaterniond::FromTwoVectors(seen(before, point).cross(twist), seen(turned, point).cross(twist))
+          .angularDistance(Eigen::Quaterniond::Identity());
+  EXPECT_GT(angle, 0.1);
+  EXPECT_LT((seen(turned, point) - Eigen::AngleAxisd(angle, twist) * seen(before, point)).norm(), 1e-9);
+  EXPECT_EQ(turned.target_mm, before.target_mm);
+  // Twice the time is twice the turn.
+  const CameraView further = held_by_cap(before, Vec3::Zero(), twist, 0.5);
+  EXPECT_LT((seen(further, point) - Eigen::AngleAxisd(2.0 * angle, twist) * seen(before, point)).norm(), 1e-9);
+
+  // A push aside shifts it that way; one to the user brings it nearer.
+  const Vec3 shifted = seen(held_by_cap(before, Vec3(1.0, -0.5, 0.0), Vec3::Zero(), 0.1), point) - seen(before, point);
+  EXPECT_GT(shifted.x(), 1.0);
+  EXPECT_NEAR(shifted.y(), -0.5 * shifted.x(), 1e-9);
+  EXPECT_NEAR(shifted.z(), 0.0, 1e-9);
+  const CameraView nearer = held_by_cap(before, Vec3::UnitZ(), Vec3::Zero(), 0.1);
+  EXPECT_LT((nearer.eye_mm - nearer.target_mm).norm(), 0.95 * distance_mm);
+  EXPECT_LT((seen(nearer, point) - seen(before, point)).norm(), 1e-9);
+
+  const CameraView still = held_by_cap(before, Vec3::Zero(), Vec3::Zero(), 1.0);
+  EXPECT_LT((still.eye_mm - before.eye_mm).norm() + (seen(still, point) - seen(before, point)).norm(), 1e-9);
+}
+
 class ToolMeshes : public testing::TestWithParam<Tool> {};
 
 // Drills and round burs are drawn with flutes, every other tool as it is.
