@@ -197,11 +197,13 @@ ContactSet contact_set(std::vector<ContactPoint>& active, std::vector<ContactPoi
 
 void ContactValues::make_room(int points) {
   const auto padded = static_cast<std::size_t>((points + kGroupPoints - 1) / kGroupPoints * kGroupPoints);
-  for (std::vector<float>* values : {&distance_mm, &gx, &gy, &gz, &density_g_cm3}) values->resize(std::max(values->size(), padded));
+  for (std::vector<float>* values : {&distance_mm, &gx, &gy, &gz, &density_g_cm3})
+    values->resize(std::max(values->size(), padded));
   nearest_mm.resize(std::max(nearest_mm.size(), padded / kGroupPoints));
 }
 
-ContactSums evaluate_contact(const Patch& patch, const ContactSet& set, const ContactQuery& query, ContactValues& values) noexcept {
+ContactSums evaluate_contact(const Patch& patch, const ContactSet& set, const ContactQuery& query,
+                             ContactValues& values) noexcept {
   Totals totals;
   Task task{};
   task.first_group = query.first_group;
@@ -209,7 +211,8 @@ ContactSums evaluate_contact(const Patch& patch, const ContactSet& set, const Co
   OSTEON_CHECK(task.first_group >= 0 && task.last_group <= set.groups() && values.nearest_mm.size() >= set.balls.size());
   values.covered = true;
   // Floats count from a corner near the tool, so that they are exact to a hundred-thousandth of a millimetre.
-  const Vec3 origin_mm = patch.fine.pitch_mm() > 0.0 ? position_mm(kBrickCells * patch.fine.first(), patch.fine.pitch_mm()) : query.pose_bone_tool.position_mm;
+  const Vec3 origin_mm = patch.fine.pitch_mm() > 0.0 ? position_mm(kBrickCells * patch.fine.first(), patch.fine.pitch_mm())
+                                                     : query.pose_bone_tool.position_mm;
   const Eigen::Matrix3d rotation = query.pose_bone_tool.rotation.toRotationMatrix();
   const Vec3 at = query.pose_bone_tool.position_mm - origin_mm, toward = rotation.transpose() * query.direction_bone;
   for (int i = 0; i < 3; ++i) {
@@ -242,7 +245,15 @@ ContactSums evaluate_contact(const Patch& patch, const ContactSet& set, const Co
   }
   chosen_rows.load(std::memory_order_relaxed)->evaluate(set, task, values, totals);
   const double(&sum)[kTotals] = totals.sum;
-  return {sum[0], sum[1], sum[2], sum[3], sum[4], static_cast<double>(totals.nearest), sum[5], {sum[6], sum[7], sum[8]}, {sum[9], sum[10], sum[11]}};
+  return {sum[0],
+          sum[1],
+          sum[2],
+          sum[3],
+          sum[4],
+          static_cast<double>(totals.nearest),
+          sum[5],
+          {sum[6], sum[7], sum[8]},
+          {sum[9], sum[10], sum[11]}};
 }
 
 int limit_contact_lanes(int lanes) {

@@ -85,7 +85,8 @@ struct ContactSums {
 };
 
 // [haptic] Distance, gradient and, if asked for, density of the points; the sums too where `query.ahead` is set.
-ContactSums evaluate_contact(const Patch& patch, const ContactSet& set, const ContactQuery& query, ContactValues& values) noexcept;
+ContactSums evaluate_contact(const Patch& patch, const ContactSet& set, const ContactQuery& query,
+                             ContactValues& values) noexcept;
 
 // For tests and benchmarks: at most so many points at a time from now on. Returns how many.
 int limit_contact_lanes(int lanes);

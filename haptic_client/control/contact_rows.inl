@@ -57,7 +57,8 @@ struct Cell {
 
 OSTEON_INLINE Cell cell_of(const GridPlace& grid, Row px, Row py, Row pz) {
   const float inverse = grid.inverse_pitch;
-  const Row x = px * inverse + splat(grid.shift[0]), y = py * inverse + splat(grid.shift[1]), z = pz * inverse + splat(grid.shift[2]);
+  const Row x = px * inverse + splat(grid.shift[0]), y = py * inverse + splat(grid.shift[1]),
+            z = pz * inverse + splat(grid.shift[2]);
   const RowInt cx = trunc_to_int(x), cy = trunc_to_int(y), cz = trunc_to_int(z);
   // The table begins one brick in, so that what lies just below it does not round up into it.
   const RowInt bx = (cx >> 3) - 1, by = (cy >> 3) - 1, bz = (cz >> 3) - 1;
@@ -121,8 +122,8 @@ struct RowSums {
   Row nearest;
 };
 
-OSTEON_INLINE void add_up(const ContactSet& set, const Task& task, std::size_t first, Row qx, Row qy, Row qz, Row facing, RowInt counts,
-                          Row distance, Row density, RowSums& sums) {
+OSTEON_INLINE void add_up(const ContactSet& set, const Task& task, std::size_t first, Row qx, Row qy, Row qz, Row facing,
+                          RowInt counts, Row distance, Row density, RowSums& sums) {
   const Row nothing{};
   const Row area = load(&set.area_mm2[first]), arm = load(&set.arm_mm[first]);
   const Row projected = counts ? area * facing : nothing;
@@ -180,7 +181,8 @@ static void evaluate(const ContactSet& set, const Task& task, ContactValues& val
         store(&values.gz[i], Row{});
         if (task.density) store(&values.density_g_cm3[i], Row{});
         if (!task.ahead) continue;
-        const Row facing = load(&set.nx[i]) * task.toward[0] + load(&set.ny[i]) * task.toward[1] + load(&set.nz[i]) * task.toward[2];
+        const Row facing =
+            load(&set.nx[i]) * task.toward[0] + load(&set.ny[i]) * task.toward[1] + load(&set.nz[i]) * task.toward[2];
         sums.area += facing >= task.least_facing ? load(&set.area_mm2[i]) * facing : Row{};
       }
       sums.nearest = low(sums.nearest, splat(far));
@@ -190,7 +192,8 @@ static void evaluate(const ContactSet& set, const Task& task, ContactValues& val
     Row least = splat(kLeftOut_mm);
     for (std::size_t i = from; i < from + kGroupPoints; i += kLanes) {
       const Row nx = load(&set.nx[i]), ny = load(&set.ny[i]), nz = load(&set.nz[i]);
-      const Row qx = load(&set.x[i]) + nx * task.lift, qy = load(&set.y[i]) + ny * task.lift, qz = load(&set.z[i]) + nz * task.lift;
+      const Row qx = load(&set.x[i]) + nx * task.lift, qy = load(&set.y[i]) + ny * task.lift,
+                qz = load(&set.z[i]) + nz * task.lift;
       Row px = ((qx * r[0] + qy * r[1]) + qz * r[2]) + splat(task.at[0]);
       Row py = ((qx * r[3] + qy * r[4]) + qz * r[5]) + splat(task.at[1]);
       Row pz = ((qx * r[6] + qy * r[7]) + qz * r[8]) + splat(task.at[2]);

@@ -22,8 +22,10 @@ double sampled_mm(const SampledDistance& mesh, const Vec3& p) noexcept {
   double value = 0.0;
   for (int corner = 0; corner < 8; ++corner) {
     const int i = corner >> 2, j = (corner >> 1) & 1, k = corner & 1;
-    const auto index = (static_cast<std::size_t>(base[0] + i) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(base[1] + j)) *
-                           static_cast<std::size_t>(size[2]) + static_cast<std::size_t>(base[2] + k);
+    const auto index =
+        (static_cast<std::size_t>(base[0] + i) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(base[1] + j)) *
+            static_cast<std::size_t>(size[2]) +
+        static_cast<std::size_t>(base[2] + k);
     value += mesh.values[index] * kQuantum_mm * (i ? t[0] : 1.0 - t[0]) * (j ? t[1] : 1.0 - t[1]) * (k ? t[2] : 1.0 - t[2]);
   }
   return value + pitch * std::sqrt(outside);
@@ -95,7 +97,8 @@ double CutShape::distance_mm(const Vec3& p, Vec3& out) const noexcept {
     if (to_dome > distance) distance = to_dome, normal = Vec3(r, 0.0, p.z() + radius_mm_) / (to_dome + radius_mm_);
   }
   out = normal;
-  if (turned) out = r > 0.0 ? Vec3(normal.x() * p.x() / r, normal.x() * p.y() / r, normal.z()) : Vec3(normal.x(), 0.0, normal.z());
+  if (turned)
+    out = r > 0.0 ? Vec3(normal.x() * p.x() / r, normal.x() * p.y() / r, normal.z()) : Vec3(normal.x(), 0.0, normal.z());
   return distance;
 }
 

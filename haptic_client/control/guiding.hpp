@@ -1,5 +1,5 @@
-// What stands on the bone, as the haptic loop feels it, and the openings of the guides among it: once a tool has entered an opening it stays there until
-// it is drawn out, and goes only where the opening lets it.
+// What stands on the bone, as the haptic loop feels it, and the openings of the guides among it: once a tool has entered an
+// opening it stays there until it is drawn out, and goes only where the opening lets it.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -30,7 +30,8 @@ class Guiding {
   // [haptic] Another tool is taken up.
   void release() noexcept { held_ = false; }
   // [haptic] Where an opening lets the tool go that is wanted there; nothing while it is in none.
-  [[nodiscard]] std::optional<GuidedPose> step(std::span<const PlacedGuide> guides, const Tool& tool, const Pose& wanted_bone_tool) noexcept;
+  [[nodiscard]] std::optional<GuidedPose> step(std::span<const PlacedGuide> guides, const Tool& tool,
+                                               const Pose& wanted_bone_tool) noexcept;
   [[nodiscard]] bool held() const noexcept { return held_; }
   // Of the guide that holds the tool, while one does.
   [[nodiscard]] std::uint32_t guide_id() const noexcept { return id_; }

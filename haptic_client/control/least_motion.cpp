@@ -28,7 +28,8 @@ Pose moved(const Pose& pose, const Motion& motion) noexcept {
   Pose result = pose;
   result.position_mm += motion.move_mm;
   const double angle = motion.turn_rad.norm();
-  if (angle > 0.0) result.rotation = (Eigen::Quaterniond(Eigen::AngleAxisd(angle, motion.turn_rad / angle)) * pose.rotation).normalized();
+  if (angle > 0.0)
+    result.rotation = (Eigen::Quaterniond(Eigen::AngleAxisd(angle, motion.turn_rad / angle)) * pose.rotation).normalized();
   return result;
 }
 

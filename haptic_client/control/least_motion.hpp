@@ -54,6 +54,7 @@ struct MotionLimits {
 // Least squares of move and arm · turn against the wanted motion, over the conditions that it breaks (Hildreth's dual
 // method, the worst condition first). `held`: some condition kept the motion from being the wanted one. Where conditions
 // contradict each other the result breaks some of them; the caller looks. Pure, no allocation.
-[[nodiscard]] Motion least_motion(const Motion& wanted, const Conditions& conditions, const MotionLimits& limits, bool& held) noexcept;
+[[nodiscard]] Motion least_motion(const Motion& wanted, const Conditions& conditions, const MotionLimits& limits,
+                                  bool& held) noexcept;
 
 }  // namespace osteon::haptic

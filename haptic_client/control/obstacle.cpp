@@ -23,12 +23,14 @@ SolidLattice::SolidLattice(const Tool& item) {
 }
 
 bool SolidLattice::near(const Vec3& point_mm, double radius_mm) const noexcept {
-  return (point_mm.array() >= box_.min_mm.array() - radius_mm).all() && (point_mm.array() <= box_.max_mm.array() + radius_mm).all();
+  return (point_mm.array() >= box_.min_mm.array() - radius_mm).all() &&
+         (point_mm.array() <= box_.max_mm.array() + radius_mm).all();
 }
 
 bool SolidLattice::sample(const Vec3& point_mm, double& distance_mm, Vec3& gradient) const noexcept {
   const Vec3 at = (point_mm - box_.min_mm) / pitch_mm_;
-  const Coord c{static_cast<std::int32_t>(std::floor(at.x())), static_cast<std::int32_t>(std::floor(at.y())), static_cast<std::int32_t>(std::floor(at.z()))};
+  const Coord c{static_cast<std::int32_t>(std::floor(at.x())), static_cast<std::int32_t>(std::floor(at.y())),
+                static_cast<std::int32_t>(std::floor(at.z()))};
   if (c.x < 0 || c.y < 0 || c.z < 0 || c.x + 1 >= dims_.x || c.y + 1 >= dims_.y || c.z + 1 >= dims_.z) return false;
   const Vec3 t = at - Vec3(c.x, c.y, c.z);
   const std::ptrdiff_t step_y = dims_.z, step_x = static_cast<std::ptrdiff_t>(dims_.y) * dims_.z;

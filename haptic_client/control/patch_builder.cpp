@@ -125,7 +125,8 @@ void PatchBuilder::build(std::span<const CutField* const> bodies, const ToolMode
   // The fine box ends a margin beyond the tip and reaches back as far as the sample limit allows.
   // A blade's plate runs in the kerf as its teeth do.
   const bool blade = model.feed == Feeding::in_plane;
-  const double fine_reach_mm = params_.fine_samples * model.fine_pitch_mm - 2.0 * params_.fine_margin_mm - (blade ? 0.0 : tool.diameter_mm);
+  const double fine_reach_mm =
+      params_.fine_samples * model.fine_pitch_mm - 2.0 * params_.fine_margin_mm - (blade ? 0.0 : tool.diameter_mm);
   const double back_mm = blade ? tool.reach_mm() : tool.cutting_length_mm;
   const Box fine_box = tool_box(model, pose, 0.0, -std::min(back_mm, std::max(1.0, fine_reach_mm)));
   fill(patch.fine, bricks_in(fine_box.grown(params_.fine_margin_mm), model.fine_pitch_mm), model.fine_pitch_mm,
@@ -146,7 +147,8 @@ void PatchBuilder::build(std::span<const CutField* const> bodies, const ToolMode
     clearance.cells = cells;
     clearance.cell_mm = kBrickCells * h;
     clearance.mm.clear();
-    for_each(cells, [&](Coord index) { clearance.mm.push_back(static_cast<float>(bone.clearance_mm(brick_centre_mm(index, h)))); });
+    for_each(cells,
+             [&](Coord index) { clearance.mm.push_back(static_cast<float>(bone.clearance_mm(brick_centre_mm(index, h)))); });
   }
   ++patch.version;
 }

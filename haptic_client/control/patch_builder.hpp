@@ -37,7 +37,8 @@ class PatchBuilder {
  private:
   using Store = std::unordered_map<Coord, std::shared_ptr<const Brick>, CoordHash>;
   enum class Quantity { solid, density };
-  std::shared_ptr<const Brick> brick(Store& store, std::span<const CutField* const> bodies, int level, Coord index, Quantity quantity);
+  std::shared_ptr<const Brick> brick(Store& store, std::span<const CutField* const> bodies, int level, Coord index,
+                                     Quantity quantity);
 
   PatchParams params_;
   int fine_level_ = -1;

@@ -156,9 +156,18 @@ void Proxy::look(const Tick& tick, const Pose& pose, Against against, Sight& sig
   if (first < groups) {
     ContactQuery query;
     query.pose_bone_tool = pose;
-    query.first_group = first;
-    query.groups = groups - first;
+    bool covered = true;
+    if (tick.lift_mm > 0.0 && first == 0) {
+      query.lift_mm = tick.lift_mm;
+      query.groups = set.active_groups;
+      evaluate_contact(tick.patch, set, query, values);
+      covered = values.covered;
+      query.lift_mm = 0.0;
+    }
+    query.first_group = tick.lift_mm > 0.0 ? set.active_groups : first;
+    query.groups = groups - query.first_group;
     evaluate_contact(tick.patch, set, query, values);
+    values.covered &= covered;
   }
   // What was cut since the patch was built is gone.
   const float near_mm = static_cast<float>(0.75 * model.fine_pitch_mm);
@@ -170,7 +179,9 @@ void Proxy::look(const Tick& tick, const Pose& pose, Against against, Sight& sig
         const auto at = static_cast<std::size_t>(i);
         float& distance = values.distance_mm[at];
         if (distance < near_mm && is_real(model, i)) {
-          const Vec3 p = pose.point(point_at(model, i).inset_mm);
+          const ContactPoint& point = point_at(model, i);
+          const Vec3 p =
+              pose.point(group < set.active_groups ? Vec3(point.inset_mm + tick.lift_mm * point.outward) : point.inset_mm);
           Vec3 out;
           for (int s = 0; s < sweep_count_; ++s) {
             const auto left = static_cast<float>(sweeps_[static_cast<std::size_t>(s)].left_mm(p, out));
@@ -222,7 +233,8 @@ void Proxy::see_scene(const Tick& tick, const Pose& pose, Against, Sight& sight)
           values.gy[at] = static_cast<float>(out.y());
           values.gz[at] = static_cast<float>(out.z());
           sight.hard[at] = 1;
-          values.nearest_mm[static_cast<std::size_t>(group)] = std::min(values.nearest_mm[static_cast<std::size_t>(group)], distance);
+          values.nearest_mm[static_cast<std::size_t>(group)] =
+              std::min(values.nearest_mm[static_cast<std::size_t>(group)], distance);
         }
       }
       if (within) break;
@@ -230,7 +242,8 @@ void Proxy::see_scene(const Tick& tick, const Pose& pose, Against, Sight& sight)
   }
 }
 
-void Proxy::add_conditions(const Tick& tick, const Sight& sight, const Pose& pose, const Motion& at, double reach_mm, bool broken_only) noexcept {
+void Proxy::add_conditions(const Tick& tick, const Sight& sight, const Pose& pose, const Motion& at, double reach_mm,
+                           bool broken_only) noexcept {
   const ToolModel& model = tick.model;
   const int groups = model.contact.groups();
   // How deep each may be: nowhere, or where it is already, a little on its way out.
@@ -246,7 +259,8 @@ void Proxy::add_conditions(const Tick& tick, const Sight& sight, const Pose& pos
   };
   const auto visit = [&](const auto& see) {
     for (int group = 0; group < groups; ++group) {
-      if (static_cast<double>(sight.values.nearest_mm[static_cast<std::size_t>(group)]) >= (broken_only ? 0.0 : reach_mm)) continue;
+      if (static_cast<double>(sight.values.nearest_mm[static_cast<std::size_t>(group)]) >= (broken_only ? 0.0 : reach_mm))
+        continue;
       for (int i = group * kGroupPoints; i < (group + 1) * kGroupPoints; ++i)
         if (is_real(model, i) && asked(i)) see(i);
     }
@@ -264,7 +278,8 @@ void Proxy::add_conditions(const Tick& tick, const Sight& sight, const Pose& pos
     condition.n = Vec3(sight.values.gx[p], sight.values.gy[p], sight.values.gz[p]);
     if (condition.n.norm() < kFlatField) condition.n = -pose.direction(point.outward);
     condition.m = pose.direction(point.inset_mm).cross(condition.n);
-    condition.least_mm = floor_mm(i) - static_cast<double>(sight.values.distance_mm[p]) + condition.n.dot(at.move_mm) + condition.m.dot(at.turn_rad);
+    condition.least_mm = floor_mm(i) - static_cast<double>(sight.values.distance_mm[p]) + condition.n.dot(at.move_mm) +
+                         condition.m.dot(at.turn_rad);
     conditions_->add(condition);
   });
 }
@@ -283,7 +298,8 @@ double Proxy::safe_part(const Tick& tick, const Motion& motion, Against against)
   return part;
 }
 
-Motion Proxy::allowed(const Tick& tick, const Motion& piece, Against against, const MotionLimits& limits, ProxyStep& report) noexcept {
+Motion Proxy::allowed(const Tick& tick, const Motion& piece, Against against, const MotionLimits& limits,
+                      ProxyStep& report) noexcept {
   constexpr int kMostTries = 7, kMostSolved = 4;
   const double most_mm = 1.5 * norm_mm(piece, limits.arm_mm) + 1e-3;
   bool held = false;
@@ -321,8 +337,15 @@ void Proxy::travel(const Tick& tick, const Pose& wanted, const Vec3* across, boo
     if (!move_too) left.move_mm.setZero();
     if (across) left.move_mm -= left.move_mm.dot(*across) * *across;
     if (norm_mm(left, limits.arm_mm) < kNothing_mm) return;
-    const double part = safe_part(tick, left, Against::all);
-    const Motion done = allowed(tick, part * left, Against::all, limits, report);
+    // First what is left of it once all that is near has had its say, so that what is pressed in does not slow what slides.
+    bool held = false;
+    conditions_->clear();
+    add_conditions(tick, here_, pose_, Motion{}, 1.25 * tick.model.fine_pitch_mm, false);
+    const Motion along = least_motion(left, *conditions_, limits, held);
+    report.contact |= held;
+    if (norm_mm(along, limits.arm_mm) < kNothing_mm) return;
+    const double part = safe_part(tick, along, Against::all);
+    const Motion done = allowed(tick, part * along, Against::all, limits, report);
     if (part >= 1.0 || norm_mm(done, limits.arm_mm) < kNothing_mm) return;
   }
 }
@@ -365,16 +388,19 @@ Proxy::Engagement Proxy::engagement(const Tick& tick, const Vec3& direction) noe
         const Vec3 probe = pose_.point(tool_mm) + std::min(query.ahead_mm / facing, query.most_mm) * direction;
         double left_mm = -1.0;
         Vec3 out;
-        for (int s = 0; s < sweep_count_ && left_mm < 0.0; ++s) left_mm = sweeps_[static_cast<std::size_t>(s)].left_mm(probe, out);
+        for (int s = 0; s < sweep_count_ && left_mm < 0.0; ++s)
+          left_mm = sweeps_[static_cast<std::size_t>(s)].left_mm(probe, out);
         if (left_mm < 0.0) continue;
         // Gone since the patch was built: it does not count.
         any = true;
         values.distance_mm[p] = static_cast<float>(left_mm);
-        const double area = point.area_mm2 * facing, density = static_cast<double>(values.density_g_cm3[p]), arm = static_cast<double>(set.arm_mm[p]);
+        const double area = point.area_mm2 * facing, density = static_cast<double>(values.density_g_cm3[p]),
+                     arm = static_cast<double>(set.arm_mm[p]);
         const double step = std::min(density, kMostDensity_g_cm3) * (kDensitySteps / kMostDensity_g_cm3);
         const auto below = static_cast<std::size_t>(step);
-        const double strength = static_cast<double>(model.strength[below]) +
-                                (step - static_cast<double>(below)) * static_cast<double>(model.strength[below + 1] - model.strength[below]);
+        const double strength =
+            static_cast<double>(model.strength[below]) +
+            (step - static_cast<double>(below)) * static_cast<double>(model.strength[below + 1] - model.strength[below]);
         sums.engaged_mm2 -= area;
         sums.turned_area_mm2 -= point.area_mm2;
         sums.density_mm2 -= area * density;
@@ -406,7 +432,8 @@ Proxy::Engagement Proxy::engagement(const Tick& tick, const Vec3& direction) noe
   return now;
 }
 
-void Proxy::note_forces(const Tick& tick, const Engagement& now, const Vec3& direction, double thrust_n, ProxyStep& report) noexcept {
+void Proxy::note_forces(const Tick& tick, const Engagement& now, const Vec3& direction, double thrust_n,
+                        ProxyStep& report) noexcept {
   const ToolModel& model = tick.model;
   report.cutting_force_n = thrust_n * direction;
   report.torque_nmm = model.law->torque_nmm(model.law_tool, now.inputs, thrust_n);
@@ -428,13 +455,15 @@ void Proxy::note_slope(const Tick& tick, const Vec3& direction, double extension
     if (values.nearest_mm[static_cast<std::size_t>(group)] >= 0.0f) continue;
     for (int i = group * kGroupPoints; i < (group + 1) * kGroupPoints; ++i) {
       const auto p = static_cast<std::size_t>(i);
-      if (values.distance_mm[p] < 0.0f) out += static_cast<double>(set.area_mm2[p]) * Vec3(values.gx[p], values.gy[p], values.gz[p]);
+      if (values.distance_mm[p] < 0.0f)
+        out += static_cast<double>(set.area_mm2[p]) * Vec3(values.gx[p], values.gy[p], values.gz[p]);
     }
   }
   const double against = -out.dot(direction);
   const Vec3 aside = out + against * direction;
   const double slope = against > 0.0 ? aside.norm() / against : 0.0;
-  if (slope > kBite) skive_to_mm_ = aside / aside.norm() * std::min(kMostSkive_mm, (std::min(slope, kSteepest) - kBite) * extension_mm);
+  if (slope > kBite)
+    skive_to_mm_ = aside / aside.norm() * std::min(kMostSkive_mm, (std::min(slope, kSteepest) - kBite) * extension_mm);
 }
 
 void Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm, ProxyStep& report) noexcept {
@@ -508,7 +537,7 @@ void Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm,
   report.feed_mm_per_s = cut_mm / tick.dt_s;
 }
 
-void Proxy::cut_towards(const Tick& tick, const Pose& wanted, ProxyStep& report) noexcept {
+void Proxy::cut_towards(Tick& tick, const Pose& wanted, ProxyStep& report) noexcept {
   const ToolModel& model = tick.model;
   if (model.feed == Feeding::along) {
     // Across its axis it only blocks; along it, it feeds.
@@ -537,7 +566,10 @@ void Proxy::cut_towards(const Tick& tick, const Pose& wanted, ProxyStep& report)
     }
     return;
   }
-  // What turns it, and of a blade what moves it across its flat, only goes as far as bone lets it.
+  // What turns it, and of a blade what moves it across its flat, only goes as far as bone lets it. Its path takes what its
+  // faces reach, so here the faces themselves block, not the points a little within: else it would creep on through bone.
+  tick.lift_mm = model.inset;
+  look(tick, pose_, Against::all, here_);
   Pose turned{pose_.position_mm, wanted.rotation};
   Vec3 away_mm = wanted.position_mm - pose_.position_mm;
   const bool blade = model.feed == Feeding::in_plane;

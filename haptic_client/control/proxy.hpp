@@ -97,6 +97,7 @@ class Proxy {
     bool may_cut;
     double dt_s;
     bool scene = false;  // something of it may be near
+    double lift_mm = 0;  // by which points that cut are taken out of the tool again where they block
   };
   // Which points block, and against what.
   enum class Against : std::uint8_t {
@@ -118,7 +119,8 @@ class Proxy {
 
   void look(const Tick& tick, const Pose& pose, Against against, Sight& sight) const noexcept;
   void see_scene(const Tick& tick, const Pose& pose, Against against, Sight& sight) const noexcept;
-  void add_conditions(const Tick& tick, const Sight& sight, const Pose& pose, const Motion& at, double reach_mm, bool broken_only) noexcept;
+  void add_conditions(const Tick& tick, const Sight& sight, const Pose& pose, const Motion& at, double reach_mm,
+                      bool broken_only) noexcept;
   // The part of a small motion that nothing forbids; both sights are of the poses before and after it, if it is any.
   Motion allowed(const Tick& tick, const Motion& piece, Against against, const MotionLimits& limits, ProxyStep& report) noexcept;
   // How much of a motion may be made at once.
@@ -129,7 +131,7 @@ class Proxy {
   void note_slope(const Tick& tick, const Vec3& direction, double extension_mm) noexcept;
   // Goes along a direction, cutting what is in the way as far as the force allows.
   void advance(const Tick& tick, const Vec3& direction, double distance_mm, ProxyStep& report) noexcept;
-  void cut_towards(const Tick& tick, const Pose& wanted, ProxyStep& report) noexcept;
+  void cut_towards(Tick& tick, const Pose& wanted, ProxyStep& report) noexcept;
   // Bone that came back, by undo or rejection, where the tool is. True: the tick is over.
   [[nodiscard]] bool bone_returned(const Tick& tick, const Pose& wanted, ProxyStep& report) noexcept;
   void note_forces(const Tick& tick, const Engagement& now, const Vec3& direction, double thrust_n, ProxyStep& report) noexcept;

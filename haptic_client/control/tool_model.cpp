@@ -91,7 +91,8 @@ ToolModel::ToolModel(const Tool& definition, double pitch_mm, double blunt, int 
   for (const SamplePoint& p : points_of(tool, points > 0 ? points : points_for(tool, fine_pitch_mm))) {
     const double axis_mm = std::hypot(p.position_mm.x(), p.position_mm.y());
     // A screw's thread presses into the wall of its hole, which is its core: it does not hold it back.
-    if (tool.kind == ToolKind::screw && p.position_mm.z() > -tool.cutting_length_mm && axis_mm > 0.5 * tool.core_diameter_mm + kQuantum_mm)
+    if (tool.kind == ToolKind::screw && p.position_mm.z() > -tool.cutting_length_mm &&
+        axis_mm > 0.5 * tool.core_diameter_mm + kQuantum_mm)
       continue;
     const ContactPoint point{p.position_mm, p.position_mm + inset * p.inward, -p.inward, p.area_mm2, axis_mm};
     // A drill's flutes hold it in its hole but do not cut sideways, so only the point is active.
@@ -99,13 +100,17 @@ ToolModel::ToolModel(const Tool& definition, double pitch_mm, double blunt, int 
     (cuts ? active : passive).push_back(point);
     if (cuts) active_area_mm2 += point.area_mm2;
   }
+  // The very point of what has one, which stands for no area: rings leave it out.
+  if (point_height_mm(tool) > 0.0)
+    active.push_back({Vec3::Zero(), {0, 0, -inset}, Vec3::UnitZ(), 0.0, 0.0});
   const MillingParams milling{.diameter_mm = tool.diameter_mm};
   contact = contact_set(active, passive, milling.pole_radius * 0.5 * tool.diameter_mm);
   OSTEON_CHECK(contact.groups() * kGroupPoints <= kMostContactPoints);
   // Far out, where the arm is not held up by the pole's; resistance goes with one over it.
   constexpr double kFar_mm = 1e3;
   for (std::size_t i = 0; i < strength.size(); ++i)
-    strength[i] = static_cast<float>(kFar_mm * milling_resistance(milling, 1.0, kFar_mm, kMostDensity_g_cm3 * static_cast<double>(i) / kDensitySteps));
+    strength[i] = static_cast<float>(
+        kFar_mm * milling_resistance(milling, 1.0, kFar_mm, kMostDensity_g_cm3 * static_cast<double>(i) / kDensitySteps));
   law_tool = osteon::law_tool(tool);
   const Result<const ForceLaw*> own = choose_law(tool, {});
   law = own ? *own : &default_law(tool);

@@ -28,8 +28,8 @@ struct Sums {
 
 // The same evaluation by samplers of any kind.
 template <class Solid, class Density>
-Sums by_samplers(const std::vector<ContactPoint>& points, const ContactQuery& query, double step_mm, const DensityTable& strength, double least_arm_mm,
-                 const Solid& solid, const Density& density, std::vector<double>& distances) {
+Sums by_samplers(const std::vector<ContactPoint>& points, const ContactQuery& query, double step_mm, const DensityTable& strength,
+                 double least_arm_mm, const Solid& solid, const Density& density, std::vector<double>& distances) {
   Sums sums;
   const Vec3 toward = query.pose_bone_tool.rotation.conjugate() * query.direction_bone;
   const Eigen::Matrix3d turn = query.pose_bone_tool.rotation.toRotationMatrix();
@@ -40,10 +40,12 @@ Sums by_samplers(const std::vector<ContactPoint>& points, const ContactQuery& qu
     distances[i] = static_cast<double>(kLeftOut_mm);
     if (facing < query.least_facing) continue;
     const Vec3 tool_mm = point.inset_mm + query.lift_mm * point.outward;
-    const Vec3 p = turn * tool_mm + query.pose_bone_tool.position_mm + std::min(query.ahead_mm / facing, query.most_mm) * query.direction_bone;
+    const Vec3 p = turn * tool_mm + query.pose_bone_tool.position_mm +
+                   std::min(query.ahead_mm / facing, query.most_mm) * query.direction_bone;
     const auto at = [&](double x, double y, double z) { return static_cast<double>(solid.wsSample(openvdb::Vec3d(x, y, z))); };
     const double distance = at(p.x(), p.y(), p.z());
-    gradients += Vec3(at(p.x() + step_mm, p.y(), p.z()) - at(p.x() - step_mm, p.y(), p.z()), at(p.x(), p.y() + step_mm, p.z()) - at(p.x(), p.y() - step_mm, p.z()),
+    gradients += Vec3(at(p.x() + step_mm, p.y(), p.z()) - at(p.x() - step_mm, p.y(), p.z()),
+                      at(p.x(), p.y() + step_mm, p.z()) - at(p.x(), p.y() - step_mm, p.z()),
                       at(p.x(), p.y(), p.z() + step_mm) - at(p.x(), p.y(), p.z() - step_mm));
     distances[i] = distance;
     if (distance >= 0.0) continue;
@@ -53,7 +55,9 @@ Sums by_samplers(const std::vector<ContactPoint>& points, const ContactQuery& qu
     const auto below = static_cast<std::size_t>(s);
     sums.engaged += area;
     sums.density += area * rho;
-    sums.milling += area / arm * (static_cast<double>(strength[below]) + (s - static_cast<double>(below)) * static_cast<double>(strength[below + 1] - strength[below]));
+    sums.milling += area / arm *
+                    (static_cast<double>(strength[below]) +
+                     (s - static_cast<double>(below)) * static_cast<double>(strength[below + 1] - strength[below]));
     const Vec3 push = -area * rho * point.outward;
     sums.force += push;
     sums.torque += tool_mm.cross(push);
@@ -66,7 +70,8 @@ double us(Clock::time_point from) { return 1e6 * std::chrono::duration<double>(C
 
 void print(const char* name, std::vector<double> values) {
   std::ranges::sort(values);
-  std::printf("\"%s_p50\": %.4f, \"%s_min\": %.4f, \"%s_max\": %.4f, ", name, values[values.size() / 2], name, values.front(), name, values.back());
+  std::printf("\"%s_p50\": %.4f, \"%s_min\": %.4f, \"%s_max\": %.4f, ", name, values[values.size() / 2], name, values.front(),
+              name, values.back());
 }
 
 int run() {
@@ -87,8 +92,9 @@ int run() {
   for (int i = 0; i < kPoses; ++i) {
     ContactQuery query;
     const double turn = 0.05 * i;
-    query.pose_bone_tool = {{0.02 * i, 0.01 * std::sin(turn), -3.0 + 0.005 * i},
-                            Eigen::Quaterniond(Eigen::AngleAxisd(turn, Vec3::UnitZ())) * pose_along(Vec3::Zero(), -Vec3::UnitZ()).rotation};
+    query.pose_bone_tool = {
+        {0.02 * i, 0.01 * std::sin(turn), -3.0 + 0.005 * i},
+        Eigen::Quaterniond(Eigen::AngleAxisd(turn, Vec3::UnitZ())) * pose_along(Vec3::Zero(), -Vec3::UnitZ()).rotation};
     query.groups = set.groups();
     query.density = query.ahead = true;
     query.direction_bone = Vec3(1, 0, -0.3).normalized();
@@ -108,7 +114,8 @@ int run() {
   values.make_room(kPoints);
 
   // The same field for OpenVDB: f at the tool's pitch round the tool, density at h.
-  openvdb::FloatGrid::Ptr solid = openvdb::FloatGrid::create(static_cast<float>(kBandVoxels * kPitch_mm)), density = openvdb::FloatGrid::create(0.0f);
+  openvdb::FloatGrid::Ptr solid = openvdb::FloatGrid::create(static_cast<float>(kBandVoxels * kPitch_mm)),
+                          density = openvdb::FloatGrid::create(0.0f);
   solid->setTransform(openvdb::math::Transform::createLinearTransform(model.fine_pitch_mm));
   density->setTransform(openvdb::math::Transform::createLinearTransform(kPitch_mm));
   const auto fill = [](openvdb::FloatGrid& grid, const CoordBox& box, const std::vector<float>& samples) {
@@ -131,7 +138,8 @@ int run() {
   fill(*density, coarse, samples);
   using Accessor = openvdb::FloatGrid::ConstAccessor;
   const Accessor solid_accessor = solid->getConstAccessor(), density_accessor = density->getConstAccessor();
-  const openvdb::tools::GridSampler<Accessor, openvdb::tools::BoxSampler> fast(solid_accessor, solid->transform()), fast_density(density_accessor, density->transform());
+  const openvdb::tools::GridSampler<Accessor, openvdb::tools::BoxSampler> fast(solid_accessor, solid->transform()),
+      fast_density(density_accessor, density->transform());
   const openvdb::tools::GridSampler<openvdb::FloatGrid, openvdb::tools::BoxSampler> plain(*solid), plain_density(*density);
 
   std::vector<double> ours, accessor, tree, ratios, distances(kPoints);
@@ -149,7 +157,8 @@ int run() {
       mine = std::min(mine, ours.back());
     }
     auto began = Clock::now();
-    const Sums theirs = by_samplers(points, query, model.fine_pitch_mm, model.strength, least_arm_mm, fast, fast_density, distances);
+    const Sums theirs =
+        by_samplers(points, query, model.fine_pitch_mm, model.strength, least_arm_mm, fast, fast_density, distances);
     accessor.push_back(us(began));
     ratios.push_back(accessor.back() / ours[ours.size() - 3]);
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -159,18 +168,21 @@ int run() {
     }
     touching += static_cast<int>(std::ranges::count_if(distances, [](double d) { return d < 0.0; }));
     engaged += theirs.engaged;
-    worst_sum = std::max({worst_sum, (theirs.force - sums.force).norm() / theirs.force.norm(), (theirs.torque - sums.torque).norm() / theirs.torque.norm()});
+    worst_sum = std::max({worst_sum, (theirs.force - sums.force).norm() / theirs.force.norm(),
+                          (theirs.torque - sums.torque).norm() / theirs.torque.norm()});
     began = Clock::now();
     by_samplers(points, query, model.fine_pitch_mm, model.strength, least_arm_mm, plain, plain_density, distances);
     tree.push_back(us(began));
   }
   const int lanes = limit_contact_lanes(16);
-  std::printf("{\"points\": %d, \"lanes\": %d, \"in_bone\": %.4f, ", kPoints, lanes, static_cast<double>(touching) / (kRounds * kPoints));
+  std::printf("{\"points\": %d, \"lanes\": %d, \"in_bone\": %.4f, ", kPoints, lanes,
+              static_cast<double>(touching) / (kRounds * kPoints));
   print("contact_us", ours);
   print("accessor_us", accessor);
   print("tree_us", tree);
   print("speedup", ratios);
-  std::printf("\"compared\": %d, \"largest_difference_mm\": %.3g, \"largest_force_difference\": %.3g}\n", compared, worst_mm, worst_sum);
+  std::printf("\"compared\": %d, \"largest_difference_mm\": %.3g, \"largest_force_difference\": %.3g}\n", compared, worst_mm,
+              worst_sum);
   return 0;
 }
 

@@ -53,13 +53,15 @@ TEST_P(AxialTool, MakesItsOwnHoleAndComesOut) {
   cut.level = std::min(tool.cut_level, finest_level(bone.pitch_mm()));
   cut.path = {quantise(pose_along({0.1, -0.2, -1}, Vec3::UnitZ())), quantise(pose_along({0.1, -0.2, deepest}, Vec3::UnitZ()))};
   swept.apply(cut);
-  std::printf("  %s: %.2f mm deep, %.1f mm3 removed, straight sweep %.1f mm3\n", which.tool, deepest, bench.replica().removed_mm3(), swept.removed_mm3());
+  std::printf("  %s: %.2f mm deep, %.1f mm3 removed, straight sweep %.1f mm3\n", which.tool, deepest,
+              bench.replica().removed_mm3(), swept.removed_mm3());
   EXPECT_NEAR(bench.replica().removed_mm3(), swept.removed_mm3(), 0.01 * swept.removed_mm3());
 }
 
 INSTANTIATE_TEST_SUITE_P(All, AxialTool,
-                         ::testing::Values(AxialCase{"drill-1-8in", 12, 3}, AxialCase{"drill-5-16in", 20, 4}, AxialCase{"end-drill", 20, 3},
-                                           AxialCase{"pin-1", 12, 5}, AxialCase{"reamer-cylinder", 24, 3}, AxialCase{"reamer-sphere", 40, 2},
+                         ::testing::Values(AxialCase{"drill-1-8in", 12, 3}, AxialCase{"drill-5-16in", 20, 4},
+                                           AxialCase{"end-drill", 20, 3}, AxialCase{"pin-1", 12, 5},
+                                           AxialCase{"reamer-cylinder", 24, 3}, AxialCase{"reamer-sphere", 40, 2},
                                            AxialCase{"reamer-outside", 64, 1}),
                          [](const auto& test) {
                            std::string name = test.param.tool;

@@ -24,7 +24,8 @@ struct Widest {
 // A block with a drilled hole, the burr half in it.
 class ContactOnBlock : public ::testing::Test {
  protected:
-  ContactOnBlock() : bone_(block_case(16.0)), field_(bone_, BodyId{}), model_(*find_tool("burr-round-5"), bone_.pitch_mm(), 1.0, 900) {
+  ContactOnBlock()
+      : bone_(block_case(16.0)), field_(bone_, BodyId{}), model_(*find_tool("burr-round-5"), bone_.pitch_mm(), 1.0, 900) {
     field_.apply(osteon::test::straight_cut(*find_tool("drill-3.2"), {0, 0, -1}, {0, 0, 6}, Vec3::UnitZ()));
     values_.make_room(kMostContactPoints);
   }
@@ -54,7 +55,8 @@ class ContactOnBlock : public ::testing::Test {
 
 // To the block: 16 mm square, 30 mm deep.
 double to_block_mm(const Vec3& p) {
-  return Vec3(std::max(0.0, std::abs(p.x()) - 8.0), std::max(0.0, std::abs(p.y()) - 8.0), std::max({0.0, -p.z(), p.z() - 30.0})).norm();
+  return Vec3(std::max(0.0, std::abs(p.x()) - 8.0), std::max(0.0, std::abs(p.y()) - 8.0), std::max({0.0, -p.z(), p.z() - 30.0}))
+      .norm();
 }
 
 Pose pose_of(osteon::test::Random& random) {
@@ -169,7 +171,8 @@ TEST_F(ContactOnBlock, SumsAreThoseOfThePoints) {
       const double facing = p.outward.dot(toward);
       if (facing < query.least_facing) continue;
       area += p.area_mm2 * facing;
-      const Vec3 probe = query.pose_bone_tool.point(p.inset_mm) + std::min(query.ahead_mm / facing, query.most_mm) * query.direction_bone;
+      const Vec3 probe =
+          query.pose_bone_tool.point(p.inset_mm) + std::min(query.ahead_mm / facing, query.most_mm) * query.direction_bone;
       double solid = 1.0;
       if (!patch_.solid(probe, solid) || solid >= 0.0) continue;
       const double density = patch_.density_at(probe), share = p.area_mm2 * facing;

@@ -73,9 +73,12 @@ class HandStage {
 
 // The bone is at z > 0. Cancellous, so that a push that a hand can give goes on.
 Case block(double pitch_mm, double width_mm, double deep_mm) {
-  return osteon::test::make_bone({Vec3(-0.5 * width_mm, -0.5 * width_mm, -3), Vec3(0.5 * width_mm, 0.5 * width_mm, deep_mm)}, pitch_mm,
-                                 [=](const Vec3& p) { return std::max({-p.z(), std::abs(p.x()) - 0.5 * width_mm + 3.0, std::abs(p.y()) - 0.5 * width_mm + 3.0}); },
-                                 [](const Vec3&) { return 0.6; });
+  return osteon::test::make_bone(
+      {Vec3(-0.5 * width_mm, -0.5 * width_mm, -3), Vec3(0.5 * width_mm, 0.5 * width_mm, deep_mm)}, pitch_mm,
+      [=](const Vec3& p) {
+        return std::max({-p.z(), std::abs(p.x()) - 0.5 * width_mm + 3.0, std::abs(p.y()) - 0.5 * width_mm + 3.0});
+      },
+      [](const Vec3&) { return 0.6; });
 }
 
 // How each tool is held against a face that looks along -z, and which way it is pushed: z, into the bone.
@@ -106,8 +109,9 @@ TEST(HandTools, EveryToolThatCutsTakesBone) {
     const LoopReport pushed = stage.lead({0, 0, 2.0}, 2.0);
     const LoopReport back = stage.lead({0, 0, -3.5}, 0.7);
     const double removed = stage.replica_.removed_mm3() - before;
-    std::printf("  %-20s cut for %4d of 2700 ticks, %8.2f mm3, at most %6.1f N and %8.1f N mm, %.2f mm deep\n", tool.name.c_str(), stage.cutting_,
-                removed, stage.force_n_, stage.torque_nmm_, pushed.pose_bone_proxy.position_mm.z() - held(tool).position_mm.z() - 0.4);
+    std::printf("  %-20s cut for %4d of 2700 ticks, %8.2f mm3, at most %6.1f N and %8.1f N mm, %.2f mm deep\n", tool.name.c_str(),
+                stage.cutting_, removed, stage.force_n_, stage.torque_nmm_,
+                pushed.pose_bone_proxy.position_mm.z() - held(tool).position_mm.z() - 0.4);
     // A broach moves in its blows only.
     EXPECT_GT(stage.cutting_, tool.kind == ToolKind::broach ? 2 : 50) << tool.name;
     EXPECT_GT(removed, 0.05) << tool.name;
@@ -171,7 +175,8 @@ TEST(OwnHole, DoesNotJamAtAnyAngle) {
     bench.run([&](const SessionTick& tick) {
       const double depth = (tick.report.pose_bone_proxy.position_mm - Vec3(0.1, -0.2, 0)).dot(step.entry.axis->normalized());
       deepest = std::max(deepest, depth);
-      if (tick.order.phase == SurgeonPhase::retract && depth < deepest - 1.0) out_n = std::max(out_n, tick.report.force_physical_n.norm());
+      if (tick.order.phase == SurgeonPhase::retract && depth < deepest - 1.0)
+        out_n = std::max(out_n, tick.report.force_physical_n.norm());
     });
     std::printf("  own hole at %2.0f degrees: %.2f mm deep, at most %.3f N on the way out\n", degrees, deepest, out_n);
     EXPECT_TRUE(bench.session().surgeon().results()[0].completed) << degrees;

@@ -77,7 +77,9 @@ class Stage {
 };
 
 Pose straight(double x, double y, double z) { return {{x, y, z}, Eigen::Quaterniond::Identity()}; }
-Pose tilted(const Vec3& at, const Vec3& about, double angle_rad) { return {at, Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, about))}; }
+Pose tilted(const Vec3& at, const Vec3& about, double angle_rad) {
+  return {at, Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, about))};
+}
 double dense(const Vec3&) { return 1.9; }
 
 Case half_space(double pitch_mm = 0.5) {
@@ -209,7 +211,9 @@ TEST(Slide, AlongAPlaneIsExact) {
   for (const char* name : {"burr-round-5", "drill-3.2"})
     for (const double slope : {0.0, 20.0, 35.0}) {
       const Vec3 out(std::sin(slope * kDegree), 0, -std::cos(slope * kDegree));
-      Stage stage(osteon::test::make_bone({Vec3(-14, -14, -12), Vec3(14, 14, 12)}, 0.5, [=](const Vec3& p) { return p.dot(out); }, dense), name);
+      Stage stage(osteon::test::make_bone(
+                      {Vec3(-14, -14, -12), Vec3(14, 14, 12)}, 0.5, [=](const Vec3& p) { return p.dot(out); }, dense),
+                  name);
       stage.place({3.0 * out, Eigen::Quaterniond::Identity()});
       const Vec3 along(std::cos(slope * kDegree), 0, std::sin(slope * kDegree)), across = Vec3::UnitY();
       stage.lead({-0.5 * out, Eigen::Quaterniond::Identity()}, 50, 300);
@@ -303,7 +307,8 @@ TEST(Scene, APinStopsTheToolAtAnySpeed) {
       stage.place(straight(-2, 0, -5));
       const ProxyStep step = stage.lead(straight(12, 0, -5), speed, 300, rpm);
       // The ball's middle: pulled at its tip the tool leans.
-      EXPECT_NEAR(stage.proxy_.pose().point({0, 0, -2.5}).x(), 6.0 - 2.0 - 2.5 + stage.model_.inset, 0.08) << rpm << " rpm, " << speed << " mm/s";
+      EXPECT_NEAR(stage.proxy_.pose().point({0, 0, -2.5}).x(), 6.0 - 2.0 - 2.5 + stage.model_.inset, 0.08)
+          << rpm << " rpm, " << speed << " mm/s";
       EXPECT_TRUE(step.contact);
       EXPECT_FALSE(step.cutting);
     }
@@ -413,7 +418,9 @@ TEST(Skiving, ThePointSlidesDownASlopeUntilItBites) {
     step.entry.point_mm = Vec3(0, 0, 0);
     step.entry.axis = Vec3(0, 0, 1);
     const Vec3 out(std::sin(slope * kDegree), 0, -std::cos(slope * kDegree));  // downhill is +x
-    Bench bench(osteon::test::make_bone({Vec3(-10, -10, -14), Vec3(12, 10, 16)}, 0.5, [=](const Vec3& p) { return p.dot(out); }, dense), {step});
+    Bench bench(osteon::test::make_bone(
+                    {Vec3(-10, -10, -14), Vec3(12, 10, 16)}, 0.5, [=](const Vec3& p) { return p.dot(out); }, dense),
+                {step});
     double drifted = 0.0, at_end = 0.0;
     bench.run([&](const SessionTick& tick) {
       if (tick.report.phase != CuttingPhase::cutting) return;
