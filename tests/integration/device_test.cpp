@@ -1,0 +1,200 @@
+// A person's hand at a PHANToM, our stand-in for its library with a simulated arm and hand behind it, in real processes
+// on this machine: drilling with button and clutch, a cable that is pulled while it drills, and every end of it.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <numbers>
+#include <thread>
+
+#include "tests/integration/stage.hpp"
+#include "tests/support/devices/arm.hpp"
+#include "tests/support/wait.hpp"
+
+namespace osteon::test {
+namespace {
+
+using namespace std::chrono_literals;
+constexpr auto kPatience = 60s;
+constexpr int kSpindle = 1, kClutch = 2;  // the stylus' buttons
+
+class PhantomInRoom : public ::testing::Test {
+ protected:
+  PhantomInRoom() : arm_(folder_ / "arm") { arm_->hand_n_per_mm = 0.5; }
+
+  Process start(const Stage& stage, std::vector<std::string> more = {}) const {
+    std::vector<std::string> all{"--server",
+                                 stage.address(),
+                                 "--device",
+                                 "phantom",
+                                 "--libhd",
+                                 OSTEON_STAND_IN_HD,
+                                 "--tool",
+                                 "drill-3.2",
+                                 "--view",
+                                 "top",
+                                 "--at",
+                                 "2,-3,0",
+                                 "--status",
+                                 "--summary",
+                                 stage / "hand.json",
+                                 "--session-log",
+                                 stage / "hand.csv",
+                                 "--cache",
+                                 stage / "cache"};
+    all.insert(all.end(), more.begin(), more.end());
+    return stage.start("osteon-haptic", all);
+  }
+  // The simulated hand moves its wish steadily.
+  void move_hand(double x_mm, double y_mm, double z_mm, double mm_per_s) const {
+    const double from[3] = {arm_->hand_mm[0], arm_->hand_mm[1], arm_->hand_mm[2]};
+    const double way = std::hypot(x_mm - from[0], y_mm - from[1], z_mm - from[2]);
+    const int steps = std::max(1, static_cast<int>(std::lround(100.0 * way / mm_per_s)));
+    for (int i = 1; i <= steps; ++i) {
+      const double s = static_cast<double>(i) / steps;
+      arm_.hand(from[0] + s * (x_mm - from[0]), from[1] + s * (y_mm - from[1]), from[2] + s * (z_mm - from[2]));
+      std::this_thread::sleep_for(10ms);
+    }
+  }
+  TempDir folder_;
+  ArmStrings arm_;
+};
+
+TEST_F(PhantomInRoom, DrillsLosesItsCableAndDrillsOn) {
+  Stage stage(24.0);
+  Process haptic = start(stage);
+  ASSERT_TRUE(haptic.wait_for_out("free_hand", kPatience)) << haptic.err();
+  EXPECT_EQ(arm_->scheduler_starts, 1u);
+  EXPECT_EQ(arm_.force_n(), 0.0);  // the tool waits over the bone
+
+  // The clutch moves the handle, not the tool; then down to the bone with the spindle on.
+  arm_->buttons = kClutch;
+  std::this_thread::sleep_for(100ms);
+  move_hand(0, 0, 10, 50.0);
+  arm_->buttons = 0;
+  std::this_thread::sleep_for(100ms);
+  arm_->buttons = kSpindle;
+  std::this_thread::sleep_for(700ms);
+  move_hand(0, 0, -3, 8.0);  // 14 mm of the bone's: 10 mm of air and into the near cortex
+  ASSERT_TRUE(wait_until([&] { return arm_.force_n() > 0.2; }, 10s)) << haptic.out();
+
+  // The cable is pulled while it drills.
+  arm_->plugged = 0;
+  EXPECT_TRUE(wait_until([&] { return haptic.err().find("device lost") != std::string::npos; }, 10s));
+  EXPECT_EQ(arm_.force_n(), 0.0);
+  EXPECT_TRUE(haptic.running());
+  arm_->plugged = 1;
+  EXPECT_TRUE(wait_until([&] { return haptic.err().find("device back") != std::string::npos; }, 10s));
+  // The handle is tied to the tool where both now are, so the hand presses on from there.
+  arm_->peak_n = 0.0;
+  move_hand(0, 0, -14, 6.0);
+  std::this_thread::sleep_for(3s);
+  EXPECT_GT(arm_->peak_n, 0.2);
+  // Out of the hole, spindle off, and the end.
+  move_hand(0, 0, 20, 30.0);
+  arm_->buttons = 0;
+  std::this_thread::sleep_for(1s);
+  EXPECT_EQ(arm_.force_n(), 0.0);
+  ASSERT_EQ(haptic.terminate(), 0) << haptic.err();
+  EXPECT_EQ(arm_->scheduler_stops, arm_->scheduler_starts);
+  EXPECT_EQ(arm_->is_open, 0);
+  EXPECT_EQ(arm_->misuse, 0u);
+  EXPECT_EQ(arm_->unsafe_forces, 0u);
+  EXPECT_LE(arm_->peak_n, Arm::kPeak_n + 1e-9);
+
+  const auto summary = read_json(stage / "hand.json");
+  EXPECT_EQ(summary["device"], "phantom");
+  EXPECT_EQ(summary["device_losses"], 1);
+  EXPECT_EQ(summary["device_limits"]["continuous_n"], Arm::kContinuous_n);
+  EXPECT_NEAR(summary["force_scale"].get<double>(), Arm::kContinuous_n / 30.0, 1e-12);
+  EXPECT_EQ(summary["stopped"], false);  // how a hand that is free ends
+
+  // Where the clutch was held or the device away, the tip stood still; it began over the place that was named.
+  const Table log = read_table(stage / "hand.csv");
+  ASSERT_GT(log.rows(), 5000u);
+  std::size_t first = 0;
+  while (first < log.rows() && log.texts.at("tip_x_mm")[first] != "2.00000") ++first;
+  ASSERT_LT(first, log.rows());
+  EXPECT_NEAR(log["tip_y_mm"][first], -3.0, 1e-3);
+  EXPECT_NEAR(log["tip_z_mm"][first], 10.0, 0.3);
+  double deepest = 0.0;
+  for (const double z : log["tip_z_mm"]) deepest = std::max(deepest, -z);
+  EXPECT_GT(deepest, 4.0);
+  // A hole of the drill's width as deep as its tip went; its cone takes a little less, the wobble of the hand a little
+  // more.
+  const double cylinder = std::numbers::pi * 1.6 * 1.6 * std::min(deepest, 30.0);
+  EXPECT_GT(summary["removed_mm3"].get<double>(), 0.75 * cylinder - 10.0);
+  EXPECT_LT(summary["removed_mm3"].get<double>(), 1.3 * cylinder + 5.0);
+
+  ASSERT_EQ(stage.server().terminate(), 0);
+  EXPECT_EQ(read_json(stage / "server.json")["field_hash"], summary["field_hash"]);
+}
+
+TEST_F(PhantomInRoom, WithoutItsRoomItHasNoForceAndEndsInOrder) {
+  Stage stage(16.0);
+  Process haptic = start(stage);
+  ASSERT_TRUE(haptic.wait_for_out("free_hand", kPatience)) << haptic.err();
+  move_hand(0, 0, -13, 15.0);  // presses, the spindle off
+  ASSERT_TRUE(wait_until([&] { return arm_.force_n() > 0.2; }, 10s));
+  stage.server().signal(SIGKILL);
+  ASSERT_EQ(haptic.wait(30s), 1) << haptic.err();
+  EXPECT_EQ(arm_.force_n(), 0.0);
+  EXPECT_EQ(arm_->scheduler_stops, 1u);
+  EXPECT_EQ(arm_->is_open, 0);
+}
+
+TEST_F(PhantomInRoom, WaitsForItsUserWhereItMustBeCalibrated) {
+  arm_->calibration = 2;
+  arm_->style = 4;
+  const Stage stage(16.0);
+  Process haptic = start(stage);
+  EXPECT_TRUE(wait_until([&] { return haptic.err().find("inkwell") != std::string::npos; }, kPatience));
+  EXPECT_TRUE(haptic.wait_for_out("wait", kPatience)) << haptic.err();
+  arm_->calibration = 1;
+  EXPECT_TRUE(haptic.wait_for_out("free_hand", kPatience));
+  EXPECT_THAT(haptic.err(), testing::HasSubstr("device ready"));
+  ASSERT_EQ(haptic.terminate(), 0);
+  EXPECT_EQ(arm_->unsafe_forces, 0u);
+}
+
+TEST_F(PhantomInRoom, WhatIsWrongIsSaidBeforeAServerIsLookedFor) {
+  const auto said = [&](std::vector<std::string> more) {
+    std::vector<std::string> all{"--server", "127.0.0.1:1", "--patience", "0"};
+    all.insert(all.end(), more.begin(), more.end());
+    const RunResult result = run(program("osteon-haptic"), all, 20s);
+    EXPECT_EQ(result.exit_code, 1);
+    return result.err;
+  };
+  using testing::HasSubstr;
+  EXPECT_THAT(said({}), HasSubstr("needs a --plan"));
+  EXPECT_THAT(said({"--device", "phantom"}), HasSubstr("--tool is missing"));
+  EXPECT_THAT(said({"--device", "phantom", "--tool", "drill-99"}), HasSubstr("drill-99"));
+  EXPECT_THAT(said({"--device", "phantom", "--tool", "drill-3.2", "--view", "above"}), HasSubstr("--view must be"));
+  EXPECT_THAT(said({"--device", "phantom", "--tool", "drill-3.2", "--at", "here"}), HasSubstr("--at"));
+  EXPECT_THAT(said({"--device", "phantom+phantom", "--tool", "drill-3.2"}), HasSubstr("cannot be added"));
+  EXPECT_THAT(said({"--device", "phantom", "--tool", "drill-3.2"}), HasSubstr("install the vendor's OpenHaptics"));
+  EXPECT_THAT(said({"--device", "phantom", "--libhd", OSTEON_STAND_IN_DHD, "--tool", "drill-3.2"}),
+              HasSubstr("hdInitDevice"));
+  arm_->plugged = 0;
+  EXPECT_THAT(said({"--device", "phantom", "--libhd", OSTEON_STAND_IN_HD, "--tool", "drill-3.2"}),
+              HasSubstr("check its power and cable"));
+  EXPECT_THAT(said({"--device", "force-dimension", "--libdhd", OSTEON_STAND_IN_DHD, "--tool", "drill-3.2"}),
+              HasSubstr("check power, cable"));
+}
+
+TEST_F(PhantomInRoom, DevicesAreListedWithWhatIsMissing) {
+  using testing::HasSubstr;
+  RunResult list =
+      run(program("osteon-haptic"), {"devices", "--libhd", OSTEON_STAND_IN_HD, "--libdhd", OSTEON_STAND_IN_DHD});
+  EXPECT_EQ(list.exit_code, 0);
+  EXPECT_THAT(list.out, HasSubstr("found: Stand-in Arm, serial 0001"));
+  EXPECT_THAT(list.out, HasSubstr("found: stand-in omega, serial 4242"));
+  list = run(program("osteon-haptic"), {"devices"});
+  EXPECT_EQ(list.exit_code, 0);
+  EXPECT_THAT(list.out, HasSubstr("not here: OpenHaptics (libHD.so) is not installed"));
+  EXPECT_THAT(list.out, HasSubstr("not here: Force Dimension's libdhd is not installed"));
+  for (const char* name : {"simulated", "falcon", "spacemouse", "pedal"}) EXPECT_THAT(list.out, HasSubstr(name));
+  EXPECT_EQ(arm_->opened, arm_->closed);
+}
+
+}  // namespace
+}  // namespace osteon::test
