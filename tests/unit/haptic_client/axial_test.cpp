@@ -40,7 +40,7 @@ TEST_P(AxialTool, MakesItsOwnHoleAndComesOut) {
   EXPECT_GE(work_min, 0.0);
   EXPECT_EQ(out_n, 0.0);
   // The rig lets go when the tool is there; while it draws back, the coupling's stretch still pushes.
-  EXPECT_GE(deepest, which.to_mm);
+  EXPECT_GE(deepest, which.to_mm - 0.1);  // short of it by the slack of a device that cannot show all the force
   EXPECT_LT(deepest, which.to_mm + 1.5);
 
   // Another road to the same hole: the tool swept straight from above to the deepest place.

