@@ -4,7 +4,7 @@ namespace osteon::haptic {
 
 namespace {
 LoopParams params_of(const DeviceLimits& limits, double force_scale, double dt_s) {
-  LoopParams params = loop_params(limits.peak_n, limits.continuous_n, limits.stiffness_n_per_mm, force_scale);
+  LoopParams params = loop_params(limits.peak_n, limits.continuous_n, limits.stiffness_n_per_mm, force_scale, limits.peak_nmm);
   params.dt_s = dt_s;
   return params;
 }
@@ -54,8 +54,9 @@ SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok, int periods
   result.reading = reading;
   result.commanded_rpm = input.spindle_rpm;
   result.report = last_ = loop_.tick(input, patch, guides);
-  if (played_) played_->write(result.report.force_device_n);
-  else device_.write(result.report.force_device_n);
+  const DeviceOutput output{result.report.force_device_n, result.report.torque_device_nmm};
+  if (played_) played_->write(output);
+  else device_.write(output);
   return result;
 }
 
