@@ -108,7 +108,8 @@ MachineFacts look_at_machine(int priority) {
     facts.rt_runtime_told = true;
   }
   timespec resolution{};
-  if (::clock_getres(CLOCK_MONOTONIC, &resolution) == 0) facts.timer_resolution_ns = resolution.tv_sec * 1'000'000'000L + resolution.tv_nsec;
+  if (::clock_getres(CLOCK_MONOTONIC, &resolution) == 0)
+    facts.timer_resolution_ns = resolution.tv_sec * 1'000'000'000L + resolution.tv_nsec;
   facts.clock_source = first_line("/sys/devices/system/clocksource/clocksource0/current_clocksource");
   std::ifstream cpu("/proc/cpuinfo");
   for (std::string line; std::getline(cpu, line);)
@@ -124,18 +125,23 @@ std::vector<MachineFinding> judge(const MachineFacts& facts, int priority, long 
   const auto say = [&](Finding kind, std::string sentence, std::string remedy = {}) {
     findings.push_back({kind, std::move(sentence), std::move(remedy)});
   };
-  const std::string lines = std::string("write two lines into ") + kLimits + ", \"@audio - rtprio 95\" and \"@audio - memlock unlimited\", "
+  const std::string lines = std::string("write two lines into ") + kLimits +
+                            ", \"@audio - rtprio 95\" and \"@audio - memlock unlimited\", "
                             "add yourself to that group (sudo usermod -aG audio $USER) and log in again";
 
   if (facts.fifo_works) say(Finding::fine, "Threads may run at real-time priority " + std::to_string(priority) + ".");
   else
-    say(Finding::lacking, "Threads may not run at real-time priority " + std::to_string(priority) + " (the limit is " +
-                              std::to_string(std::max(0L, facts.rtprio_limit)) + "), so other programs delay the haptic loop.", lines);
+    say(Finding::lacking,
+        "Threads may not run at real-time priority " + std::to_string(priority) + " (the limit is " +
+            std::to_string(std::max(0L, facts.rtprio_limit)) + "), so other programs delay the haptic loop.",
+        lines);
 
   if (facts.lock_works && facts.memlock_limit_kib >= memory_kib) say(Finding::fine, "Memory may be locked.");
   else
-    say(Finding::lacking, "No more than " + kib(facts.lock_works ? facts.memlock_limit_kib : 0) + " of memory may be locked and " + kib(memory_kib) +
-                              " are needed, so the haptic loop may wait for the disk.", lines);
+    say(Finding::lacking,
+        "No more than " + kib(facts.lock_works ? facts.memlock_limit_kib : 0) + " of memory may be locked and " +
+            kib(memory_kib) + " are needed, so the haptic loop may wait for the disk.",
+        lines);
 
   if (facts.slack_works && facts.timer_resolution_ns >= 0 && facts.timer_resolution_ns <= 1000)
     say(Finding::fine, "Timers are exact: " + std::to_string(facts.timer_resolution_ns) + " ns, without slack.");
@@ -147,11 +153,13 @@ std::vector<MachineFinding> judge(const MachineFacts& facts, int priority, long 
         "boot a kernel with CONFIG_HIGH_RES_TIMERS and without highres=off");
 
   if (facts.cores < 2)
-    say(Finding::lacking, "There is one core; the haptic loop spins and would take it from all else.", "give the machine at least two cores");
+    say(Finding::lacking, "There is one core; the haptic loop spins and would take it from all else.",
+        "give the machine at least two cores");
   else say(Finding::fine, "There are " + std::to_string(facts.cores) + " cores.");
 
   if (facts.rt_runtime_told && facts.rt_runtime_us >= 0 && facts.rt_runtime_us < 500'000)
-    say(Finding::lacking, "Real-time threads are stopped after " + std::to_string(facts.rt_runtime_us / 1000) + " ms of every second.",
+    say(Finding::lacking,
+        "Real-time threads are stopped after " + std::to_string(facts.rt_runtime_us / 1000) + " ms of every second.",
         "sudo sysctl kernel.sched_rt_runtime_us=950000");
 
   const auto slow = std::ranges::count_if(facts.governors, [](const std::string& g) { return g != "performance"; });
@@ -166,12 +174,15 @@ std::vector<MachineFinding> judge(const MachineFacts& facts, int priority, long 
   if (facts.preemption == "rt" || facts.preemption == "full")
     say(Finding::fine, facts.preemption == "rt" ? "The kernel is a real-time one." : "The kernel can be preempted.");
   else
-    say(Finding::note, facts.preemption == "dynamic" ? "The kernel's preemption was chosen at boot and is not told."
-                                                     : "The kernel is preempted only where it offers to be (" + facts.preemption + ").",
+    say(Finding::note,
+        facts.preemption == "dynamic" ? "The kernel's preemption was chosen at boot and is not told."
+                                      : "The kernel is preempted only where it offers to be (" + facts.preemption + ").",
         "boot with preempt=full, or install linux-image-rt-amd64");
 
-  if (facts.clock_source != "tsc" && facts.clock_source != "kvm-clock" && facts.clock_source != "arch_sys_counter" && !facts.clock_source.empty())
-    say(Finding::note, "The clock is read from \"" + facts.clock_source + "\", which takes microseconds.", "boot with clocksource=tsc tsc=reliable");
+  if (facts.clock_source != "tsc" && facts.clock_source != "kvm-clock" && facts.clock_source != "arch_sys_counter" &&
+      !facts.clock_source.empty())
+    say(Finding::note, "The clock is read from \"" + facts.clock_source + "\", which takes microseconds.",
+        "boot with clocksource=tsc tsc=reliable");
   if (facts.virtual_machine)
     say(Finding::note, "This is a virtual machine: its host may stop it for milliseconds, which nothing in it can prevent.",
         "run the haptic client on real hardware");

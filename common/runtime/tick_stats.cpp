@@ -41,7 +41,8 @@ DurationHistogram DurationHistogram::since(const DurationHistogram& earlier) con
 
 double DurationHistogram::percentile_us(double percent) const noexcept {
   if (count_ == 0) return 0.0;
-  const auto wanted = std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::ceil(percent / 100.0 * static_cast<double>(count_))));
+  const auto wanted =
+      std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::ceil(percent / 100.0 * static_cast<double>(count_))));
   std::uint64_t seen = 0;
   for (int bin = 0; bin < kBins; ++bin) {
     seen += bins_[static_cast<std::size_t>(bin)];

@@ -39,7 +39,8 @@ void Watchdog::watch(int priority) {
     }
     const auto silence = std::chrono::nanoseconds(now - heard);
     if (silence < patience_) continue;
-    longest_ns_.store(std::max<std::int64_t>(longest_ns_.load(std::memory_order_relaxed), silence.count()), std::memory_order_relaxed);
+    longest_ns_.store(std::max<std::int64_t>(longest_ns_.load(std::memory_order_relaxed), silence.count()),
+                      std::memory_order_relaxed);
     if (std::exchange(stalled, true)) continue;
     stalls_.fetch_add(1, std::memory_order_relaxed);
     if (late_) late_();

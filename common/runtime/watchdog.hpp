@@ -23,7 +23,9 @@ class Watchdog {
   void rest() noexcept { resting_.store(beats_.load(std::memory_order_relaxed), std::memory_order_relaxed); }
   // Any thread.
   [[nodiscard]] std::uint64_t stalls() const noexcept { return stalls_.load(std::memory_order_relaxed); }
-  [[nodiscard]] std::chrono::nanoseconds longest() const noexcept { return std::chrono::nanoseconds(longest_ns_.load(std::memory_order_relaxed)); }
+  [[nodiscard]] std::chrono::nanoseconds longest() const noexcept {
+    return std::chrono::nanoseconds(longest_ns_.load(std::memory_order_relaxed));
+  }
 
  private:
   void watch(int priority);

@@ -29,17 +29,20 @@ void measure(double seconds) {
     }
   }).join();
   std::printf("%.0f ticks of an empty loop%s woke late by %.1f us (median), %.1f us (99 of 100), %.1f us at most; %llu missed.\n",
-              1000.0 * seconds, fifo ? "" : ", without real-time priority,", stats.lateness.percentile_us(50), stats.lateness.percentile_us(99),
-              stats.lateness.max_us(), static_cast<unsigned long long>(stats.missed));
+              1000.0 * seconds, fifo ? "" : ", without real-time priority,", stats.lateness.percentile_us(50),
+              stats.lateness.percentile_us(99), stats.lateness.max_us(), static_cast<unsigned long long>(stats.missed));
 }
 
 }  // namespace
 
 int run_check(int argc, char** argv) {
-  CLI::App app("Says what this machine lacks for a haptic loop of 1 kHz, and how to set it. Exits with 0 when it lacks nothing, 1 else.",
-               "osteon-haptic check");
+  CLI::App app(
+      "Says what this machine lacks for a haptic loop of 1 kHz, and how to set it. Exits with 0 when it lacks nothing, 1 else.",
+      "osteon-haptic check");
   double seconds = 1.0;
-  app.add_option("--seconds", seconds, "How long to run an empty loop; 0: not at all")->check(CLI::Range(0.0, 3600.0))->capture_default_str();
+  app.add_option("--seconds", seconds, "How long to run an empty loop; 0: not at all")
+      ->check(CLI::Range(0.0, 3600.0))
+      ->capture_default_str();
   if (const auto code = parse_arguments(app, argc, argv)) return *code == 0 ? 0 : 2;
 
   int lacking = 0;

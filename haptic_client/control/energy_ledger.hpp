@@ -28,8 +28,8 @@ struct EnergyReport {
   bool held_back = false;    // the monitor cut the force
 };
 
-// One tick: observe(), paid_n_per_mm(), settle(), draw(), limited(), in this order; all [haptic]. Vectors in one frame of any orientation, lengths
-// of the handle's own motion.
+// One tick: observe(), paid_n_per_mm(), settle(), draw(), limited(), in this order; all [haptic]. Vectors in one frame of any
+// orientation, lengths of the handle's own motion.
 class EnergyLedger {
  public:
   explicit EnergyLedger(const EnergyParams& params = {}) : params_(params) {}

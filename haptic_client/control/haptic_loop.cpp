@@ -213,8 +213,10 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   report.force_device_n = report.coupling_device_n + report.motor_device_n;
 
   // Torque, for a device that shows it; never a force. What the hand did not turn grows slowly, as force does.
-  const Vec3 wanted_nmm = moment.touching && safe ? clamped(ramp_ * s * report.torque_physical_nmm, params_.peak_nmm) : Vec3(Vec3::Zero());
-  const double most_nmm = torque_bone_nmm_.norm() + Proxy::kTurnArm_mm * params_.slew_n_per_ms * 1e3 * params_.dt_s * input.periods;
+  const Vec3 wanted_nmm =
+      moment.touching && safe ? clamped(ramp_ * s * report.torque_physical_nmm, params_.peak_nmm) : Vec3(Vec3::Zero());
+  const double most_nmm =
+      torque_bone_nmm_.norm() + Proxy::kTurnArm_mm * params_.slew_n_per_ms * 1e3 * params_.dt_s * input.periods;
   torque_bone_nmm_ = clamped(wanted_nmm, most_nmm);
   report.torque_device_nmm = mapping_.to_device(torque_bone_nmm_);
 }
@@ -225,7 +227,8 @@ Vec3 HapticLoop::slewed(const Vec3& wanted_n, double hand_mm, int periods, LoopR
   const double square = force_bone_n_.squaredNorm();
   const double kept = square > 0.0 ? std::clamp(wanted_n.dot(force_bone_n_) / square, 0.0, 1.0) : 0.0;
   const Vec3 from_n = kept * force_bone_n_, step_n = wanted_n - from_n;
-  const double most_n = 2.0 * params_.force_scale * coupling_n_per_mm_ * hand_mm + params_.slew_n_per_ms * 1e3 * params_.dt_s * periods;
+  const double most_n =
+      2.0 * params_.force_scale * coupling_n_per_mm_ * hand_mm + params_.slew_n_per_ms * 1e3 * params_.dt_s * periods;
   if (step_n.norm() <= most_n) return wanted_n;
   report.events |= kSlewLimited;
   return from_n + step_n * (most_n / step_n.norm());

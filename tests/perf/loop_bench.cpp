@@ -60,10 +60,12 @@ void measure(const char* name, const PlanStep& step, double width_mm, int rounds
       bench.follow();
     }
   }
-  std::printf("\"%s_ticks\": %llu, \"%s_p50_us\": %.3f, \"%s_p99_us\": %.3f, \"%s_max_us\": %.3f, \"%s_cutting_p50_us\": %.3f, "
-              "\"%s_cutting_p99_us\": %.3f",
-              name, static_cast<unsigned long long>(cost->all.count()), name, cost->all.percentile_us(50), name, cost->all.percentile_us(99), name,
-              cost->all.max_us(), name, cost->cutting.percentile_us(50), name, cost->cutting.percentile_us(99));
+  std::printf(
+      "\"%s_ticks\": %llu, \"%s_p50_us\": %.3f, \"%s_p99_us\": %.3f, \"%s_max_us\": %.3f, \"%s_cutting_p50_us\": %.3f, "
+      "\"%s_cutting_p99_us\": %.3f",
+      name, static_cast<unsigned long long>(cost->all.count()), name, cost->all.percentile_us(50), name,
+      cost->all.percentile_us(99), name, cost->all.max_us(), name, cost->cutting.percentile_us(50), name,
+      cost->cutting.percentile_us(99));
 }
 
 // The client's two threads that matter, and a room that answers after 20 ms or is silent.
@@ -82,11 +84,13 @@ class Blackout {
     constexpr const char* kNames[] = {"before", "blackout", "after"};
     for (int i = 0; i < 3; ++i) {
       const TickStats& s = stats_[i];
-      std::printf("%s\"%s\": {\"ticks\": %llu, \"missed\": %llu, \"late_p50_us\": %.3f, \"late_p99_us\": %.3f, \"late_p999_us\": %.3f, "
-                  "\"late_max_us\": %.3f, \"work_p50_us\": %.3f, \"work_p99_us\": %.3f, \"cutting_ticks\": %ld, \"held_ticks\": %ld}",
-                  i > 0 ? ", " : "", kNames[i], static_cast<unsigned long long>(s.work.count()), static_cast<unsigned long long>(s.missed),
-                  s.lateness.percentile_us(50), s.lateness.percentile_us(99), s.lateness.percentile_us(99.9), s.lateness.max_us(),
-                  s.work.percentile_us(50), s.work.percentile_us(99), cutting_[i], held_[i]);
+      std::printf(
+          "%s\"%s\": {\"ticks\": %llu, \"missed\": %llu, \"late_p50_us\": %.3f, \"late_p99_us\": %.3f, \"late_p999_us\": %.3f, "
+          "\"late_max_us\": %.3f, \"work_p50_us\": %.3f, \"work_p99_us\": %.3f, \"cutting_ticks\": %ld, \"held_ticks\": %ld}",
+          i > 0 ? ", " : "", kNames[i], static_cast<unsigned long long>(s.work.count()),
+          static_cast<unsigned long long>(s.missed), s.lateness.percentile_us(50), s.lateness.percentile_us(99),
+          s.lateness.percentile_us(99.9), s.lateness.max_us(), s.work.percentile_us(50), s.work.percentile_us(99), cutting_[i],
+          held_[i]);
     }
     std::printf(", \"realtime\": %s, \"most_unconfirmed\": %zu", realtime_ ? "true" : "false", most_unconfirmed_);
   }
@@ -134,7 +138,8 @@ class Blackout {
         heard = true;
       }
       most_unconfirmed_ = std::max(most_unconfirmed_, replica_.unconfirmed());
-      follows_ = watch.update(std::chrono::duration<double>(now.time_since_epoch()).count(), heard, replica_.unconfirmed()) == RoomHealth::follows;
+      follows_ = watch.update(std::chrono::duration<double>(now.time_since_epoch()).count(), heard, replica_.unconfirmed()) ==
+                 RoomHealth::follows;
       places_.refresh();
       for (const ChangedLeaves& change : replica_.take_changes()) builder.changed(bone_.pitch_mm(), change.level, change.origins);
       Patch& patch = patches_.writable();
@@ -170,7 +175,8 @@ int run(int argc, char** argv) {
   }
   const double seconds = what == "blackout" && argc > 2 ? std::atof(argv[2]) : 0.0;
   if (!(seconds > 0.0 && seconds <= 600.0)) {
-    std::fprintf(stderr, "osteon-loop-bench: needs `tick`, or `blackout` and the seconds of each part, more than 0 and at most 600\n");
+    std::fprintf(stderr,
+                 "osteon-loop-bench: needs `tick`, or `blackout` and the seconds of each part, more than 0 and at most 600\n");
     return 1;
   }
   std::printf("{");

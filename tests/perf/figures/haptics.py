@@ -53,8 +53,9 @@ def blackout(run):
     rows = [("part", "ticks", "missed", "late us p50", "p99", "p99.9", "max", "work us p50", "p99", "cutting", "held")]
     for part in ("before", "blackout", "after"):
         p = out[part]
-        rows.append((part, p["ticks"], p["missed"], f"{p['late_p50_us']:.1f}", f"{p['late_p99_us']:.1f}", f"{p['late_p999_us']:.1f}",
-                     f"{p['late_max_us']:.0f}", f"{p['work_p50_us']:.1f}", f"{p['work_p99_us']:.1f}", p["cutting_ticks"], p["held_ticks"]))
+        rows.append((part, p["ticks"], p["missed"], f"{p['late_p50_us']:.1f}", f"{p['late_p99_us']:.1f}",
+                     f"{p['late_p999_us']:.1f}", f"{p['late_max_us']:.0f}", f"{p['work_p50_us']:.1f}",
+                     f"{p['work_p99_us']:.1f}", p["cutting_ticks"], p["held_ticks"]))
     run.tables.append((f"network blackout, real-time {'on' if out['realtime'] else 'refused'}, at most {out['most_unconfirmed']} "
                        "cuts unconfirmed", rows))
     without = 0.5 * (out["before"]["missed"] + out["after"]["missed"])

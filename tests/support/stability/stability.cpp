@@ -60,7 +60,8 @@ struct Gesture {
     const double u = wave(across_hz[0], phase[0]), v = wave(across_hz[1], phase[1]);
     if (!hollow) return Vec3(across_mm * u, across_mm * v, press) + tremor_mm * tremor;
     // Round the inside of a hollow, pressing outwards: the burr's middle is half as far out as the wall.
-    return Vec3(0, 0, -1.0) + (kCavity_mm - 2.5 + press) * Vec3(0.9 * u, 0.9 * v, 1.0).normalized() + tip_from_middle_mm + tremor_mm * tremor;
+    return Vec3(0, 0, -1.0) + (kCavity_mm - 2.5 + press) * Vec3(0.9 * u, 0.9 * v, 1.0).normalized() + tip_from_middle_mm +
+           tremor_mm * tremor;
   }
 };
 
@@ -140,20 +141,28 @@ class Observer {
 class Round {
  public:
   Round(const StabilityRun& run, int number, StabilityResult& result)
-      : run_(run), result_(result), random_(run.seed * 1000 + static_cast<std::uint64_t>(number)), rig_(number % 2 == 1),
-        bone_(scene_bone(run.scene)), replica_(bone_, BodyId{}), room_(bone_, static_cast<int>(std::lround(1e-3 * run.delay_ms / run.dt_s))) {
+      : run_(run),
+        result_(result),
+        random_(run.seed * 1000 + static_cast<std::uint64_t>(number)),
+        rig_(number % 2 == 1),
+        bone_(scene_bone(run.scene)),
+        replica_(bone_, BodyId{}),
+        room_(bone_, static_cast<int>(std::lround(1e-3 * run.delay_ms / run.dt_s))) {
     const SimulatedDeviceParams device = number / 2 % 2 ? *find_simulated_device("simulated-3.3N") : SimulatedDeviceParams{};
     LoopParams params = loop_params(device.limits.peak_n, device.limits.continuous_n, device.limits.stiffness_n_per_mm, 0.0);
     params.dt_s = run.dt_s;
-    const char* const tool = run.scene == StabilityScene::drill ? "drill-3.2" : run.scene == StabilityScene::thin_wall ? "burr-round-3.2" : "burr-round-5";
+    const char* const tool = run.scene == StabilityScene::drill       ? "drill-3.2"
+                             : run.scene == StabilityScene::thin_wall ? "burr-round-3.2"
+                                                                      : "burr-round-5";
     loop_ = std::make_unique<HapticLoop>(params, std::vector<ToolModel>{ToolModel(*find_tool(tool), bone_.pitch_mm())});
     full_rpm_ = std::max(1000.0, loop_->tool(0).tool.spindle_rpm);
 
-    const Pose start{{0, 0, -3}, Eigen::Quaterniond(Eigen::AngleAxisd(run.scene == StabilityScene::drill ? 0.0 : 0.5, Vec3::UnitX()))};
+    const Pose start{{0, 0, -3},
+                     Eigen::Quaterniond(Eigen::AngleAxisd(run.scene == StabilityScene::drill ? 0.0 : 0.5, Vec3::UnitX()))};
     rotation_ = start.rotation;
     WorkspaceMapping mapping;
-    mapping.align(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized())), device.limits.stiffness_n_per_mm < 10.0 ? 0.5 : 1.0,
-                  Vec3::Zero(), start.position_mm);
+    mapping.align(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized())),
+                  device.limits.stiffness_n_per_mm < 10.0 ? 0.5 : 1.0, Vec3::Zero(), start.position_mm);
     loop_->take_up(0, start, mapping);
     device_ = std::make_unique<SimulatedDevice>(device);
     HandParams hand = expert_hand();
@@ -181,7 +190,8 @@ class Round {
 
     // From where it was taken up into the gesture within half a second.
     const double in = std::min(1.0, 2.0 * t);
-    const Vec3 target_mm = in * gesture_->at(walked_s_, 2.5 * (rotation_ * Vec3::UnitZ()), run_.scene == StabilityScene::cavity) + (1.0 - in) * Vec3(0, 0, -3);
+    const Vec3 target_mm = in * gesture_->at(walked_s_, 2.5 * (rotation_ * Vec3::UnitZ()), run_.scene == StabilityScene::cavity) +
+                           (1.0 - in) * Vec3(0, 0, -3);
     const WorkspaceMapping& mapping = loop_->mapping();
     HandCommand command;
     command.mode = rig_ ? HandMode::rig : HandMode::carry;
@@ -200,7 +210,8 @@ class Round {
     device_->write(DeviceOutput(report.force_device_n));
     observer_->see(report, reading.pose_device_tool.position_mm, pedal);
     const double below_mm = report.pose_bone_proxy.position_mm.z();
-    if (run_.scene == StabilityScene::thin_wall && std::hypot(report.pose_bone_proxy.position_mm.x(), report.pose_bone_proxy.position_mm.y()) < 6.0)
+    if (run_.scene == StabilityScene::thin_wall &&
+        std::hypot(report.pose_bone_proxy.position_mm.x(), report.pose_bone_proxy.position_mm.y()) < 6.0)
       result_.deepest_mm = std::max(result_.deepest_mm, below_mm);
 
     follow(report, i);
@@ -221,7 +232,8 @@ class Round {
         const Tool other = *find_tool("burr-round-3.2");
         const Vec3 at = report.pose_bone_proxy.position_mm + random_.in_cube(2.0);
         const Vec3 tip(at.x(), at.y(), std::clamp(at.z(), 0.2, 3.0));
-        room_.commit_other(straight_cut(other, tip, tip + Vec3(random_.between(-1.5, 1.5), random_.between(-1.5, 1.5), 0.0), Vec3::UnitZ()));
+        room_.commit_other(
+            straight_cut(other, tip, tip + Vec3(random_.between(-1.5, 1.5), random_.between(-1.5, 1.5), 0.0), Vec3::UnitZ()));
       }
       // Also under a handle that stands still.
       if (every(1.55) && i > 0) room_.undo(1 + static_cast<int>(random_.index(30)));
@@ -265,9 +277,10 @@ void StabilityResult::add(const StabilityResult& other) {
   generated_mj += other.generated_mj, net_mj += other.net_mj, cutting_mj += other.cutting_mj;
   worst_mj = std::max(worst_mj, other.worst_mj);
   least_cutting_n_mm = std::min(least_cutting_n_mm, other.least_cutting_n_mm);
-  for (double StabilityResult::*most : {&StabilityResult::step_over_n, &StabilityResult::still_step_n, &StabilityResult::motor_over_n,
-                                        &StabilityResult::motor_late_n, &StabilityResult::motor_most_n, &StabilityResult::force_most_n,
-                                        &StabilityResult::deepest_mm})
+  for (double StabilityResult::*most :
+       {&StabilityResult::step_over_n, &StabilityResult::still_step_n, &StabilityResult::motor_over_n,
+        &StabilityResult::motor_late_n, &StabilityResult::motor_most_n, &StabilityResult::force_most_n,
+        &StabilityResult::deepest_mm})
     this->*most = std::max(this->*most, other.*most);
 }
 

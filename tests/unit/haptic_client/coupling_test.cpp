@@ -198,7 +198,8 @@ TEST_F(CouplingAtWall, ReturnedBoneStoresNothing) {
     const double released = offset - coupling_.offset_mm().norm();
     EXPECT_GE(released, -1e-12);
     if (released > 0.0) {
-      paid_mj -= ledger_.report().stored_mj - 0.5 * 50.0 * std::pow(std::sqrt(2.0 * ledger_.report().stored_mj / 50.0) - released, 2);
+      paid_mj -=
+          ledger_.report().stored_mj - 0.5 * 50.0 * std::pow(std::sqrt(2.0 * ledger_.report().stored_mj / 50.0) - released, 2);
     }
     EXPECT_GE(paid_mj, -1e-6) << i;
     handle = next;

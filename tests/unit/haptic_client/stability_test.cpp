@@ -16,11 +16,12 @@ TEST_P(Stability, TheCouplingGivesNothingAway) {
   run.delay_ms = std::get<1>(GetParam());
   run.ticks = 40'000;  // rig and hand on a strong device and on a weak one
   const StabilityResult r = run_stability(run);
-  std::printf("  %s, %d ms: %llu contacts, generated %.4f mJ, worst %.5f, net %.1f, cutting %.1f; steps over %.3f N, still %.3f N; "
-              "motor %.2f N; uncovered %lld, held back %lld, returned %lld\n",
-              name(run.scene), run.delay_ms, static_cast<unsigned long long>(r.episodes), r.generated_mj, r.worst_mj, r.net_mj, r.cutting_mj,
-              r.step_over_n, r.still_step_n, r.motor_most_n, static_cast<long long>(r.uncovered), static_cast<long long>(r.held_back),
-              static_cast<long long>(r.returned));
+  std::printf(
+      "  %s, %d ms: %llu contacts, generated %.4f mJ, worst %.5f, net %.1f, cutting %.1f; steps over %.3f N, still %.3f N; "
+      "motor %.2f N; uncovered %lld, held back %lld, returned %lld\n",
+      name(run.scene), run.delay_ms, static_cast<unsigned long long>(r.episodes), r.generated_mj, r.worst_mj, r.net_mj,
+      r.cutting_mj, r.step_over_n, r.still_step_n, r.motor_most_n, static_cast<long long>(r.uncovered),
+      static_cast<long long>(r.held_back), static_cast<long long>(r.returned));
   EXPECT_LE(r.worst_mj, 0.01);
   EXPECT_LE(r.generated_mj, 1.0);
   EXPECT_GE(r.least_cutting_n_mm, 0.0);

@@ -28,9 +28,10 @@ Felt drill(double dt_s, double pitch_mm) {
   bench.run();
   EXPECT_TRUE(bench.session().done());
   const StepResult& result = bench.session().surgeon().results()[0];
-  const Felt felt{result.near_cortex.force_n, result.medulla.force_n, result.near_cortex.feed_mm_per_s, result.medulla.feed_mm_per_s};
-  std::printf("  %.1f kHz, h %.2f mm: %.2f and %.2f N, %.3f and %.2f mm/s\n", 1e-3 / dt_s, pitch_mm, felt.cortex_n, felt.medulla_n,
-              felt.cortex_feed, felt.medulla_feed);
+  const Felt felt{result.near_cortex.force_n, result.medulla.force_n, result.near_cortex.feed_mm_per_s,
+                  result.medulla.feed_mm_per_s};
+  std::printf("  %.1f kHz, h %.2f mm: %.2f and %.2f N, %.3f and %.2f mm/s\n", 1e-3 / dt_s, pitch_mm, felt.cortex_n,
+              felt.medulla_n, felt.cortex_feed, felt.medulla_feed);
   return felt;
 }
 
@@ -69,7 +70,8 @@ TEST(Ticks, ASpindleStallsInBoneAndTurnsAgain) {
     last_mm = r.pose_bone_proxy.position_mm.z();
     if (tick.order.phase == SurgeonPhase::retract) again_rpm = std::max(again_rpm, r.spindle_rpm);
   });
-  EXPECT_GT(stood, 10'000) << pushing << " ticks of pushing, down to " << least_rpm << " rpm, " << torque_nmm << " N mm, " << last_mm << " mm";
+  EXPECT_GT(stood, 10'000) << pushing << " ticks of pushing, down to " << least_rpm << " rpm, " << torque_nmm << " N mm, "
+                           << last_mm << " mm";
   EXPECT_NEAR(pushed_n, 29.0, 3.0);
   EXPECT_LT(advanced_mm, 0.2);  // all ways of a minute, both ways, added
   EXPECT_GT(again_rpm, 60.0);

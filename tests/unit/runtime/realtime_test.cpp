@@ -73,7 +73,8 @@ TEST(Machine, EachLackIsNamedWithItsRemedy) {
     one.spoil(facts);
     const auto findings = judge(facts, kPriority, kMemory_kib);
     EXPECT_EQ(findings.front().kind, one.kind) << one.sentence;  // what matters most comes first
-    EXPECT_EQ(std::ranges::count_if(findings, [](const MachineFinding& f) { return f.kind != Finding::fine; }), 1) << one.sentence;
+    EXPECT_EQ(std::ranges::count_if(findings, [](const MachineFinding& f) { return f.kind != Finding::fine; }), 1)
+        << one.sentence;
     EXPECT_NE(findings.front().sentence.find(one.sentence), std::string::npos) << findings.front().sentence;
     EXPECT_NE(findings.front().remedy.find(one.remedy), std::string::npos) << findings.front().remedy;
   }
