@@ -119,7 +119,7 @@ TEST(HandTools, EveryToolThatCutsTakesBone) {
     EXPECT_GE(stage.work_min_, 0.0) << tool.name;
     EXPECT_EQ(stage.allocations_, 0) << tool.name;
     // Drawn back it is free: nothing jams in what it has made.
-    EXPECT_EQ(back.force_physical_n.norm(), 0.0) << tool.name;
+    EXPECT_LT(back.force_physical_n.norm(), 1e-3) << tool.name;
     EXPECT_NEAR((back.pose_bone_proxy.position_mm - stage.input_.pose_device_tool.position_mm).norm(), 0.0, 1e-5) << tool.name;
     ++tried;
   }
