@@ -129,7 +129,7 @@ std::string dimensions(const Tool& tool) {
     if (value == 0) continue;
     char part[64];
     const std::string unit = field.name.substr(field.name.rfind('_') + 1);
-    std::snprintf(part, sizeof part, "%s%s %.4g %s", text.empty() ? "" : ", ", field.name.substr(0, field.name.rfind('_')).c_str(), value, unit == "rpm" ? "/min" : "mm");
+    std::snprintf(part, sizeof part, "%s%s %.6g %s", text.empty() ? "" : ", ", field.name.substr(0, field.name.rfind('_')).c_str(), value, unit == "rpm" ? "/min" : "mm");
     text += part;
   }
   std::ranges::replace(text, '_', ' ');

@@ -25,7 +25,7 @@ constexpr const char* kScriptHelp =
     "  wait seq N                            until the room's event N is drawn\n"
     "  wait bodies N                         until the room has so many bodies\n"
     "  wait items N                          until so many guides, pins, screws and implants stand\n"
-    "  undo N, redo N                        the newest N events of all; N undo events\n"
+    "  undo N, redo N                        the newest N events of all; N undo events; says how many there were\n"
     "  take-away BODY                        a sawn-off piece\n"
     "  place TOOL at X Y Z along X Y Z [on BODY]   a guide, pin, screw or implant\n"
     "  save [NAME.vdb]                       the cut fields, on the server beside its --save\n"
@@ -96,7 +96,7 @@ Result<void> run(const Arguments& arguments) {
   options.frame_log = arguments.frame_log;
   options.ask = [&watch = **watch](const RoomRequest& request) {
     return std::visit(
-        [&](const auto& asked) -> Result<RoomSeq> {
+        [&](const auto& asked) -> Result<RoomAnswer> {
           using Asked = std::decay_t<decltype(asked)>;
           if constexpr (std::is_same_v<Asked, UndoLast>) return watch.undo(asked.count);
           if constexpr (std::is_same_v<Asked, RedoLast>) return watch.redo(asked.count);

@@ -249,13 +249,14 @@ std::optional<Result<void>> Viewer::obey(const Command& command) {
 
 std::optional<Result<void>> Viewer::obey_room(const RoomRequest& request) {
   if (!asked_) {
-    const Result<RoomSeq> answer =
+    const Result<RoomAnswer> answer =
         options_.ask ? options_.ask(request) : failure(ErrorCode::unavailable, "this viewer has no room to ask");
     if (!answer) return Result<void>(tl::unexpected(answer.error()));
     if (std::holds_alternative<SaveBone>(request)) return Result<void>{};
     asked_ = *answer;
   }
-  if (!surface_shown_ || shown_seq_ < *asked_) return std::nullopt;
+  if (!surface_shown_ || shown_seq_ < asked_->place) return std::nullopt;
+  if (asked_->events) pending_->line += ": " + std::to_string(*asked_->events) + (*asked_->events == 1 ? " event" : " events");
   asked_.reset();
   return Result<void>{};
 }

@@ -15,6 +15,7 @@
 #include "viewer_client/app/script.hpp"
 #include "viewer_client/render/window.hpp"
 #include "viewer_client/scene/inbox.hpp"
+#include "viewer_client/scene/room_answer.hpp"
 
 namespace osteon {
 
@@ -25,8 +26,8 @@ struct ViewerOptions {
   bool answers = false;             // say ok or error on standard output after each command
   bool stop_at_error = false;       // a command that fails ends the run
   std::function<void(const CameraView&)> looked;  // hears after every turn where the window looks
-  // Asks the room and waits for its answer: the place of the event.
-  std::function<Result<RoomSeq>(const RoomRequest&)> ask;
+  // Asks the room and waits for its answer.
+  std::function<Result<RoomAnswer>(const RoomRequest&)> ask;
 };
 
 // [render]
@@ -68,7 +69,7 @@ class Viewer {
   std::vector<CuttingState> states_;
   std::vector<SceneItem> items_;
   std::vector<BodyId> bodies_;
-  std::optional<RoomSeq> asked_;   // the event that the pending command has caused
+  std::optional<RoomAnswer> asked_;  // of the pending command
   bool tool_shown_ = true;
   bool interrupted_ = false;
   bool surface_complete_ = false;  // the whole surface has come

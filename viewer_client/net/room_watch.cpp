@@ -66,6 +66,11 @@ Result<Response> ask(const std::shared_ptr<grpc::Channel>& channel,
   return failure(code, status.error_message());
 }
 
+template <class Response>
+Result<RoomAnswer> answered(const Response& response, std::optional<int> events = {}) {
+  return RoomAnswer{RoomSeq{response.room_seq()}, events};
+}
+
 // The tools that the window can draw without being sent them.
 class KnownTools {
  public:
@@ -372,34 +377,34 @@ void RoomWatch::look(const Look& from) {
 
 bool RoomWatch::interrupted() const { return impl_->interrupted.load(); }
 
-Result<RoomSeq> RoomWatch::undo(std::uint32_t count) {
+Result<RoomAnswer> RoomWatch::undo(std::uint32_t count) {
   const auto [channel, author] = impl_->line();
   v1::UndoRequest request;
   request.set_author(author);
   request.set_count(count);
   const auto answer = ask(channel, &v1::RoomService::Stub::Undo, request);
-  return answer ? Result<RoomSeq>(RoomSeq{answer->room_seq()}) : tl::unexpected(answer.error());
+  return answer ? answered(*answer, answer->undone_size()) : tl::unexpected(answer.error());
 }
 
-Result<RoomSeq> RoomWatch::redo(std::uint32_t count) {
+Result<RoomAnswer> RoomWatch::redo(std::uint32_t count) {
   const auto [channel, author] = impl_->line();
   v1::RedoRequest request;
   request.set_author(author);
   request.set_count(count);
   const auto answer = ask(channel, &v1::RoomService::Stub::Redo, request);
-  return answer ? Result<RoomSeq>(RoomSeq{answer->room_seq()}) : tl::unexpected(answer.error());
+  return answer ? answered(*answer, answer->redone_size()) : tl::unexpected(answer.error());
 }
 
-Result<RoomSeq> RoomWatch::remove_body(BodyId body) {
+Result<RoomAnswer> RoomWatch::remove_body(BodyId body) {
   const auto [channel, author] = impl_->line();
   v1::RemoveBodyRequest request;
   request.set_author(author);
   request.set_body(body.value);
   const auto answer = ask(channel, &v1::RoomService::Stub::RemoveBody, request);
-  return answer ? Result<RoomSeq>(RoomSeq{answer->room_seq()}) : tl::unexpected(answer.error());
+  return answer ? answered(*answer) : tl::unexpected(answer.error());
 }
 
-Result<RoomSeq> RoomWatch::place(const std::string& tool, const Pose& pose_bone_item, BodyId body) {
+Result<RoomAnswer> RoomWatch::place(const std::string& tool, const Pose& pose_bone_item, BodyId body) {
   const auto [channel, author] = impl_->line();
   v1::ListToolsRequest list;
   list.set_author(author);
@@ -413,16 +418,16 @@ Result<RoomSeq> RoomWatch::place(const std::string& tool, const Pose& pose_bone_
   request.mutable_item()->set_body(body.value);
   *request.mutable_item()->mutable_pose_bone_item() = wire::to_wire(pose_bone_item);
   const auto answer = ask(channel, &v1::RoomService::Stub::SetSceneItem, request);
-  return answer ? Result<RoomSeq>(RoomSeq{answer->room_seq()}) : tl::unexpected(answer.error());
+  return answer ? answered(*answer) : tl::unexpected(answer.error());
 }
 
-Result<RoomSeq> RoomWatch::save(const std::string& file_name) {
+Result<RoomAnswer> RoomWatch::save(const std::string& file_name) {
   const auto [channel, author] = impl_->line();
   v1::SaveFieldsRequest request;
   request.set_author(author);
   request.set_file_name(file_name);
   const auto answer = ask(channel, &v1::RoomService::Stub::SaveFields, request);
-  return answer ? Result<RoomSeq>(RoomSeq{answer->room_seq()}) : tl::unexpected(answer.error());
+  return answer ? answered(*answer) : tl::unexpected(answer.error());
 }
 
 }  // namespace osteon

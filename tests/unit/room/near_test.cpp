@@ -69,12 +69,14 @@ class Reader final : public MeshSink {
     const std::lock_guard lock(mutex_);
     double nearest = 1e9;
     int level = kCoarsestLevel;
-    for (const auto& [key, payload] : blocks_)
-      for (const auto& p : decode_block(key, payload, level_pitch_mm(kPitch_mm, key.level))->positions_mm)
+    for (const auto& [key, payload] : blocks_) {
+      const auto mesh = decode_block(key, payload, level_pitch_mm(kPitch_mm, key.level));
+      for (const auto& p : mesh->positions_mm)
         if (const double distance = (Vec3(p[0], p[1], p[2]) - place_mm).norm(); distance < nearest) {
           nearest = distance;
           level = key.level;
         }
+    }
     return level;
   }
   const std::set<int>& first_levels() const { return first_; }
