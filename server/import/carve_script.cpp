@@ -105,7 +105,11 @@ Pose pose_across(const Vec3& tip_mm, const Vec3& axis, const Vec3& across) {
 
 Result<Tool> tool_named(const std::string& name, const fs::path& folder) {
   const fs::path given(name);
-  if (given.extension() != ".yaml" && given.extension() != ".yml") return find_tool(name);
+  if (given.extension() != ".yaml" && given.extension() != ".yml") {
+    Result<Tool> known = find_tool(name);
+    if (!known) return failure(known.error().code, known.error().message + "; or name a tool file of yours, such as my-tool.yaml");
+    return known;
+  }
   return load_tool_file(given.is_absolute() ? given : folder / given);  // with the STL that it may name
 }
 
