@@ -25,11 +25,9 @@ namespace osteon {
 namespace {
 
 using Clock = RoomHost::Clock;
+constexpr Coord kFirstCoord{INT32_MIN, INT32_MIN, INT32_MIN};  // before every block of a level
 
 }  // namespace
-
-// Before every block of a body.
-constexpr Coord kFirstCoord{INT32_MIN, INT32_MIN, INT32_MIN};
 
 // Leaves copied at once. Between two batches the room goes on cutting.
 constexpr std::size_t kLeafBatch = 64;
@@ -396,7 +394,7 @@ void RoomHost::Impl::make_stale_blocks(bool due) {
     std::vector<BlockKey> gone;
     for (auto block = surface.blocks.begin(); block != surface.blocks.end();) {
       const BodyId body = block->first.body;
-      const auto next_body = surface.blocks.lower_bound({BodyId{body.value + 1}, 0, kFirstCoord});
+      const auto next_body = surface.blocks.lower_bound({BodyId{body.value + 1}, kCoarsestLevel, kFirstCoord});
       if (!std::ranges::binary_search(bodies_now, body))
         for (; block != next_body; ++block) gone.push_back(block->first);
       block = next_body;
@@ -608,8 +606,12 @@ void RoomHost::Impl::run_pieces() {
       pieces_due = look_wanted = false;
       ++looks_begun;
     }
-    if (rates_.pieces.count() > 0)
+    if (rates_.pieces.count() > 0) {
       for (Separation& found : pieces.look()) ask_for_split(std::move(found));
+    } else {
+      const std::unique_lock room_lock(room_mutex);
+      (void)room.take_changes();  // nobody else does
+    }
     std::unique_lock lock(pieces_mutex);
     looks_done = looks_begun;
     pieces_wake.notify_all();
@@ -623,7 +625,7 @@ void RoomHost::Impl::ask_for_split(Separation found) {
   bool decided = false;
   {
     const std::lock_guard lock(queue_mutex);
-    if (queue_closed) return;  // stop() looks once more
+    if (queue_closed) return pieces.lose(shared->parent);  // stop() looks once more, at all of it
     queue.emplace_back(std::in_place_type<QueuedEvent>,
                        QueuedEvent{[shared](Room& r) { return r.split(std::move(*shared)); },
                                    [this, shared, &decided](const Result<RoomEvent>& split) {
