@@ -257,6 +257,7 @@ std::optional<Result<void>> Viewer::obey_room(const RoomRequest& request) {
   }
   if (!surface_shown_ || shown_seq_ < asked_->place) return std::nullopt;
   if (asked_->events) pending_->line += ": " + std::to_string(*asked_->events) + (*asked_->events == 1 ? " event" : " events");
+  if (!asked_->said.empty()) pending_->line += ": " + asked_->said;
   asked_.reset();
   return Result<void>{};
 }
@@ -269,6 +270,17 @@ std::string Viewer::summary_json() const {
   };
   nlohmann::ordered_json bodies = nlohmann::ordered_json::array();
   for (const BodyId body : bodies_) bodies.push_back(body.value);
+  nlohmann::ordered_json standing = nlohmann::ordered_json::array();
+  for (const SceneItem& item : items_) {
+    const Vec3 &at = item.pose_bone_item.position_mm, along = item.pose_bone_item.direction(Vec3::UnitZ());
+    standing.push_back({{"item", item.id},
+                        {"body", item.body.value},
+                        {"tool_hash", to_hex(item.tool)},
+                        {"at_mm", {at.x(), at.y(), at.z()}},
+                        {"along", {along.x(), along.y(), along.z()}},
+                        {"turns", item.turns},
+                        {"seated", item.seated}});
+  }
   const nlohmann::ordered_json summary{
       {"blocks", scene_.blocks()},
       {"regions", scene_.regions()},
@@ -277,6 +289,7 @@ std::string Viewer::summary_json() const {
       {"room_seq", shown_seq_.value},
       {"bodies", bodies},
       {"items", items_.size()},
+      {"standing", standing},
       {"frames", frames_},
       {"frame_ms", milliseconds(frame_times_)},
       {"update_ms", milliseconds(update_times_)},
