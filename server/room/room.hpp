@@ -102,8 +102,8 @@ struct RoomCounts {
 
 inline constexpr std::size_t kMostItems = 256, kMostTools = 1024, kMostBodies = 64;
 
-// Every body holds every cut: all bodies share the case's lattice and frame, a piece has all but itself taken away, and a
-// cut is applied to each of them, so the server, every replica and the undo of a split need no notion of which body a
+// Every body holds every cut, those that were taken away too: all bodies share the case's lattice and frame, a piece has
+// all but itself taken away, and a cut is applied to each of them, so the server, every replica and the undo of a split need no notion of which body a
 // tool meets. Not synchronised: one thread calls the changing functions, or several the const ones.
 class Room {
  public:
@@ -145,7 +145,8 @@ class Room {
 
   [[nodiscard]] RoomSeq room_seq() const { return room_seq_; }
   [[nodiscard]] const RoomCounts& counts() const { return counts_; }
-  [[nodiscard]] const Case& bone() const { return field().bone(); }
+  // Never changes, so that any thread may ask beside the one that changes the room.
+  [[nodiscard]] const Case& bone() const { return bone_; }
   [[nodiscard]] const std::shared_ptr<ToolBox>& tools() const { return tools_; }
   [[nodiscard]] std::vector<BodyId> bodies() const;  // that exist, in order
   [[nodiscard]] const CutField* find_field(BodyId body) const;  // null: no such body
@@ -222,6 +223,7 @@ class Room {
   void list_blocks(BodyId id, const Body& body, std::vector<BlockKey>& keys) const;
   RoomEvent take_back(AuthorId by, const std::set<RoomSeq>& falls);
 
+  Case bone_;
   CutLimits limits_;
   std::shared_ptr<ToolBox> tools_;  // shared with the fields and, beyond the room, with those that list tools
   std::map<BodyId, Body> bodies_;

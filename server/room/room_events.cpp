@@ -224,7 +224,8 @@ Result<void> Room::know(const Tool& tool) {
 }
 
 // What was done to a piece as such falls with the split that made it; with a cut falls every later split of a body that
-// the cut had reached, since the bone that comes back may hold the piece.
+// the cut had reached, since the bone that comes back may hold the piece; and so with an earlier split of that body, whose
+// bone would come back in the later piece too.
 std::set<RoomSeq> Room::with_what_falls_too(std::set<RoomSeq> places) const {
   std::set<BodyId> pieces_gone;
   bool more = true;
@@ -237,8 +238,7 @@ std::set<RoomSeq> Room::with_what_falls_too(std::set<RoomSeq> places) const {
         falls = pieces_gone.contains(event.body);
         const auto parent = bodies_.find(event.body);
         for (const RoomSeq fallen : places)
-          falls |= fallen < place && events_.at(fallen).kind == EventKind::cut && parent != bodies_.end() &&
-                   parent->second.history.contains(fallen);
+          falls |= fallen < place && parent != bodies_.end() && parent->second.history.contains(fallen);
       } else if (event.kind == EventKind::remove_body) {
         falls = pieces_gone.contains(event.body);
       }
