@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <charconv>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -20,7 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Arguments {
-  std::string bone, script, out, fields, surface, report, file, stl;
+  std::string bone, script, out, fields, surface, report, file, stl, tool, name, title;
+  std::vector<std::string> set;
   double cut_mm = 1.0;
   std::uint32_t body = 0;
 };
@@ -136,12 +138,68 @@ std::string dimensions(const Tool& tool) {
   return text;
 }
 
+// `field=value`, each by the rules of a tool file; says in words what was changed.
+Result<std::string> change(Tool& tool, const std::vector<std::string>& settings) {
+  std::string changes;
+  for (const std::string& setting : settings) {
+    const std::size_t equals = std::min(setting.find('='), setting.size());
+    const std::string field = setting.substr(0, equals);
+    double value = 0;
+    const char *begin = setting.data() + std::min(equals + 1, setting.size()), *end = setting.data() + setting.size();
+    const auto [stop, error] = std::from_chars(begin, end, value);
+    if (begin == end || error != std::errc{} || stop != end)
+      return failure(ErrorCode::invalid_input, "--set " + setting + " is not FIELD=NUMBER, such as diameter_mm=3");
+    auto changed = edited(tool, field, value);
+    if (!changed) return tl::unexpected(changed.error());
+    tool = std::move(*changed);
+    changes += ", " + field + " " + setting.substr(equals + 1);
+  }
+  return changes;
+}
+
+// The tool with what --set, --name and --title say, as a tool file. A room tells tools by their names, so that a changed
+// one gets another: that of its file unless --name gives one.
+Result<void> write_changed(Tool& tool, const Arguments& a) {
+  const fs::path file(a.out);
+  if (file.extension() != ".yaml" && file.extension() != ".yml") return failure(ErrorCode::invalid_input, a.out + " does not end in .yaml");
+  if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
+  const auto changes = change(tool, a.set);
+  if (!changes) return tl::unexpected(changes.error());
+  tool.name = a.name.empty() ? file.stem().string() : a.name;
+  tool.title = a.title.empty() ? tool.title + *changes : a.title;
+  const std::string text = to_yaml(tool);
+  auto good = parse_tool(text, a.out);
+  if (!good) return tl::unexpected(good.error());
+  tool = std::move(*good);
+  return write_file(a.out, text);
+}
+
+std::string limits(ToolKind kind) {
+  std::string text;
+  for (const EditableField& field : editable_fields(kind)) {
+    char line[120];
+    std::snprintf(line, sizeof line, "  %-20s %g to %g%s\n", field.name.c_str(), field.lowest, field.highest, field.whole ? ", whole" : "");
+    text += line;
+  }
+  return text;
+}
+
 Result<std::string> run_tools(const Arguments& a) {
   std::vector<Tool> tools(builtin_tools().begin(), builtin_tools().end());
   if (!a.file.empty()) {
     auto own = load_tool_file(a.file);  // with the STL that it may name
     if (!own) return tl::unexpected(own.error());
     tools = {std::move(*own)};
+  }
+  if (!a.tool.empty()) {
+    auto known = find_tool(a.tool);
+    if (!known) return tl::unexpected(known.error());
+    tools = {std::move(*known)};
+  }
+  if (a.out.empty() != a.set.empty()) return failure(ErrorCode::invalid_input, "a changed tool needs --set FIELD=NUMBER and --out FILE.yaml, both");
+  if (!a.set.empty()) {
+    if (tools.size() != 1) return failure(ErrorCode::invalid_input, "--set changes one tool: name it, or give its --file");
+    if (auto written = write_changed(tools.front(), a); !written) return tl::unexpected(written.error());
   }
   if (!a.stl.empty()) {
     std::error_code error;
@@ -156,6 +214,7 @@ Result<std::string> run_tools(const Arguments& a) {
     std::snprintf(line, sizeof line, "%-20s %-18s %-7s %.16s  %s\n", tool.name.c_str(), std::string(kind_name(tool.kind)).c_str(),
                   tool.cuts() ? ("level " + std::to_string(tool.cut_level)).c_str() : "-", to_hex(tool.hash()).c_str(), dimensions(tool).c_str());
     text += line;
+    if (!a.tool.empty() && a.set.empty()) text += limits(tool.kind);
     if (a.stl.empty()) continue;
     const TriangleMesh mesh = tool_surface(tool, 0.5);
     if (auto written = write_stl(mesh, fs::path(a.stl) / (tool.name + ".stl")); !written) return tl::unexpected(written.error());
@@ -192,8 +251,13 @@ void add_bone_commands(CLI::App& app, std::vector<Command>& commands) {
   carve->add_option("--cut", a.cut_mm, "Longest way of one cut, mm")->check(CLI::Range(0.01, 25.0))->capture_default_str();
   commands.push_back({carve, [shared](const StopSignal& stop) { return run_carve(*shared, stop); }});
 
-  CLI::App* tools = app.add_subcommand("tools", "List the tool box: name, kind, level of its cuts, hash, dimensions");
-  tools->add_option("--file", a.file, "Of a tool file instead");
+  CLI::App* tools = app.add_subcommand("tools", "List the tool box: name, kind, level of its cuts, hash, dimensions; or change a tool");
+  CLI::Option* named = tools->add_option("NAME", a.tool, "Of this tool alone, with what --set may change of it and the limits");
+  tools->add_option("--file", a.file, "Of a tool file instead")->excludes(named);
+  tools->add_option("--set", a.set, "Change a field, such as diameter_mm=3 or teeth=4; may be given again")->expected(1)->take_all();
+  tools->add_option("--out", a.out, "Write the changed tool to this file, .yaml");
+  tools->add_option("--name", a.name, "Its name; default: its file's, without .yaml");
+  tools->add_option("--title", a.title, "Its title; default: the old one and what was changed");
   tools->add_option("--stl", a.stl, "Also write each tool as NAME.stl into this folder");
   commands.push_back({tools, [shared](const StopSignal&) { return run_tools(*shared); }});
 
