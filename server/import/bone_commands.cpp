@@ -1,6 +1,8 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <charconv>
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -9,6 +11,7 @@
 #include "common/geometry/mesh_file.hpp"
 #include "common/runtime/files.hpp"
 #include "common/tools/tool_surface.hpp"
+#include "common/volume/cell_collision.hpp"
 #include "common/volume/field_file.hpp"
 #include "common/volume/mesh_distance.hpp"
 #include "server/import/bone_surface.hpp"
@@ -23,6 +26,8 @@ namespace fs = std::filesystem;
 struct Arguments {
   std::string bone, script, out, fields, surface, report, file, stl, tool, name, title;
   std::vector<std::string> set;
+  std::vector<double> at, axis;
+  int level = 0, points = 2000;
   double cut_mm = 1.0;
   std::uint32_t body = 0;
 };
@@ -44,21 +49,84 @@ Result<std::string> write_surface(const CutField& field, const std::string& file
   return std::string(text);
 }
 
-Result<std::string> run_surface(const Arguments& a, const StopSignal& stop) {
-  if (auto good = check_mesh_name(a.out); !good) return tl::unexpected(good.error());
+// The bone as it is after the cuts of --fields, as one body of them.
+Result<CutField> load_body(const Arguments& a) {
   auto bone = Case::load(a.bone);
   if (!bone) return tl::unexpected(bone.error());
   CutField field(*bone, BodyId{a.body});
-  if (!a.fields.empty()) {
-    const auto saved = load_fields(a.fields, *bone);
-    if (!saved) return tl::unexpected(saved.error());
-    if (std::ranges::find(saved->bodies, BodyId{a.body}) == saved->bodies.end())
-      return failure(ErrorCode::not_found, a.fields + " has no body " + std::to_string(a.body));
-    for (const FieldLeaf& leaf : saved->leaves)
-      if (leaf.body == BodyId{a.body}) field.restore(leaf);
-  }
+  if (a.fields.empty()) return field;
+  const auto saved = load_fields(a.fields, *bone);
+  if (!saved) return tl::unexpected(saved.error());
+  if (std::ranges::find(saved->bodies, BodyId{a.body}) == saved->bodies.end())
+    return failure(ErrorCode::not_found, a.fields + " has no body " + std::to_string(a.body));
+  for (const FieldLeaf& leaf : saved->leaves)
+    if (leaf.body == BodyId{a.body}) field.restore(leaf);
+  return field;
+}
+
+Result<std::string> run_surface(const Arguments& a, const StopSignal& stop) {
+  if (auto good = check_mesh_name(a.out); !good) return tl::unexpected(good.error());
+  const auto field = load_body(a);
+  if (!field) return tl::unexpected(field.error());
   Bar bar(stop, "meshing");
-  return write_surface(field, a.out, bar.stage(0.0, 1.0));
+  return write_surface(*field, a.out, bar.stage(0.0, 1.0));
+}
+
+// One way to ask whether the tool meets bone: its answer, the median of its times, what it keeps.
+template <class Ask>
+std::string contact_line(const char* way, const std::vector<SamplePoint>& points, const Pose& pose, std::size_t memory_bytes, Ask ask) {
+  using Clock = std::chrono::steady_clock;
+  std::array<double, 21> times_us;
+  std::optional<std::size_t> found;
+  for (double& time : times_us) {
+    const auto begin = Clock::now();
+    found = ask();
+    time = std::chrono::duration<double, std::micro>(Clock::now() - begin).count();
+  }
+  std::ranges::nth_element(times_us, times_us.begin() + times_us.size() / 2);
+  std::string where = "is free of bone";
+  if (found) {
+    const Vec3 at = pose.point(points[*found].position_mm);
+    char text[120];
+    std::snprintf(text, sizeof text, "meets bone at %.2f %.2f %.2f, point %zu", at.x(), at.y(), at.z(), *found);
+    where = text;
+  }
+  char line[240];
+  std::snprintf(line, sizeof line, "%-18s %-52s %9.1f us %9.3f MB\n", way, where.c_str(), times_us[times_us.size() / 2], static_cast<double>(memory_bytes) * 1e-6);
+  return line;
+}
+
+Result<std::string> run_contact(const Arguments& a) {
+  constexpr double kMostSamples = 1e8;
+  const auto tool = tool_named(a.tool, fs::current_path());
+  if (!tool) return tl::unexpected(tool.error());
+  const Vec3 axis(a.axis[0], a.axis[1], a.axis[2]);
+  if (!(axis.norm() > 1e-6)) return failure(ErrorCode::invalid_input, "--axis has no length");
+  const Pose pose = pose_along({a.at[0], a.at[1], a.at[2]}, axis.normalized());
+  const auto field = load_body(a);
+  if (!field) return tl::unexpected(field.error());
+
+  // The samples round the tool, as far as there is bone.
+  const std::vector<SamplePoint> points = sample_points(*tool, a.points);
+  const double pitch = level_pitch_mm(field->bone().pitch_mm(), a.level);
+  const Box bone = field->bone().bounds().grown(2.0 * pitch);
+  Box box{pose.position_mm, pose.position_mm};
+  for (const SamplePoint& point : points) {
+    box.min_mm = box.min_mm.cwiseMin(pose.point(point.position_mm));
+    box.max_mm = box.max_mm.cwiseMax(pose.point(point.position_mm));
+  }
+  box = box.grown(2.0 * pitch);
+  box = {box.min_mm.cwiseMax(bone.min_mm), box.max_mm.cwiseMin(bone.max_mm)};
+  if (!(box.min_mm.array() < box.max_mm.array()).all()) return tool->name + " is beyond the bone\n";
+  if ((box.max_mm - box.min_mm).prod() / (pitch * pitch * pitch) > kMostSamples)
+    return failure(ErrorCode::invalid_input, "the box round " + tool->name + " has more than 100 million samples; choose a lower --level");
+  const CoordBox samples = covering_samples(box, pitch);
+  const BoneCells cells(*field, a.level, samples);
+  const BoneDistance distance(*field, a.level, samples);
+  const auto of_cells = [&](MixedCell rule) { return [&cells, &points, &pose, rule] { return first_contact(cells, rule, points, pose); }; };
+  return contact_line("cells, nearest", points, pose, cells.memory_bytes(), of_cells(MixedCell::nearest)) +
+         contact_line("cells, trilinear", points, pose, cells.memory_bytes(), of_cells(MixedCell::trilinear)) +
+         contact_line("distance", points, pose, distance.memory_bytes(), [&] { return first_contact(distance, points, pose); });
 }
 
 // Peak memory of this process, MB; zero where the system does not say.
@@ -241,6 +309,17 @@ void add_bone_commands(CLI::App& app, std::vector<Command>& commands) {
   surface->add_option("--fields", a.fields, "What was cut from it: a file of carve, or of osteon-server --save");
   surface->add_option("--body", a.body, "Which body of the fields: 0 is the bone, others are pieces sawn off")->capture_default_str();
   commands.push_back({surface, [shared](const StopSignal& stop) { return run_surface(*shared, stop); }});
+
+  CLI::App* contact = app.add_subcommand("contact", "Ask whether a tool meets bone: by the segmentation's cells, two ways, and by the distance field");
+  contact->add_option("CASE_DIR", a.bone, "Folder of the case")->required();
+  contact->add_option("TOOL", a.tool, "A tool of the box, or a tool file")->required();
+  contact->add_option("--at", a.at, "Its tip, X,Y,Z, mm")->delimiter(',')->expected(3)->required();
+  contact->add_option("--axis", a.axis, "The way out of its tip, X,Y,Z")->delimiter(',')->expected(3)->required();
+  contact->add_option("--fields", a.fields, "What was cut from the bone: a file of carve, or of osteon-server --save");
+  contact->add_option("--body", a.body, "Which body of the fields")->capture_default_str();
+  contact->add_option("--level", a.level, "Ask at pitch h / 2^level")->check(CLI::Range(0, kLevels - 1))->capture_default_str();
+  contact->add_option("--points", a.points, "So many points of the tool's surface, about")->check(CLI::Range(100, 100000))->capture_default_str();
+  commands.push_back({contact, [shared](const StopSignal&) { return run_contact(*shared); }});
 
   CLI::App* carve = app.add_subcommand("carve", "Cut a bone as a script says, and say what every step did and cost");
   carve->add_option("CASE_DIR", a.bone, "Folder of the case")->required();

@@ -270,6 +270,38 @@ TEST_F(Scripts, TheToolBoxIsListedAndWritten) {
   EXPECT_EQ(std::ranges::count(own.out, '\n'), 1);
 }
 
+// How many of the three ways say that the tool meets bone.
+std::ptrdiff_t meeting(const std::string& text) {
+  std::ptrdiff_t count = 0;
+  for (std::size_t at = text.find("meets bone"); at != std::string::npos; at = text.find("meets bone", at + 1)) ++count;
+  return count;
+}
+
+TEST_F(Scripts, ContactIsAskedInThreeWays) {
+  const std::string program = OSTEON_IMPORT_PROGRAM;
+  ASSERT_EQ(test::run(program, {"phantom", "block", "--layers", "8:1.5", "--width", "12", "--pitch", "0.5", "--out", path("case")}).exit_code, 0);
+  const auto asked = [&](const char* at, std::vector<std::string> more = {}) {
+    std::vector<std::string> arguments{"contact", path("case"), "burr-round-3.2", "--at", at, "--axis", "0,0,-1"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const auto result = test::run(program, arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(std::ranges::count(result.out, '\n'), 3) << result.out;
+    return meeting(result.out);
+  };
+  // The block's top is z = 0, its samples are 0.5 mm apart: a millimetre either way is no matter of the way of asking.
+  EXPECT_EQ(asked("0,0,1"), 0);
+  EXPECT_EQ(asked("0,0,-1"), 3);
+  // In a groove of a bur of 5 mm, 3 mm deep, one of 3.2 mm is free a millimetre above its bottom, and not at the wall.
+  const auto script = write("steps: [{tool: burr-round-5, from: [-8, 0, -3], to: [8, 0, -3], axis: [0, 0, -1]}]").string();
+  ASSERT_EQ(test::run(program, {"carve", path("case"), script, "--out", path("f.vdb")}).exit_code, 0);
+  EXPECT_EQ(asked("0,0,-2", {"--fields", path("f.vdb"), "--level", "1"}), 0);
+  EXPECT_EQ(asked("0,0,-2"), 3) << "before the cut";
+  EXPECT_EQ(asked("0,2,-2", {"--fields", path("f.vdb"), "--level", "1"}), 3);
+  const auto beyond = test::run(program, {"contact", path("case"), "burr-round-3.2", "--at", "0,0,500", "--axis", "0,0,-1"});
+  EXPECT_NE(beyond.out.find("beyond the bone"), std::string::npos) << beyond.out;
+  EXPECT_EQ(test::run(program, {"contact", path("case"), "burr-round-3.2", "--at", "0,0,0", "--axis", "0,0,0"}).exit_code, 1);
+}
+
 TEST_F(Scripts, AToolOfTheBoxIsChangedWithoutWritingAFile) {
   const std::string program = OSTEON_IMPORT_PROGRAM;
   const auto limits = test::run(program, {"tools", "drill-3.2"});
