@@ -175,7 +175,7 @@ Tool read(const YAML::Node& root, const MeshLoader& load_mesh) {
   for (const FieldRule& rule : rules)
     if (rule.required && std::ranges::find(given, &rule) == given.end()) {
       const std::string field = rule.name.ends_with("_rad") ? in_degrees(rule.name) : std::string(rule.name);
-      throw Fault{"\"" + field + "\" is missing; a " + kind + " needs it, " + limits_sentence(rule)};
+      throw Fault{"\"" + field + "\" is missing; the kind " + kind + " needs it, " + limits_sentence(rule)};
     }
   if (tool.cuts() && !has_level) throw Fault{"\"cut_level\" is missing; choose 0 for large cutters, 2 for small ones and blades"};
   if (tool.kind == ToolKind::mesh && !tool.mesh) {

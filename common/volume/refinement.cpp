@@ -29,14 +29,16 @@ SubVolumeField::SubVolumeField(Case bone, int level, std::shared_ptr<const ToolB
 RefineReport SubVolumeField::apply(const Cut& cut) {
   OSTEON_CHECK(cut.level == level_);
   RefineReport report;
+  // The cut itself tells which leaves it reached, so its way through the bone is worked out once. Leaves that it has made
+  // are left alone by what is resampled after it.
+  report.cut = field_.apply(cut);
   std::set<Coord> touched;
-  for (const Coord leaf : field_.reach(cut)) touched.insert(floor_to(shift_down(leaf, level_), kSubVolumeSamples));
+  for (const Coord leaf : report.cut.reached_leaves) touched.insert(floor_to(shift_down(leaf, level_), kSubVolumeSamples));
   for (const Coord origin : touched) {
     if (surface_.contains(origin)) continue;
     resample(origin);
     ++report.resampled;
   }
-  report.cut = field_.apply(cut);
   return report;
 }
 
@@ -53,6 +55,7 @@ void SubVolumeField::resample(Coord origin) {
       for (std::int32_t z = box.min.z; z <= box.max.z; z += kLeafSize) {
         leaf.origin = {x, y, z};
         const Coord last = leaf.origin + Coord{kLeafSize - 1, kLeafSize - 1, kLeafSize - 1};
+        if (field_.has_cuts(level_, {leaf.origin, last})) continue;
         // Leaves without bone are kept by neither method.
         if (field_.bone().has_bone({shift_down(leaf.origin, level_), shift_down(last, level_) + Coord{1, 1, 1}})) field_.restore(leaf);
       }

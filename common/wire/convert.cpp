@@ -224,6 +224,30 @@ Result<SceneItem> from_wire(const v1::SceneItem& item) {
   return out;
 }
 
+Result<Placing> placing_from_wire(const v1::SetSceneItemRequest& request) {
+  switch (request.placing_case()) {
+    case v1::SetSceneItemRequest::kOntoBone: {
+      const v1::OntoBone& given = request.onto_bone();
+      OntoBone onto;
+      onto.near_mm = from_wire(given.near_mm());
+      if (given.has_axis()) onto.axis = from_wire(given.axis());
+      if (given.has_across()) onto.across = from_wire(given.across());
+      if (!onto.near_mm.allFinite()) return bad("onto_bone.near_mm", "is not finite");
+      if (onto.axis && !(onto.axis->allFinite() && onto.axis->norm() > 1e-9)) return bad("onto_bone.axis", "has no direction");
+      if (!(onto.across.allFinite() && onto.across.norm() > 1e-9)) return bad("onto_bone.across", "has no direction");
+      return Placing(onto);
+    }
+    case v1::SetSceneItemRequest::kThreadTurns:
+      if (!std::isfinite(request.thread_turns())) return bad("thread_turns", "is not finite");
+      return Placing(ByThread{request.thread_turns()});
+    case v1::SetSceneItemRequest::kDriveHomeMm:
+      if (!std::isfinite(request.drive_home_mm())) return bad("drive_home_mm", "is not finite");
+      return Placing(DriveHome{request.drive_home_mm()});
+    case v1::SetSceneItemRequest::PLACING_NOT_SET: break;
+  }
+  return Placing{};
+}
+
 v1::Look to_wire(const Look& look) {
   v1::Look out;
   *out.mutable_eye_mm() = to_wire(look.eye_mm);

@@ -7,7 +7,7 @@
 #include "common/field/field_hash.hpp"
 #include "common/surface/look.hpp"
 #include "common/mechanics/cutting_state.hpp"
-#include "common/tools/scene_item.hpp"
+#include "common/tools/placing.hpp"
 #include "osteon/v1/cutting.pb.h"
 #include "osteon/v1/room.pb.h"
 #include "osteon/v1/types.pb.h"
@@ -38,6 +38,7 @@ inline constexpr std::uint32_t kProtocolVersion = 2;
 [[nodiscard]] Result<CuttingState> from_wire(const v1::CuttingState& state);
 [[nodiscard]] Result<FieldLeaf> from_wire(const v1::FieldLeaf& leaf);
 [[nodiscard]] Result<SceneItem> from_wire(const v1::SceneItem& item);
+[[nodiscard]] Result<Placing> placing_from_wire(const v1::SetSceneItemRequest& request);
 [[nodiscard]] Result<Tool> from_wire(const v1::ToolDefinition& tool);  // by the rules of tool files
 [[nodiscard]] Result<BlockKey> key_from_wire(const v1::MeshBlock& block);
 [[nodiscard]] Result<Look> from_wire(const v1::Look& look);

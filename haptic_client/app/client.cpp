@@ -14,6 +14,7 @@
 #include "common/runtime/event_queue.hpp"
 #include "common/runtime/latest_value.hpp"
 #include "common/runtime/log.hpp"
+#include "common/runtime/memory_reserve.hpp"
 #include "common/runtime/periodic.hpp"
 #include "common/runtime/watchdog.hpp"
 #include "haptic_client/control/guiding.hpp"
@@ -236,6 +237,7 @@ class Client {
 
   void replica_thread() {
     std::deque<FromRoom> events;
+    MemoryReserve reserve(kCutReserve);
     std::optional<Clock::time_point> waiting_since;
     while (true) {
       {
@@ -253,6 +255,7 @@ class Client {
       replica_.settle();
       watch_room(heard);
       build_patch();
+      if (heard || replica_.unconfirmed() > 0) reserve.refill();
       if (!over) continue;
       if (!waiting_since) waiting_since = Clock::now();
       const bool settled = replica_.unconfirmed() == 0 && unsent_.empty();

@@ -183,7 +183,7 @@ int main(int argc, char** argv) {
   app.add_option("--detail", options.detail,
                  "full: viewers are sent the whole bone at its own pitch; near: that only where they look and where tools "
                  "work, coarser elsewhere; auto: near for a bone of more than " + std::to_string(kMostFullBlocks) + " blocks")
-      ->transform(CLI::CheckedTransformer(details, CLI::ignore_case))
+      ->transform(CLI::CheckedTransformer(details, CLI::ignore_case).description("auto|full|near"))
       ->default_str("auto");
   app.add_option("--summary", options.summary_file, "JSON written at the end: field hash, counts, ticks, latencies");
   if (const auto code = parse_arguments(app, argc, argv)) return *code;

@@ -1,5 +1,8 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
+#include <charconv>
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -8,6 +11,7 @@
 #include "common/geometry/mesh_file.hpp"
 #include "common/runtime/files.hpp"
 #include "common/tools/tool_surface.hpp"
+#include "common/volume/cell_collision.hpp"
 #include "common/volume/field_file.hpp"
 #include "common/volume/mesh_distance.hpp"
 #include "server/import/bone_surface.hpp"
@@ -20,7 +24,10 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Arguments {
-  std::string bone, script, out, fields, surface, report, file, stl;
+  std::string bone, script, out, fields, surface, report, file, stl, tool, name, title;
+  std::vector<std::string> set;
+  std::vector<double> at, axis;
+  int level = 0, points = 2000;
   double cut_mm = 1.0;
   std::uint32_t body = 0;
 };
@@ -42,21 +49,84 @@ Result<std::string> write_surface(const CutField& field, const std::string& file
   return std::string(text);
 }
 
-Result<std::string> run_surface(const Arguments& a, const StopSignal& stop) {
-  if (auto good = check_mesh_name(a.out); !good) return tl::unexpected(good.error());
+// The bone as it is after the cuts of --fields, as one body of them.
+Result<CutField> load_body(const Arguments& a) {
   auto bone = Case::load(a.bone);
   if (!bone) return tl::unexpected(bone.error());
   CutField field(*bone, BodyId{a.body});
-  if (!a.fields.empty()) {
-    const auto saved = load_fields(a.fields, *bone);
-    if (!saved) return tl::unexpected(saved.error());
-    if (std::ranges::find(saved->bodies, BodyId{a.body}) == saved->bodies.end())
-      return failure(ErrorCode::not_found, a.fields + " has no body " + std::to_string(a.body));
-    for (const FieldLeaf& leaf : saved->leaves)
-      if (leaf.body == BodyId{a.body}) field.restore(leaf);
-  }
+  if (a.fields.empty()) return field;
+  const auto saved = load_fields(a.fields, *bone);
+  if (!saved) return tl::unexpected(saved.error());
+  if (std::ranges::find(saved->bodies, BodyId{a.body}) == saved->bodies.end())
+    return failure(ErrorCode::not_found, a.fields + " has no body " + std::to_string(a.body));
+  for (const FieldLeaf& leaf : saved->leaves)
+    if (leaf.body == BodyId{a.body}) field.restore(leaf);
+  return field;
+}
+
+Result<std::string> run_surface(const Arguments& a, const StopSignal& stop) {
+  if (auto good = check_mesh_name(a.out); !good) return tl::unexpected(good.error());
+  const auto field = load_body(a);
+  if (!field) return tl::unexpected(field.error());
   Bar bar(stop, "meshing");
-  return write_surface(field, a.out, bar.stage(0.0, 1.0));
+  return write_surface(*field, a.out, bar.stage(0.0, 1.0));
+}
+
+// One way to ask whether the tool meets bone: its answer, the median of its times, what it keeps.
+template <class Ask>
+std::string contact_line(const char* way, const std::vector<SamplePoint>& points, const Pose& pose, std::size_t memory_bytes, Ask ask) {
+  using Clock = std::chrono::steady_clock;
+  std::array<double, 21> times_us;
+  std::optional<std::size_t> found;
+  for (double& time : times_us) {
+    const auto begin = Clock::now();
+    found = ask();
+    time = std::chrono::duration<double, std::micro>(Clock::now() - begin).count();
+  }
+  std::ranges::nth_element(times_us, times_us.begin() + times_us.size() / 2);
+  std::string where = "is free of bone";
+  if (found) {
+    const Vec3 at = pose.point(points[*found].position_mm);
+    char text[120];
+    std::snprintf(text, sizeof text, "meets bone at %.2f %.2f %.2f, point %zu", at.x(), at.y(), at.z(), *found);
+    where = text;
+  }
+  char line[240];
+  std::snprintf(line, sizeof line, "%-18s %-52s %9.1f us %9.3f MB\n", way, where.c_str(), times_us[times_us.size() / 2], static_cast<double>(memory_bytes) * 1e-6);
+  return line;
+}
+
+Result<std::string> run_contact(const Arguments& a) {
+  constexpr double kMostSamples = 1e8;
+  const auto tool = tool_named(a.tool, fs::current_path());
+  if (!tool) return tl::unexpected(tool.error());
+  const Vec3 axis(a.axis[0], a.axis[1], a.axis[2]);
+  if (!(axis.norm() > 1e-6)) return failure(ErrorCode::invalid_input, "--axis has no length");
+  const Pose pose = pose_along({a.at[0], a.at[1], a.at[2]}, axis.normalized());
+  const auto field = load_body(a);
+  if (!field) return tl::unexpected(field.error());
+
+  // The samples round the tool, as far as there is bone.
+  const std::vector<SamplePoint> points = sample_points(*tool, a.points);
+  const double pitch = level_pitch_mm(field->bone().pitch_mm(), a.level);
+  const Box bone = field->bone().bounds().grown(2.0 * pitch);
+  Box box{pose.position_mm, pose.position_mm};
+  for (const SamplePoint& point : points) {
+    box.min_mm = box.min_mm.cwiseMin(pose.point(point.position_mm));
+    box.max_mm = box.max_mm.cwiseMax(pose.point(point.position_mm));
+  }
+  box = box.grown(2.0 * pitch);
+  box = {box.min_mm.cwiseMax(bone.min_mm), box.max_mm.cwiseMin(bone.max_mm)};
+  if (!(box.min_mm.array() < box.max_mm.array()).all()) return tool->name + " is beyond the bone\n";
+  if ((box.max_mm - box.min_mm).prod() / (pitch * pitch * pitch) > kMostSamples)
+    return failure(ErrorCode::invalid_input, "the box round " + tool->name + " has more than 100 million samples; choose a lower --level");
+  const CoordBox samples = covering_samples(box, pitch);
+  const BoneCells cells(*field, a.level, samples);
+  const BoneDistance distance(*field, a.level, samples);
+  const auto of_cells = [&](MixedCell rule) { return [&cells, &points, &pose, rule] { return first_contact(cells, rule, points, pose); }; };
+  return contact_line("cells, nearest", points, pose, cells.memory_bytes(), of_cells(MixedCell::nearest)) +
+         contact_line("cells, trilinear", points, pose, cells.memory_bytes(), of_cells(MixedCell::trilinear)) +
+         contact_line("distance", points, pose, distance.memory_bytes(), [&] { return first_contact(distance, points, pose); });
 }
 
 // Peak memory of this process, MB; zero where the system does not say.
@@ -129,10 +199,56 @@ std::string dimensions(const Tool& tool) {
     if (value == 0) continue;
     char part[64];
     const std::string unit = field.name.substr(field.name.rfind('_') + 1);
-    std::snprintf(part, sizeof part, "%s%s %.4g %s", text.empty() ? "" : ", ", field.name.substr(0, field.name.rfind('_')).c_str(), value, unit == "rpm" ? "/min" : "mm");
+    std::snprintf(part, sizeof part, "%s%s %.6g %s", text.empty() ? "" : ", ", field.name.substr(0, field.name.rfind('_')).c_str(), value, unit == "rpm" ? "/min" : "mm");
     text += part;
   }
   std::ranges::replace(text, '_', ' ');
+  return text;
+}
+
+// `field=value`, each by the rules of a tool file; says in words what was changed.
+Result<std::string> change(Tool& tool, const std::vector<std::string>& settings) {
+  std::string changes;
+  for (const std::string& setting : settings) {
+    const std::size_t equals = std::min(setting.find('='), setting.size());
+    const std::string field = setting.substr(0, equals);
+    double value = 0;
+    const char *begin = setting.data() + std::min(equals + 1, setting.size()), *end = setting.data() + setting.size();
+    const auto [stop, error] = std::from_chars(begin, end, value);
+    if (begin == end || error != std::errc{} || stop != end)
+      return failure(ErrorCode::invalid_input, "--set " + setting + " is not FIELD=NUMBER, such as diameter_mm=3");
+    auto changed = edited(tool, field, value);
+    if (!changed) return tl::unexpected(changed.error());
+    tool = std::move(*changed);
+    changes += ", " + field + " " + setting.substr(equals + 1);
+  }
+  return changes;
+}
+
+// The tool with what --set, --name and --title say, as a tool file. A room tells tools by their names, so that a changed
+// one gets another: that of its file unless --name gives one.
+Result<void> write_changed(Tool& tool, const Arguments& a) {
+  const fs::path file(a.out);
+  if (file.extension() != ".yaml" && file.extension() != ".yml") return failure(ErrorCode::invalid_input, a.out + " does not end in .yaml");
+  if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
+  const auto changes = change(tool, a.set);
+  if (!changes) return tl::unexpected(changes.error());
+  tool.name = a.name.empty() ? file.stem().string() : a.name;
+  tool.title = a.title.empty() ? tool.title + *changes : a.title;
+  const std::string text = to_yaml(tool);
+  auto good = parse_tool(text, a.out);
+  if (!good) return tl::unexpected(good.error());
+  tool = std::move(*good);
+  return write_file(a.out, text);
+}
+
+std::string limits(ToolKind kind) {
+  std::string text;
+  for (const EditableField& field : editable_fields(kind)) {
+    char line[120];
+    std::snprintf(line, sizeof line, "  %-20s %g to %g%s\n", field.name.c_str(), field.lowest, field.highest, field.whole ? ", whole" : "");
+    text += line;
+  }
   return text;
 }
 
@@ -142,6 +258,16 @@ Result<std::string> run_tools(const Arguments& a) {
     auto own = load_tool_file(a.file);  // with the STL that it may name
     if (!own) return tl::unexpected(own.error());
     tools = {std::move(*own)};
+  }
+  if (!a.tool.empty()) {
+    auto known = find_tool(a.tool);
+    if (!known) return tl::unexpected(known.error());
+    tools = {std::move(*known)};
+  }
+  if (a.out.empty() != a.set.empty()) return failure(ErrorCode::invalid_input, "a changed tool needs --set FIELD=NUMBER and --out FILE.yaml, both");
+  if (!a.set.empty()) {
+    if (tools.size() != 1) return failure(ErrorCode::invalid_input, "--set changes one tool: name it, or give its --file");
+    if (auto written = write_changed(tools.front(), a); !written) return tl::unexpected(written.error());
   }
   if (!a.stl.empty()) {
     std::error_code error;
@@ -156,6 +282,7 @@ Result<std::string> run_tools(const Arguments& a) {
     std::snprintf(line, sizeof line, "%-20s %-18s %-7s %.16s  %s\n", tool.name.c_str(), std::string(kind_name(tool.kind)).c_str(),
                   tool.cuts() ? ("level " + std::to_string(tool.cut_level)).c_str() : "-", to_hex(tool.hash()).c_str(), dimensions(tool).c_str());
     text += line;
+    if (!a.tool.empty() && a.set.empty()) text += limits(tool.kind);
     if (a.stl.empty()) continue;
     const TriangleMesh mesh = tool_surface(tool, 0.5);
     if (auto written = write_stl(mesh, fs::path(a.stl) / (tool.name + ".stl")); !written) return tl::unexpected(written.error());
@@ -183,6 +310,17 @@ void add_bone_commands(CLI::App& app, std::vector<Command>& commands) {
   surface->add_option("--body", a.body, "Which body of the fields: 0 is the bone, others are pieces sawn off")->capture_default_str();
   commands.push_back({surface, [shared](const StopSignal& stop) { return run_surface(*shared, stop); }});
 
+  CLI::App* contact = app.add_subcommand("contact", "Ask whether a tool meets bone: by the segmentation's cells, two ways, and by the distance field");
+  contact->add_option("CASE_DIR", a.bone, "Folder of the case")->required();
+  contact->add_option("TOOL", a.tool, "A tool of the box, or a tool file")->required();
+  contact->add_option("--at", a.at, "Its tip, X,Y,Z, mm")->delimiter(',')->expected(3)->required();
+  contact->add_option("--axis", a.axis, "The way out of its tip, X,Y,Z")->delimiter(',')->expected(3)->required();
+  contact->add_option("--fields", a.fields, "What was cut from the bone: a file of carve, or of osteon-server --save");
+  contact->add_option("--body", a.body, "Which body of the fields")->capture_default_str();
+  contact->add_option("--level", a.level, "Ask at pitch h / 2^level")->check(CLI::Range(0, kLevels - 1))->capture_default_str();
+  contact->add_option("--points", a.points, "So many points of the tool's surface, about")->check(CLI::Range(100, 100000))->capture_default_str();
+  commands.push_back({contact, [shared](const StopSignal&) { return run_contact(*shared); }});
+
   CLI::App* carve = app.add_subcommand("carve", "Cut a bone as a script says, and say what every step did and cost");
   carve->add_option("CASE_DIR", a.bone, "Folder of the case")->required();
   carve->add_option("SCRIPT", a.script, "YAML: steps: [{tool: burr-round-5, from: [x, y, z], to: [x, y, z], axis: [x, y, z]}]")->required();
@@ -192,8 +330,13 @@ void add_bone_commands(CLI::App& app, std::vector<Command>& commands) {
   carve->add_option("--cut", a.cut_mm, "Longest way of one cut, mm")->check(CLI::Range(0.01, 25.0))->capture_default_str();
   commands.push_back({carve, [shared](const StopSignal& stop) { return run_carve(*shared, stop); }});
 
-  CLI::App* tools = app.add_subcommand("tools", "List the tool box: name, kind, level of its cuts, hash, dimensions");
-  tools->add_option("--file", a.file, "Of a tool file instead");
+  CLI::App* tools = app.add_subcommand("tools", "List the tool box: name, kind, level of its cuts, hash, dimensions; or change a tool");
+  CLI::Option* named = tools->add_option("NAME", a.tool, "Of this tool alone, with what --set may change of it and the limits");
+  tools->add_option("--file", a.file, "Of a tool file instead")->excludes(named);
+  tools->add_option("--set", a.set, "Change a field, such as diameter_mm=3 or teeth=4; may be given again")->expected(1)->take_all();
+  tools->add_option("--out", a.out, "Write the changed tool to this file, .yaml");
+  tools->add_option("--name", a.name, "Its name; default: its file's, without .yaml");
+  tools->add_option("--title", a.title, "Its title; default: the old one and what was changed");
   tools->add_option("--stl", a.stl, "Also write each tool as NAME.stl into this folder");
   commands.push_back({tools, [shared](const StopSignal&) { return run_tools(*shared); }});
 

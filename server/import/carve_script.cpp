@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/core/check.hpp"
+#include "common/geometry/pose_across.hpp"
 #include "common/volume/mesh_distance.hpp"
 
 namespace osteon::import {
@@ -94,18 +94,13 @@ CarveStep step_of(const YAML::Node& node, const fs::path& folder) {
 
 }  // namespace
 
-Pose pose_across(const Vec3& tip_mm, const Vec3& axis, const Vec3& across) {
-  const Vec3 z = axis.normalized();
-  const Vec3 x = (across - across.dot(z) * z).normalized();
-  OSTEON_CHECK(x.allFinite() && z.allFinite());
-  Eigen::Matrix3d turn;
-  turn << x, z.cross(x), z;
-  return {tip_mm, Eigen::Quaterniond(turn)};
-}
-
 Result<Tool> tool_named(const std::string& name, const fs::path& folder) {
   const fs::path given(name);
-  if (given.extension() != ".yaml" && given.extension() != ".yml") return find_tool(name);
+  if (given.extension() != ".yaml" && given.extension() != ".yml") {
+    Result<Tool> known = find_tool(name);
+    if (!known) return failure(known.error().code, known.error().message + "; or name a tool file of yours, such as my-tool.yaml");
+    return known;
+  }
   return load_tool_file(given.is_absolute() ? given : folder / given);  // with the STL that it may name
 }
 

@@ -27,9 +27,6 @@ struct CarveStep {
   std::optional<int> level; // as wished; a case and a tool bound it
 };
 
-// The tool's pose with its +z along `axis` and its +x as near to `across` as that allows; both not zero and not parallel.
-[[nodiscard]] Pose pose_across(const Vec3& tip_mm, const Vec3& axis, const Vec3& across);
-
 // Errors: not_found, invalid_input; each names the file and the step.
 [[nodiscard]] Result<std::vector<CarveStep>> read_carve_script(const std::filesystem::path& file);
 

@@ -73,8 +73,9 @@ Carving::Carving(Case bone, double cut_mm)
         only.emplace_back(std::move(bone), BodyId{0}, tools_);
         return only;
       }()),
-      finder_(bodies_.front()),
-      surface_(BodyId{0}) {}
+      surface_(BodyId{0}) {
+  finders_.emplace_back(bodies_.front());
+}
 
 Carving::~Carving() = default;
 
@@ -83,25 +84,29 @@ Result<StepReport> Carving::run(const CarveStep& step, const KeepGoing& keep_goi
   const ToolBox::Entry& tool = tools_->add(step.tool);
   report.tool = step.tool.name;
   report.level = std::min(step.level.value_or(step.tool.cut_level), finest_level(bodies_.front().bone().pitch_mm()));
-  const double before_mm3 = bodies_.front().removed_mm3();
+  const std::size_t bodies = bodies_.size();
+  const double before_mm3 = removed_mm3(bodies);
   const std::vector<Cut> cuts = cuts_of(step, tool.hash, report.level, cut_mm_);
   std::vector<double> cut_ms, frame_ms;
-  std::set<Coord> changed;
+  std::vector<std::set<Coord>> changed(bodies);  // leaves of each body
   for (std::size_t i = 0; i < cuts.size(); ++i) {
     if (!keep_going(static_cast<double>(i) / static_cast<double>(cuts.size()))) return failure(ErrorCode::cancelled, "stopped while carving");
     const auto begin = Clock::now();
-    const CutReport done = bodies_.front().apply(cuts[i]);
+    std::vector<Coord> of_bone;
+    for (std::size_t b = 0; b < bodies; ++b) {
+      CutReport done = bodies_[b].apply(cuts[i]);
+      report.visited += done.visited;
+      report.computed += done.computed;
+      report.modified += done.modified;
+      changed[b].insert(done.changed_leaves.begin(), done.changed_leaves.end());
+      if (b == 0) of_bone = std::move(done.changed_leaves);
+    }
     cut_ms.push_back(milliseconds_since(begin));
-    for (std::size_t b = 1; b < bodies_.size(); ++b) bodies_[b].apply(cuts[i]);
-    report.visited += done.visited;
-    report.computed += done.computed;
-    report.modified += done.modified;
-    mesh_changes(report.level, done.changed_leaves, i + 1 == cuts.size(), frame_ms);
-    changed.insert(done.changed_leaves.begin(), done.changed_leaves.end());
+    mesh_changes(report.level, of_bone, i + 1 == cuts.size(), frame_ms);
   }
   report.cuts = static_cast<int>(cuts.size());
   cuts_ += cuts.size();
-  report.removed_mm3 = bodies_.front().removed_mm3() - before_mm3;
+  report.removed_mm3 = removed_mm3(bodies) - before_mm3;
   report.cut_ms_median = quantile(cut_ms, 0.5);
   report.cut_ms_p99 = quantile(cut_ms, 0.99);
   report.cut_ms_most = quantile(cut_ms, 1.0);
@@ -109,32 +114,42 @@ Result<StepReport> Carving::run(const CarveStep& step, const KeepGoing& keep_goi
   report.frame_ms_most = quantile(frame_ms, 1.0);
 
   const auto begin = Clock::now();
-  finder_.touch(bodies_.front(), report.level, {changed.begin(), changed.end()});
-  part(report);
+  for (std::size_t b = 0; b < bodies; ++b) {
+    if (changed[b].empty()) continue;
+    finders_[b].touch(bodies_[b], report.level, {changed[b].begin(), changed[b].end()});
+    part(b, report);
+  }
   report.fragment_ms = milliseconds_since(begin);
   report.field_mb = field_mb();
   return report;
 }
 
-// The larger part stays body 0; each piece becomes a body of its own, and debris vanishes.
-void Carving::part(StepReport& report) {
-  CutField& bone = bodies_.front();
-  for (const Fragment& fragment : finder_.take_fragments(bone)) {
+// The largest part stays the body that it was; each piece becomes a body of its own, and debris vanishes.
+void Carving::part(std::size_t body, StepReport& report) {
+  for (const Fragment& fragment : finders_[body].take_fragments(bodies_[body])) {
     if (fragment.debris()) {
       ++report.debris;
     } else {
       ++report.pieces;
       report.pieces_mm3 += fragment.volume_mm3;
-      bodies_.push_back(piece_of(bodies_.front(), fragment, BodyId{static_cast<std::uint32_t>(bodies_.size())}));
+      bodies_.push_back(piece_of(bodies_[body], fragment, BodyId{static_cast<std::uint32_t>(bodies_.size())}));
+      finders_.emplace_back(bodies_.back());
     }
     std::map<int, std::vector<Coord>> leaves;
     for (const FieldLeaf& mask : fragment.taken)
-      if (bodies_.front().merge(mask)) leaves[mask.level].push_back(mask.origin);
+      if (bodies_[body].merge(mask)) leaves[mask.level].push_back(mask.origin);
     for (const auto& [level, origins] : leaves) {
-      finder_.touch(bodies_.front(), level, origins);
+      finders_[body].touch(bodies_[body], level, origins);
+      if (body != 0) continue;
       for (const BlockKey& key : surface_.touch(level, origins)) stale_.push_back(key);
     }
   }
+}
+
+double Carving::removed_mm3(std::size_t bodies) const {
+  double sum = 0;
+  for (std::size_t b = 0; b < bodies; ++b) sum += bodies_[b].removed_mm3();
+  return sum;
 }
 
 // What a server does for its viewers after a frame's cuts: gathers the blocks that changed and makes their surface.

@@ -18,10 +18,10 @@ struct StepReport {
   std::string tool;
   int level = 0;
   int cuts = 0;
-  double removed_mm3 = 0;                 // by cutting; pieces that came apart are not counted
-  std::int64_t visited = 0, computed = 0, modified = 0;  // samples, §5.4
+  double removed_mm3 = 0;                 // by cutting, from all bodies; pieces that came apart are not counted
+  std::int64_t visited = 0, computed = 0, modified = 0;  // samples of all bodies together, §5.4
   double cut_ms_median = 0, cut_ms_p99 = 0, cut_ms_most = 0;
-  double frame_ms_median = 0, frame_ms_most = 0;  // of meshing the blocks that kCutsPerFrame cuts changed
+  double frame_ms_median = 0, frame_ms_most = 0;  // of meshing body 0's blocks that kCutsPerFrame cuts changed
   double fragment_ms = 0;                 // of keeping the components and looking for pieces
   int pieces = 0;                         // that came apart in this step, debris not counted
   double pieces_mm3 = 0;
@@ -45,13 +45,14 @@ class Carving {
 
  private:
   void mesh_changes(int level, const std::vector<Coord>& leaves, bool last, std::vector<double>& frame_ms);
-  void part(StepReport& report);
+  void part(std::size_t body, StepReport& report);
+  [[nodiscard]] double removed_mm3(std::size_t bodies) const;
   [[nodiscard]] double field_mb() const;
 
   double cut_mm_;
   std::shared_ptr<ToolBox> tools_;   // shared with the bodies' fields
   std::vector<CutField> bodies_;     // 0: the bone; others: pieces that came apart
-  FragmentFinder finder_;
+  std::vector<FragmentFinder> finders_;  // one for each body
   SurfaceBlocks surface_;
   std::vector<BlockKey> stale_;
   int unmeshed_cuts_ = 0;

@@ -14,6 +14,7 @@
 
 #include "common/core/check.hpp"
 #include "common/field/kernel.hpp"
+#include "common/runtime/memory_reserve.hpp"
 #include "common/runtime/periodic.hpp"
 #include "common/wire/convert.hpp"
 #include "server/net/host_parts.hpp"
@@ -25,11 +26,9 @@ namespace osteon {
 namespace {
 
 using Clock = RoomHost::Clock;
+constexpr Coord kFirstCoord{INT32_MIN, INT32_MIN, INT32_MIN};  // before every block of a level
 
 }  // namespace
-
-// Before every block of a body.
-constexpr Coord kFirstCoord{INT32_MIN, INT32_MIN, INT32_MIN};
 
 // Leaves copied at once. Between two batches the room goes on cutting.
 constexpr std::size_t kLeafBatch = 64;
@@ -159,6 +158,7 @@ void RoomHost::Impl::make_whole_surface(const std::function<void(double)>& progr
 void RoomHost::Impl::run_ticks() {
   PeriodicTimer timer(rates_.tick);
   TickStats own;
+  MemoryReserve reserve(kCutReserve);
   std::vector<Queued> batch;
   bool last = false;
   while (!last) {
@@ -183,6 +183,7 @@ void RoomHost::Impl::run_ticks() {
       pieces_due = true;
       pieces_wake.notify_one();
     }
+    if (decided) reserve.refill();
     timer.done(own);
     // Others read a copy, so that a tick never waits for a reader of its figures; only the last one makes sure.
     std::unique_lock lock(stats_mutex, std::try_to_lock);
@@ -256,10 +257,8 @@ void RoomHost::Impl::publish(const RoomEvent& event) {
   MessageParts rows;
   if (event.tool) rows.push_back(tool_row(event.room_seq, event.tool->tool));
   if (event.bone) rows = change_rows(event);
-  if (event.scene) {
-    // Only this thread changes the room.
-    rows.push_back(scene_row(event.room_seq, room.items()));
-  }
+  // Only this thread changes the room.
+  if (event.scene) rows.push_back(scene_row(event.room_seq, room.items()));
   {
     const std::lock_guard lock(sessions_mutex);
     for (const Bytes& row : rows)
@@ -396,7 +395,7 @@ void RoomHost::Impl::make_stale_blocks(bool due) {
     std::vector<BlockKey> gone;
     for (auto block = surface.blocks.begin(); block != surface.blocks.end();) {
       const BodyId body = block->first.body;
-      const auto next_body = surface.blocks.lower_bound({BodyId{body.value + 1}, 0, kFirstCoord});
+      const auto next_body = surface.blocks.lower_bound({BodyId{body.value + 1}, kCoarsestLevel, kFirstCoord});
       if (!std::ranges::binary_search(bodies_now, body))
         for (; block != next_body; ++block) gone.push_back(block->first);
       block = next_body;
@@ -608,8 +607,12 @@ void RoomHost::Impl::run_pieces() {
       pieces_due = look_wanted = false;
       ++looks_begun;
     }
-    if (rates_.pieces.count() > 0)
+    if (rates_.pieces.count() > 0) {
       for (Separation& found : pieces.look()) ask_for_split(std::move(found));
+    } else {
+      const std::unique_lock room_lock(room_mutex);
+      (void)room.take_changes();  // nobody else does
+    }
     std::unique_lock lock(pieces_mutex);
     looks_done = looks_begun;
     pieces_wake.notify_all();
@@ -623,7 +626,7 @@ void RoomHost::Impl::ask_for_split(Separation found) {
   bool decided = false;
   {
     const std::lock_guard lock(queue_mutex);
-    if (queue_closed) return;  // stop() looks once more
+    if (queue_closed) return pieces.lose(shared->parent);  // stop() looks once more, at all of it
     queue.emplace_back(std::in_place_type<QueuedEvent>,
                        QueuedEvent{[shared](Room& r) { return r.split(std::move(*shared)); },
                                    [this, shared, &decided](const Result<RoomEvent>& split) {

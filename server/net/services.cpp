@@ -582,11 +582,16 @@ class RoomServiceImpl final : public RoomBase {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     const Result<SceneItem> item = wire::from_wire(request->item());
     if (!item) return refuse(reactor, invalid(item.error().message));
+    const Result<Placing> placing = wire::placing_from_wire(*request);
+    if (!placing) return refuse(reactor, invalid(placing.error().message));
     return change(
-        reactor, [by = AuthorId{request->author()}, item = *item](Room& room) { return room.set_item(by, item); },
+        reactor,
+        [by = AuthorId{request->author()}, item = *item, placing = *placing](Room& room) { return room.set_item(by, item, placing); },
         [response](const RoomEvent& event) {
           response->set_room_seq(event.room_seq.value);
           response->set_item(event.item);
+          *response->mutable_set() = wire::to_wire(event.set->item);
+          response->set_contact_fraction(event.set->contact_fraction);
         });
   }
 

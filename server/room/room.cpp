@@ -55,9 +55,9 @@ std::string_view sentence(Rejection reason) {
   return "the reason is unknown";
 }
 
-Room::Room(Case bone, CutLimits limits, std::shared_ptr<ToolBox> tools) : limits_(limits), tools_(std::move(tools)) {
-  const CoordBox reach = bone.bounds_samples();
-  bodies_.emplace(BodyId{0}, Body{CutField(std::move(bone), BodyId{0}, tools_), {}, SurfaceBlocks(BodyId{0}), reach});
+Room::Room(Case bone, CutLimits limits, std::shared_ptr<ToolBox> tools)
+    : bone_(std::move(bone)), limits_(limits), tools_(std::move(tools)) {
+  bodies_.emplace(BodyId{0}, Body{CutField(bone_, BodyId{0}, tools_), {}, SurfaceBlocks(BodyId{0}), bone_.bounds_samples()});
 }
 
 AuthorId Room::join(MemberKind kind) {
@@ -103,9 +103,9 @@ Result<Outcome> Room::submit(const Cut& cut) {
   CutReport report;
   report.level = cut.level;
   for (auto& [id, body] : bodies_) {
-    if (!body.present) continue;
     CutReport part = body.field.apply(cut);
     if (!part.reached_leaves.empty()) body.history.add(room_seq_, cut, part.reached_leaves);
+    if (!body.present) continue;  // nobody sees it, but it may come back
     report.visited += part.visited;
     report.computed += part.computed;
     report.modified += part.modified;

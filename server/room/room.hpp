@@ -13,6 +13,7 @@
 #include "common/core/result.hpp"
 #include "common/field/cut.hpp"
 #include "common/surface/surface_blocks.hpp"
+#include "common/tools/placing.hpp"
 #include "common/tools/scene.hpp"
 #include "common/tools/tool_box.hpp"
 #include "common/volume/cut_field.hpp"
@@ -71,6 +72,7 @@ struct RoomEvent {
   std::uint64_t lease_epoch = 0;          // from now on
   const ToolBox::Entry* tool = nullptr;   // one that was added
   std::uint32_t item = 0;                 // one that was set or taken out
+  std::optional<Placed> set;              // as it stands now, where it was set
   std::vector<RoomSeq> places;            // undo, redo: of the events taken back or done again, oldest first
 };
 
@@ -100,8 +102,8 @@ struct RoomCounts {
 
 inline constexpr std::size_t kMostItems = 256, kMostTools = 1024, kMostBodies = 64;
 
-// Every body holds every cut: all bodies share the case's lattice and frame, a piece has all but itself taken away, and a
-// cut is applied to each of them, so the server, every replica and the undo of a split need no notion of which body a
+// Every body holds every cut, those that were taken away too: all bodies share the case's lattice and frame, a piece has
+// all but itself taken away, and a cut is applied to each of them, so the server, every replica and the undo of a split need no notion of which body a
 // tool meets. Not synchronised: one thread calls the changing functions, or several the const ones.
 class Room {
  public:
@@ -132,7 +134,7 @@ class Room {
   Result<RoomEvent> redo_last(AuthorId by, std::size_t count);  // the newest undo events that still stand
   Result<RoomEvent> remove_body(AuthorId by, BodyId body);
   // By the rules of common/tools/scene.hpp, which also say whether it is seated. id 0: a new one.
-  Result<RoomEvent> set_item(AuthorId by, SceneItem item);
+  Result<RoomEvent> set_item(AuthorId by, SceneItem item, const Placing& placing = {});
   Result<RoomEvent> remove_item(AuthorId by, std::uint32_t item);  // not a guide that pins fix
   // What a FragmentFinder has found in `parent`; `seen`: the lease_epoch() when it looked.
   Result<RoomEvent> split(BodyId parent, std::vector<Fragment> fragments, std::uint64_t seen) {
@@ -143,7 +145,8 @@ class Room {
 
   [[nodiscard]] RoomSeq room_seq() const { return room_seq_; }
   [[nodiscard]] const RoomCounts& counts() const { return counts_; }
-  [[nodiscard]] const Case& bone() const { return field().bone(); }
+  // Never changes, so that any thread may ask beside the one that changes the room.
+  [[nodiscard]] const Case& bone() const { return bone_; }
   [[nodiscard]] const std::shared_ptr<ToolBox>& tools() const { return tools_; }
   [[nodiscard]] std::vector<BodyId> bodies() const;  // that exist, in order
   [[nodiscard]] const CutField* find_field(BodyId body) const;  // null: no such body
@@ -220,6 +223,7 @@ class Room {
   void list_blocks(BodyId id, const Body& body, std::vector<BlockKey>& keys) const;
   RoomEvent take_back(AuthorId by, const std::set<RoomSeq>& falls);
 
+  Case bone_;
   CutLimits limits_;
   std::shared_ptr<ToolBox> tools_;  // shared with the fields and, beyond the room, with those that list tools
   std::map<BodyId, Body> bodies_;

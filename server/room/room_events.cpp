@@ -224,7 +224,8 @@ Result<void> Room::know(const Tool& tool) {
 }
 
 // What was done to a piece as such falls with the split that made it; with a cut falls every later split of a body that
-// the cut had reached, since the bone that comes back may hold the piece.
+// the cut had reached, since the bone that comes back may hold the piece; and so with an earlier split of that body, whose
+// bone would come back in the later piece too.
 std::set<RoomSeq> Room::with_what_falls_too(std::set<RoomSeq> places) const {
   std::set<BodyId> pieces_gone;
   bool more = true;
@@ -237,8 +238,7 @@ std::set<RoomSeq> Room::with_what_falls_too(std::set<RoomSeq> places) const {
         falls = pieces_gone.contains(event.body);
         const auto parent = bodies_.find(event.body);
         for (const RoomSeq fallen : places)
-          falls |= fallen < place && events_.at(fallen).kind == EventKind::cut && parent != bodies_.end() &&
-                   parent->second.history.contains(fallen);
+          falls |= fallen < place && parent != bodies_.end() && parent->second.history.contains(fallen);
       } else if (event.kind == EventKind::remove_body) {
         falls = pieces_gone.contains(event.body);
       }
@@ -450,23 +450,26 @@ void Room::cut_apart(RoomSeq place, Event& row, RoomEvent& event, std::vector<Cu
   event.bone = true;
 }
 
-Result<RoomEvent> Room::set_item(AuthorId by, SceneItem item) {
+Result<RoomEvent> Room::set_item(AuthorId by, SceneItem item, const Placing& placing) {
   if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
   if (!exists(item.body)) return refuse("the room has no body " + std::to_string(item.body.value));
   if (!tools_->find(item.tool)) return refuse("item.tool_hash is of no tool that the room knows");
   if (item.id != 0 && !items_.contains(item.id)) return refuse("item.item: the room has no item " + std::to_string(item.id));
   if (item.id == 0 && items_.size() >= kMostItems)
     return refuse("the scene has had " + std::to_string(kMostItems) + " items and takes no more");
-  const Box room = bone().bounds().grown(limits_.beyond_bone_mm);
-  const Vec3& at = item.pose_bone_item.position_mm;
-  if (!((at.array() >= room.min_mm.array()).all() && (at.array() <= room.max_mm.array()).all()))
-    return refuse("item.pose_bone_item is too far from the bone");
   const std::vector<SceneItem> standing = items();
   const std::vector<Standing> scene = with_tools(standing);
-  const auto before = std::ranges::find(scene, item.id, [](const Standing& one) { return one.item.id; });
-  const CutField& body = bodies_.at(item.body).field;
-  Result<SceneItem> ruled = set_by_rules(scene, before == scene.end() ? nullptr : &*before, {item, tools_->find(item.tool)->tool},
-                                         [&](const Vec3& p) { return body.solid_mm(p); });
+  const auto found = std::ranges::find(scene, item.id, [](const Standing& one) { return one.item.id; });
+  const Standing* before = found == scene.end() ? nullptr : &*found;
+  const Tool& tool = tools_->find(item.tool)->tool;
+  const BoneQuery solid = [&body = bodies_.at(item.body).field](const Vec3& p) { return body.solid_mm(p); };
+  Result<Placed> stands = placed(placing, before, {item, tool}, solid);
+  if (!stands) return tl::unexpected(stands.error());
+  const Box room = bone().bounds().grown(limits_.beyond_bone_mm);
+  const Vec3& at = stands->item.pose_bone_item.position_mm;
+  if (!((at.array() >= room.min_mm.array()).all() && (at.array() <= room.max_mm.array()).all()))
+    return refuse("item.pose_bone_item is too far from the bone");
+  Result<SceneItem> ruled = set_by_rules(scene, before, {stands->item, tool}, solid);
   if (!ruled) return tl::unexpected(ruled.error());
   item = *ruled;
   if (item.id == 0) item.id = ++last_item_;
@@ -474,6 +477,7 @@ Result<RoomEvent> Room::set_item(AuthorId by, SceneItem item) {
   item.set_at = event.room_seq.value;
   items_[item.id].push_back({event.room_seq, item});
   event.item = item.id;
+  event.set = Placed{item, stands->contact_fraction};
   event.scene = true;
   finish_event(event);
   return event;

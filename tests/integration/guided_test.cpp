@@ -2,7 +2,9 @@
 // pin and a screw. What is checked is what the server saved: the hole by what is solid, the scene by its items.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <fstream>
 #include <numbers>
 
@@ -81,6 +83,116 @@ TEST(Guided, ATremblingHandDrillsWhereTheGuideSays) {
       EXPECT_LT(field.solid_mm(guide.point((radius + bound + kLimit_mm) * out + Vec3(0, 0, depth))), 0.0);
     }
   }
+}
+
+// The numbers of an answer such as "ok ...: item 3 at 1.00 2.00 3.00 along 0.000 0.000 -1.000, seated".
+struct Answer {
+  unsigned item = 0;
+  Vec3 at{0, 0, 0}, along{0, 0, 0};
+  bool seated = false;
+};
+Answer standing_of(const std::string& line) {
+  Answer answer;
+  const std::size_t from = line.find(": item ");
+  EXPECT_TRUE(line.starts_with("ok ") && from != std::string::npos) << line;
+  if (from == std::string::npos) return answer;
+  EXPECT_EQ(std::sscanf(line.c_str() + from, ": item %u at %lf %lf %lf along %lf %lf %lf", &answer.item, &answer.at.x(), &answer.at.y(), &answer.at.z(),
+                        &answer.along.x(), &answer.along.y(), &answer.along.z()),
+            7)
+      << line;
+  answer.seated = line.find(", seated") != std::string::npos;
+  return answer;
+}
+
+// A person at a viewer's script sets down, moves, turns, drives home and takes away what stands on the bone. The block's
+// top is z = 0; the cup and the reamer that makes its cavity are tools of the box, edited to 36 mm.
+TEST(Scene, IsArrangedFromAViewersScript) {
+  const TempDir tools;
+  for (const auto& [tool, file] : {std::pair{"trial-cup-50", "cup-36.yaml"}, std::pair{"reamer-sphere", "reamer-36.yaml"}}) {
+    const auto made = run(program("osteon-import"), {"tools", tool, "--set", "diameter_mm=36", "--out", tools / file});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+  }
+  const auto screen = Xvfb::start("640x480");
+  ASSERT_TRUE(screen) << "Xvfb is needed; deploy/install installs it";
+  Stage stage(70.0, {"--tools", tools / ""});
+  ScriptedViewer viewer(stage.address(), *screen);
+  ASSERT_TRUE(viewer.tell("wait surface"));
+  const Vec3 into(0, 0, -1);
+  const double on_surface_mm = 0.02;  // the answers' last digit beside the field's rounding
+  const auto refused = [&](const std::string& command, const std::string& named) {
+    const std::string line = viewer.ask(command);
+    EXPECT_TRUE(line.starts_with("error ")) << command << ": " << line;
+    EXPECT_NE(line.find(named), std::string::npos) << line;
+  };
+
+  // A guide finds the surface by itself, pins fix it, and then it stays.
+  const Answer block = standing_of(viewer.ask("place guide-2 near 0 20 4 across 1 0 0"));
+  EXPECT_EQ(block.item, 1u);
+  EXPECT_LT((block.at - Vec3(0, 20, 0)).norm(), on_surface_mm);
+  EXPECT_LT((block.along - into).norm(), 2e-3) << "against the surface's normal";
+  const Answer leaning = standing_of(viewer.ask("move 1 near 1 19 3 along 0.1 0 -1"));
+  EXPECT_LT((leaning.at - Vec3(1, 19, 0)).norm(), on_surface_mm);
+  EXPECT_LT((leaning.along - Vec3(0.1, 0, -1).normalized()).norm(), 2e-3);
+  EXPECT_EQ(standing_of(viewer.ask("move 1 at 0 20 0 along 0 0 -1")).item, 1u);
+  for (const GuideBore& hole : guide_shape(*find_tool("guide-2")).pin_holes) {
+    // The guide's x is the bone's, its z goes down.
+    const Vec3 tip = hole.entry_mm + (hole.length_mm + 15.0) * hole.direction;
+    const auto line = viewer.ask("place pin-1 at " + std::to_string(tip.x()) + " " + std::to_string(20.0 - tip.y()) + " " + std::to_string(-tip.z()) + " along 0 0 -1");
+    EXPECT_NEAR(standing_of(line).at.z(), -15.0, 0.01) << line;
+  }
+  refused("move 1 at 0 20 1 along 0 0 -1", "fixed by pins");
+  refused("remove 1", "fixed by pins");
+  EXPECT_EQ(viewer.ask("remove 3"), "ok remove 3");
+  EXPECT_EQ(standing_of(viewer.ask("move 1 at 0 20 1 along 0 0 -1")).at, Vec3(0, 20, 1));
+  EXPECT_EQ(viewer.ask("remove 1"), "ok remove 1");
+  refused("remove 1", "does not stand");
+  refused("turn 2 1", "no thread");
+
+  // A screw of pitch 1.25 mm and length 30 mm.
+  const Answer screw = standing_of(viewer.ask("place screw-1 near 25 -20 2"));
+  EXPECT_LT((screw.at - Vec3(25, -20, 0)).norm(), on_surface_mm);
+  const std::string number = std::to_string(screw.item);
+  EXPECT_NEAR(standing_of(viewer.ask("turn " + number + " 4")).at.z(), -5.0, on_surface_mm);
+  EXPECT_NEAR(standing_of(viewer.ask("turn " + number + " -1")).at.z(), -3.75, on_surface_mm);
+  refused("move " + number + " at 25 -20 -9 along 0 0 -1", "thread");
+  const std::string home = viewer.ask("turn " + number + " 50");
+  EXPECT_NEAR(standing_of(home).at.z(), -30.0, 0.1) << home;
+  EXPECT_NE(home.find(", 24.0"), std::string::npos) << "30 mm are 24 turns: " << home;
+  EXPECT_TRUE(standing_of(home).seated) << home;
+  refused("turn " + number + " 1000", "100 mm");
+
+  // The cup goes home in a hemisphere of its own size.
+  {
+    Surgeon hand(stage.address(), stage / "cache");
+    ASSERT_TRUE(wait_until([&] { return hand.complete(); }, kPatience));
+    const auto entries = hand.session().tools()->entries();
+    const auto reamer = std::ranges::find(entries, "reamer-36", [](const ToolBox::Entry* entry) { return entry->tool.name; });
+    ASSERT_NE(reamer, entries.end());
+    Cut cut = straight_cut((*reamer)->tool, {-14, -13, -8}, {-14, -13, -18}, into);
+    cut.author = hand.author();
+    ASSERT_TRUE(hand.session().send(cut));
+    ASSERT_TRUE(wait_until([&] { return hand.own() == 1; }, kPatience)) << hand.rejected();
+  }
+  const Answer cup = standing_of(viewer.ask("place cup-36 at -14 -13 1 along 0 0 -1"));
+  const std::string cup_number = std::to_string(cup.item);
+  EXPECT_FALSE(cup.seated);
+  const std::string short_way = viewer.ask("seat " + cup_number + " 3");
+  EXPECT_NEAR(standing_of(short_way).at.z(), -2.0, 0.01) << short_way;
+  EXPECT_FALSE(standing_of(short_way).seated) << short_way;
+  const std::string seated = viewer.ask("seat " + cup_number);
+  EXPECT_NEAR(standing_of(seated).at.z(), -18.0, 0.1) << seated;
+  EXPECT_TRUE(standing_of(seated).seated) << seated;
+  refused("seat " + number, "no implant");
+  refused("seat 99", "99");
+
+  // All of it can be taken back, and everyone is told.
+  EXPECT_EQ(viewer.ask("undo 1"), "ok undo 1: 1 event");
+  ASSERT_TRUE(viewer.tell("status " + (stage / "viewer.json").string()));
+  const json standing = read_json(stage / "viewer.json").at("standing");
+  ASSERT_EQ(standing.size(), 3u);
+  EXPECT_NEAR(standing.at(2).at("at_mm").at(2).get<double>(), -2.0, 0.01);
+  refused("place guide-1 near 0 0 30", "20 mm");
+  refused("place drill-3.2 near 0 0 3", "for the hand");
 }
 
 // The shape of a tool of the box, written as triangles, comes back from a folder as a tool of its own.

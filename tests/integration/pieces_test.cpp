@@ -143,7 +143,7 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
   ASSERT_TRUE(viewer.tell("take-away 1"));
   ASSERT_TRUE(viewer.tell("wait bodies 1"));
   EXPECT_NE(picture("taken.png"), parted);
-  ASSERT_TRUE(viewer.tell("undo 1"));
+  EXPECT_EQ(viewer.ask("undo 1"), "ok undo 1: 1 event");
   ASSERT_TRUE(viewer.tell("wait bodies 2"));
   EXPECT_EQ(viewed().at("scene_mesh_hash"), parted_hash);
   EXPECT_EQ(picture("back.png"), parted);
@@ -154,6 +154,9 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
   EXPECT_EQ(hand.bodies().size(), 1u);
   EXPECT_NE(viewed().at("scene_mesh_hash"), parted_hash);
   ASSERT_TRUE(viewer.tell("redo 1"));
+  const std::string all = ": " + std::to_string(cuts.size() + 1) + " events";
+  EXPECT_EQ(viewer.ask("undo 5000"), "ok undo 5000" + all) << "the cuts and what they separated";
+  EXPECT_EQ(viewer.ask("redo 1"), "ok redo 1" + all);
   ASSERT_TRUE(viewer.tell("wait bodies 2"));
   EXPECT_FALSE(viewer.tell("redo 9 times"));
   EXPECT_FALSE(viewer.tell("take-away 7")) << "no such body";

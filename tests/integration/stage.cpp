@@ -50,11 +50,12 @@ std::vector<std::string> viewer_arguments(const std::string& address, std::vecto
 ScriptedViewer::ScriptedViewer(const std::string& address, const Xvfb& screen, std::vector<std::string> more)
     : process_(program("osteon-viewer"), viewer_arguments(address, std::move(more)), screen.options()) {}
 
-bool ScriptedViewer::tell(const std::string& command, std::chrono::milliseconds patience) {
+std::string ScriptedViewer::ask(const std::string& command, std::chrono::milliseconds patience) {
   process_.write(command + "\n");
-  const auto answer = process_.read_line(patience);
-  return answer && answer->starts_with("ok");
+  return process_.read_line(patience).value_or("");
 }
+
+bool ScriptedViewer::tell(const std::string& command, std::chrono::milliseconds patience) { return ask(command, patience).starts_with("ok"); }
 
 Stage::Stage(double width_mm, std::vector<std::string> server_arguments) {
   const RunResult imported = run(program("osteon-import"), {"phantom", "block", "--layers", "5:1.9,20:0.3,5:1.9", "--width",

@@ -26,7 +26,9 @@ struct Table {
 class ScriptedViewer {
  public:
   ScriptedViewer(const std::string& address, const Xvfb& screen, std::vector<std::string> more = {});
-  // Says a command and waits for its answer; true when that begins with "ok".
+  // Says a command and waits for the line that answers; empty where none comes.
+  [[nodiscard]] std::string ask(const std::string& command, std::chrono::milliseconds patience = std::chrono::seconds{60});
+  // The same; true when the answer begins with "ok".
   [[nodiscard]] bool tell(const std::string& command, std::chrono::milliseconds patience = std::chrono::seconds{60});
   [[nodiscard]] Process& process() { return process_; }
 

@@ -2,6 +2,7 @@
 // and what a cut costs with each of the tools at its own level, with the memory that its field takes.
 #include <benchmark/benchmark.h>
 #include <openvdb/openvdb.h>
+#include <sys/resource.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -9,13 +10,18 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <memory>
+#include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "common/core/check.hpp"
 #include "common/field/kernel.hpp"
+#include "common/runtime/memory_reserve.hpp"
 #include "common/volume/cut_field.hpp"
 #include "tests/support/scenes/bones.hpp"
+#include "tests/support/scenes/random.hpp"
 
 namespace osteon::test {
 namespace {
@@ -93,29 +99,70 @@ void flush_caches() {
   benchmark::ClobberMemory();
 }
 
-// A fresh place for every cut: none of its leaves is there yet, and the caches hold other work.
-void cold(benchmark::State& state, Cut (*cut_at)(const Vec3&)) {
-  constexpr int kPlaces = 200;
+// Wide enough for many cuts that know nothing of each other.
+const Case& wide_bone() {
+  static const Case block = plain_block(120, 16, kPitch_mm);
+  return block;
+}
+
+// Pages that the system gave to this process for the first time.
+long new_pages() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return usage.ru_minflt;
+}
+
+// Where memory for what the cuts add comes from: from a reserve that is refilled between cuts, as the server and the haptic
+// client do; or from the system, page by page, while it cuts.
+enum class Heap { reserved, given };
+
+// A place in untouched bone for every cut, and caches that hold other work. A 3.5 mm drill with its band reaches 2.3 mm to
+// each side and a leaf is 1 mm wide, so of places 7 mm apart no two share a leaf: every leaf that a cut changes is new.
+void cold(benchmark::State& state, Cut (*cut_at)(const Vec3&), Heap heap) {
+  constexpr int kPlaces = 200, kRow = 15;
+  constexpr double kApart_mm = 8.0, kScatter_mm = 0.5;  // at least 7 mm, and everywhere between the leaves' faces
   const Threads threads(state.range(0));
+  std::vector<Cut> cuts;
+  Random random(5);
+  for (int i = 0; i < kPlaces; ++i) {
+    Vec3 scatter = random.in_cube(kScatter_mm);
+    scatter.z() *= 0.25;
+    cuts.push_back(cut_at(Vec3((i % kRow - 7) * kApart_mm, (i / kRow - 7) * kApart_mm, 0.0) + scatter));
+  }
   Times times;
   CutReport report;
+  std::int64_t leaves = 0;
+  long pages = 0;
   for (auto _ : state) {
-    CutField field(bone(), BodyId{});
+    const Case& bone = wide_bone();
+    // Kept, so that no pass finds memory that another one gave back.
+    static std::vector<std::unique_ptr<CutField>> fields;
+    CutField& field = *fields.emplace_back(std::make_unique<CutField>(bone, BodyId{}));
+    std::optional<MemoryReserve> reserve;
+    if (heap == Heap::reserved) reserve.emplace(kCutReserve);
     double sum = 0.0;
-    for (int i = 0; i < kPlaces; ++i) {
-      const Cut cut = cut_at({-24.0 + 2.4 * (i % 20) + 0.01 * i, -24.0 + 2.4 * (i / 20), i % 7 * 0.037});
+    std::set<Coord> reached;
+    for (const Cut& cut : cuts) {
+      if (reserve) reserve->refill();
       flush_caches();
+      const long had = new_pages();
       const auto start = Clock::now();
       report = field.apply(cut);
       const double us = us_since(start);
+      pages += new_pages() - had;
       sum += us;
       times.us.push_back(us);
+      for (const Coord& leaf : report.reached_leaves) OSTEON_CHECK(reached.insert(leaf).second);
+      leaves += static_cast<std::int64_t>(report.changed_leaves.size());
     }
     state.SetIterationTime(sum / kPlaces * 1e-6);
   }
+  const auto count = static_cast<double>(times.us.size());
   times.report(state);
   count_samples(state, static_cast<double>(report.visited), static_cast<double>(report.computed),
                 static_cast<double>(report.modified));
+  state.counters["new_leaves"] = static_cast<double>(leaves) / count;
+  state.counters["new_pages"] = static_cast<double>(pages) / count;
 }
 
 // The plain way, §5.4 of the dissertation: walk the voxels of the World Bounding Block, here of the swept tool and grown
@@ -381,51 +428,72 @@ Motion motion_of(const Tool& tool) {
   }
 }
 
+// Deep enough for the longest broach.
 const Case& big_bone() {
-  static const Case block = plain_block(110, 70, kPitch_mm);
+  static const Case block = plain_block(90, 140, kPitch_mm);
   return block;
 }
 
-// Each cut goes on from the one before it, from the surface inwards.
-void cut_with(benchmark::State& state, const Tool& tool) {
+// Where a tool's cuts begin: with half a millimetre of its tip in the bone, or seated, with all of its cutting part in.
+enum class Begin { entering, seated };
+
+double first_depth_mm(const Tool& tool, Begin begin, double on_the_way_mm) {
+  if (begin == Begin::entering) return 0.5;
+  switch (tool.kind) {
+    case ToolKind::round_burr: return tool.diameter_mm;
+    case ToolKind::sphere_reamer: return 0.5 * tool.diameter_mm;
+    case ToolKind::oscillating_saw: return 20.0;  // the plate follows its teeth
+    case ToolKind::broach: return tool.cutting_length_mm - on_the_way_mm;  // whole at the end: then it stops
+    default: return tool.cutting_length_mm;
+  }
+}
+
+// Each cut goes on from the one before it, inwards. What a seated tool took on its way in is taken before, in one cut.
+void cut_with(benchmark::State& state, const Tool& tool, Begin begin) {
+  constexpr int kCuts = 120;
   const Threads threads(state.range(0));
   const Motion motion = motion_of(tool);
+  const double depth = first_depth_mm(tool, begin, -motion.way_mm_s.z() * kCuts * kCutSeconds);
   Times times;
   double visited = 0, computed = 0, modified = 0, memory = 0;
   for (auto _ : state) {
     CutField field(big_bone(), BodyId{});
-    const int cuts = 120;
     const int level = std::min(tool.cut_level, finest_level(kPitch_mm));
     double sum = 0.0;
     visited = computed = modified = 0;
+    const auto cut_between = [&](const Pose& from, const Pose& to) {
+      Cut cut = straight_cut(tool, Vec3::Zero(), Vec3::Zero(), {0, 0, -1});
+      cut.level = level;
+      cut.path = {quantise(from), quantise(to)};
+      return cut;
+    };
     const auto pose_at = [&](int i) {
       const double t = i * kCutSeconds, tilt = motion.tilt_rad_s * t;
-      // Begins with half a millimetre of its tip in the bone. Tilted from one rotation, so that it does not spin: a blade
-      // that spins is another motion.
-      Pose pose = pose_along(Vec3(0, 0, -0.5) + t * motion.way_mm_s, {0, 0, -1});
+      // Tilted from one rotation, so that it does not spin: a blade that spins is another motion.
+      Pose pose = pose_along(Vec3(0, 0, -depth) + t * motion.way_mm_s, {0, 0, -1});
       pose.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(tilt, Vec3(0.3, 1.0, 0.0).normalized())) * pose.rotation;
       return pose;
     };
-    for (int i = 0; i < cuts; ++i) {
-      Cut cut = straight_cut(tool, Vec3::Zero(), Vec3::Zero(), {0, 0, -1});
-      cut.level = level;
-      cut.path = {quantise(pose_at(i)), quantise(pose_at(i + 1))};
+    if (begin == Begin::seated) field.apply(cut_between(pose_along(Vec3(0, 0, 1), {0, 0, -1}), pose_at(0)));
+    for (int i = 0; i < kCuts; ++i) {
+      const Cut cut = cut_between(pose_at(i), pose_at(i + 1));
       const auto start = Clock::now();
       const CutReport report = field.apply(cut);
       const double us = us_since(start);
       sum += us;
       times.us.push_back(us);
-      visited += static_cast<double>(report.visited) / cuts;
-      computed += static_cast<double>(report.computed) / cuts;
-      modified += static_cast<double>(report.modified) / cuts;
+      visited += static_cast<double>(report.visited) / kCuts;
+      computed += static_cast<double>(report.computed) / kCuts;
+      modified += static_cast<double>(report.modified) / kCuts;
     }
     memory = static_cast<double>(field.memory_bytes());
-    state.SetIterationTime(sum / cuts * 1e-6);
+    state.SetIterationTime(sum / kCuts * 1e-6);
     state.counters["pitch_mm"] = level_pitch_mm(kPitch_mm, level);
   }
   times.report(state);
   count_samples(state, visited, computed, modified);
   state.counters["memory_bytes"] = memory;
+  state.counters["depth_mm"] = depth;
 }
 
 template <class Run>
@@ -453,14 +521,18 @@ const bool registered = [] {
   add("cut_burr/hot", [](benchmark::State& state) { hot(state, burr_cut()); });
   add_plain("cut_burr/world_box", [](benchmark::State& state) { world_box(state, burr_cut()); });
   add_plain("cut_burr/near_leaves", [](benchmark::State& state) { near_leaves(state, burr_cut()); });
-  add_timed("cut_burr/cold", [](benchmark::State& state) { cold(state, burr_cut); }, 1);
+  add_timed("cut_burr/cold", [](benchmark::State& state) { cold(state, burr_cut, Heap::reserved); }, 1);
+  add_timed("cut_burr/cold_given", [](benchmark::State& state) { cold(state, burr_cut, Heap::given); }, 1);
   add("cut_drill/hot", [](benchmark::State& state) { hot(state, drill_cut()); });
   add_plain("cut_drill/world_box", [](benchmark::State& state) { world_box(state, drill_cut()); });
   add_plain("cut_drill/near_leaves", [](benchmark::State& state) { near_leaves(state, drill_cut()); });
-  add_timed("cut_drill/cold", [](benchmark::State& state) { cold(state, drill_cut); }, 1);
+  add_timed("cut_drill/cold", [](benchmark::State& state) { cold(state, drill_cut, Heap::reserved); }, 1);
+  add_timed("cut_drill/cold_given", [](benchmark::State& state) { cold(state, drill_cut, Heap::given); }, 1);
   for (const Tool& tool : builtin_tools())
     if (tool.cuts()) {
-      add_timed("cut_tool/" + tool.name, [tool](benchmark::State& state) { cut_with(state, tool); }, 1);
+      const std::string name = "cut_tool/" + tool.name;
+      add_timed(name + "/entering", [tool](benchmark::State& state) { cut_with(state, tool, Begin::entering); }, 1);
+      add_timed(name + "/seated", [tool](benchmark::State& state) { cut_with(state, tool, Begin::seated); }, 1);
     }
   return true;
 }();

@@ -25,7 +25,7 @@ constexpr std::size_t kCuts = 400, kBatch = 50;
 // Memory that the system gives for the first time costs more than a cut, and a server has it before the first. Keeps so
 // much of it ready in the heap.
 void warm_heap(std::size_t bytes) {
-  mallopt(M_MMAP_THRESHOLD, 1 << 30);
+  mallopt(M_MMAP_THRESHOLD, 32 << 20);  // more is refused
   mallopt(M_TRIM_THRESHOLD, 2'000'000'000);
   constexpr std::size_t kPart = 1 << 20;
   std::vector<std::unique_ptr<char[]>> parts;
@@ -145,30 +145,29 @@ void cost_of_size(const std::vector<int>& sizes, const Tool& burr) {
   std::printf("]");
 }
 
-// Grooves of one bur side by side, of many lengths: memory of the field against what was cut, both from zero.
+// Grooves of one bur side by side, of many lengths: what each of them removes, and what it adds to the field's memory.
 void memory_of_cuts(const Tool& burr) {
   const double radius = 0.5 * burr.diameter_mm, width = 120.0;
   CutField field(plain_block(width, 6.0, kPitch_mm), BodyId{});
   Random random(4);
-  const double first = heap_bytes();
-  double area = 0.0, volume = 0.0;
-  std::printf("\"memory\": [");
-  const double row = burr.diameter_mm + 2.0;  // farther apart than two bands
+  std::printf("{\"tool\": \"%s\", \"diameter_mm\": %g, \"grooves\": [", burr.name.c_str(), burr.diameter_mm);
+  const double row = burr.diameter_mm + 3.0;  // farther apart than two bands and a leaf, so that no two share a leaf
   bool head = true;
   for (double y = -0.5 * width + row; y < 0.5 * width - row; y += row)
     for (double x = -0.5 * width + row;;) {
-      const double length = random.between(1.0, 12.0);
+      const double length = random.between(1.0, 40.0);
       if (x + length > 0.5 * width - row) break;
+      const double before = heap_bytes();
       // The ball's centre is in the bone's face, so half of a capsule is cut.
       field.apply(straight_cut(burr, {x, y, -radius}, {x + length, y, -radius}, {0, 0, -1}));
-      area += std::numbers::pi * radius * length + 2.0 * std::numbers::pi * radius * radius;
-      volume += 0.5 * std::numbers::pi * radius * radius * length + 2.0 / 3.0 * std::numbers::pi * radius * radius * radius;
+      const double bytes = heap_bytes() - before;
+      const double area = std::numbers::pi * radius * length + 2.0 * std::numbers::pi * radius * radius;
+      const double volume = std::numbers::pi * radius * radius * (0.5 * length + 2.0 / 3.0 * radius);
+      std::printf("%s{\"area_mm2\": %.3f, \"volume_mm3\": %.3f, \"bytes\": %.0f}", head ? "" : ", ", area, volume, bytes);
       x += length + row;
-      std::printf("%s{\"area_mm2\": %.3f, \"volume_mm3\": %.3f, \"bytes\": %.0f}", head ? "" : ", ", area, volume,
-                  heap_bytes() - first);
       head = false;
     }
-  std::printf("]");
+  std::printf("]}");
 }
 
 }  // namespace
@@ -179,14 +178,16 @@ int main(int argc, char** argv) {
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
   std::vector<int> sizes;
   for (int i = 1; i < argc; ++i) sizes.push_back(std::atoi(argv[i]));
-  const auto burr = nearest_tool(osteon::ToolKind::round_burr, 3.2);
-  if (sizes.empty() || !burr || std::ranges::any_of(sizes, [](int n) { return n < 32 || n > 2048; })) {
+  const auto burr = nearest_tool(osteon::ToolKind::round_burr, 3.2), large = nearest_tool(osteon::ToolKind::round_burr, 6.0);
+  if (sizes.empty() || !burr || !large || std::ranges::any_of(sizes, [](int n) { return n < 32 || n > 2048; })) {
     std::fprintf(stderr, "osteon-growth: needs sizes in samples an axis, 32 to 2048 each\n");
     return 1;
   }
   std::printf("{\"tool\": \"%s\", ", burr->name.c_str());
   cost_of_size(sizes, *burr);
-  std::printf(", ");
+  std::printf(", \"memory\": [");
   memory_of_cuts(*burr);
-  std::printf("}\n");
+  std::printf(", ");
+  memory_of_cuts(*large);
+  std::printf("]}\n");
 }

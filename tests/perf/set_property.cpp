@@ -1,6 +1,7 @@
 // Whether a bone is a function of the set of its cuts: applies random cuts of all tools in random orders, some of them
-// again, and compares the names of the fields. Takes cuts, orders, threads that share a cut and, if wanted, how many samples the kernel
-// computes at once; prints JSON, and progress to stderr. Linked with differently built kernels it must print the same name.
+// again, and compares the names of the fields. Takes cuts, orders, threads that share a cut and, if wanted, the number of
+// the first order (each number is another order) and how many samples the kernel computes at once; prints JSON, and
+// progress to stderr. Linked with differently built kernels it must print the same name.
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -23,7 +24,7 @@ namespace {
 struct Tally {
   std::mutex mutex;
   std::set<Digest> names;
-  Digest first;
+  std::set<std::uint64_t> orders;  // by a number made of each
   int done = 0, differing = 0;
 };
 
@@ -33,7 +34,14 @@ CutField apply_in_order(const Case& bone, const std::vector<Cut>& cuts, const st
   return field;
 }
 
-int run(std::size_t count, int orders, int threads, int lanes) {
+// FNV-1a over the places of an order.
+std::uint64_t number_of(const std::vector<std::size_t>& order) {
+  std::uint64_t number = 0xcbf29ce484222325u;
+  for (const std::size_t place : order) number = (number ^ place) * 0x100000001b3u;
+  return number;
+}
+
+int run(std::size_t count, int orders, int threads, int first_order, int lanes) {
   const int used = limit_kernel_lanes(lanes);
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
   const Case bone = ball_of_bone();
@@ -62,10 +70,12 @@ int run(std::size_t count, int orders, int threads, int lanes) {
   std::atomic<int> next{0};
   const auto work = [&] {
     for (int i = next++; i < orders; i = next++) {
-      Random own(1000 + static_cast<std::uint64_t>(i));
-      const Digest name = apply_in_order(bone, cuts, order_with_repeats(count, count / 10, own)).hash();
+      Random own(1000 + static_cast<std::uint64_t>(first_order + i));
+      const std::vector<std::size_t> order = order_with_repeats(count, count / 10, own);
+      const Digest name = apply_in_order(bone, cuts, order).hash();
       const std::lock_guard lock(tally.mutex);
       tally.names.insert(name);
+      tally.orders.insert(number_of(order));
       tally.differing += name == expected ? 0 : 1;
       ++tally.done;
       if (tally.done == orders || tally.done % std::max(1, orders / 20) == 0)
@@ -80,9 +90,15 @@ int run(std::size_t count, int orders, int threads, int lanes) {
 
   tally.names.insert(expected);
   std::printf("{\"cuts\": %zu, \"orders\": %d, \"threads\": %d, \"lanes\": %d, \"seconds\": %.1f, \"tools\": %zu, "
-              "\"names\": %zu, \"differing\": %d, \"partly_cut\": %.4f, \"name\": \"%s\"}\n",
+              "\"names\": %zu, \"differing\": %d, \"partly_cut\": %.4f, \"name\": \"%s\", \"order_numbers\": [",
               count, orders, threads, used, seconds(), cutting_tools(), tally.names.size(), tally.differing,
               samples == 0 ? 0.0 : static_cast<double>(between) / static_cast<double>(samples), to_hex(expected).c_str());
+  const char* before = "";
+  for (const std::uint64_t number : tally.orders) {
+    std::printf("%s\"%016llx\"", before, static_cast<unsigned long long>(number));
+    before = ", ";
+  }
+  std::printf("]}\n");
   return 0;
 }
 
@@ -92,10 +108,10 @@ int run(std::size_t count, int orders, int threads, int lanes) {
 int main(int argc, char** argv) {
   const long cuts = argc > 1 ? std::atol(argv[1]) : 0;
   const int orders = argc > 2 ? std::atoi(argv[2]) : 0, threads = argc > 3 ? std::atoi(argv[3]) : 0;
-  const int lanes = argc > 4 ? std::atoi(argv[4]) : 16;
-  if (cuts < 1 || cuts > 1000000 || orders < 1 || threads < 1 || threads > 64 || lanes < 4) {
+  const int first_order = argc > 4 ? std::atoi(argv[4]) : 0, lanes = argc > 5 ? std::atoi(argv[5]) : 16;
+  if (cuts < 1 || cuts > 1000000 || orders < 1 || threads < 1 || threads > 64 || first_order < 0 || lanes < 4) {
     std::fprintf(stderr, "osteon-set-property: needs the numbers of cuts, of orders and of threads\n");
     return 1;
   }
-  return osteon::test::run(static_cast<std::size_t>(cuts), orders, threads, lanes);
+  return osteon::test::run(static_cast<std::size_t>(cuts), orders, threads, first_order, lanes);
 }

@@ -26,9 +26,17 @@ constexpr const char* kScriptHelp =
     "  wait seq N                            until the room's event N is drawn\n"
     "  wait bodies N                         until the room has so many bodies\n"
     "  wait items N                          until so many guides, pins, screws and implants stand\n"
-    "  undo N, redo N                        the newest N events of all; N undo events\n"
+    "  undo N, redo N                        the newest N events of all; N undo events; says how many there were\n"
     "  take-away BODY                        a sawn-off piece\n"
-    "  place TOOL at X Y Z along X Y Z [on BODY]   a guide, pin, screw or implant\n"
+    "  place TOOL near X Y Z [WAY] [on BODY] a guide, pin, screw or implant, on the surface nearest to there\n"
+    "  place TOOL at X Y Z WAY [on BODY]     the same, just there; WAY: along X Y Z (into the bone) [across X Y Z]\n"
+    "  move ITEM near X Y Z [WAY]            what stands, by the number that `place` said\n"
+    "  move ITEM at X Y Z WAY                pins along their axis only, guides unless pins fix them\n"
+    "  turn ITEM TURNS                       a screw by its thread, in or (negative) out, until its head is on bone\n"
+    "  seat ITEM [MOST_MM]                   an implant along its axis until bone stops it, 20 mm at most unless said\n"
+    "  remove ITEM                           what stands, but no guide that pins fix\n"
+    "                                        (the answers say where it stands now; `seated`: a guide held by two pins,\n"
+    "                                        a screw with its head on bone, an implant with half of it on bone)\n"
     "  save [NAME.vdb]                       the cut fields, on the server beside its --save\n"
     "  look overview                         the whole bone\n"
     "  look at X Y Z from X Y Z up X Y Z     millimetres in the bone's frame (x left, y back, z up)\n"
@@ -99,12 +107,16 @@ Result<void> run(const Arguments& arguments) {
   options.frame_log = arguments.frame_log;
   options.ask = [&watch = **watch](const RoomRequest& request) {
     return std::visit(
-        [&](const auto& asked) -> Result<RoomSeq> {
+        [&](const auto& asked) -> Result<RoomAnswer> {
           using Asked = std::decay_t<decltype(asked)>;
           if constexpr (std::is_same_v<Asked, UndoLast>) return watch.undo(asked.count);
           if constexpr (std::is_same_v<Asked, RedoLast>) return watch.redo(asked.count);
           if constexpr (std::is_same_v<Asked, TakeAway>) return watch.remove_body(asked.body);
-          if constexpr (std::is_same_v<Asked, PlaceTool>) return watch.place(asked.tool, asked.pose_bone_item, asked.body);
+          if constexpr (std::is_same_v<Asked, PlaceTool>) return watch.place(asked.tool, asked.where, asked.body);
+          if constexpr (std::is_same_v<Asked, MoveItem>) return watch.move_item(asked.item, asked.where);
+          if constexpr (std::is_same_v<Asked, TurnItem>) return watch.turn_item(asked.item, asked.turns);
+          if constexpr (std::is_same_v<Asked, SeatItem>) return watch.seat_item(asked.item, asked.most_mm);
+          if constexpr (std::is_same_v<Asked, RemoveItem>) return watch.remove_item(asked.item);
           if constexpr (std::is_same_v<Asked, SaveBone>) return watch.save(asked.file_name);
         },
         request);

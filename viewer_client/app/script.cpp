@@ -85,13 +85,68 @@ Parsed parse_number(const std::vector<std::string_view>& words, std::string_view
   return Command(RoomRequest(make(*value)));
 }
 
+// at X Y Z along X Y Z [across X Y Z], or near X Y Z [along X Y Z] [across X Y Z]; `next` goes on to what follows.
+std::optional<ItemPlace> parse_where(const std::vector<std::string_view>& words, std::size_t& next) {
+  const auto vector_after = [&](std::string_view word) -> std::optional<Vec3> {
+    if (next + 4 > words.size() || words[next] != word) return std::nullopt;
+    const auto v = vector_at(words, next + 1);
+    if (v) next += 4;
+    return v;
+  };
+  const auto has_length = [](const std::optional<Vec3>& v) { return !v || v->norm() > 1e-9; };
+  ItemPlace place;
+  auto point = vector_after("at");
+  if (!point) {
+    point = vector_after("near");
+    place.on_bone = true;
+  }
+  if (!point) return std::nullopt;
+  place.point_mm = *point;
+  place.along = vector_after("along");
+  place.across = vector_after("across");
+  if ((!place.along && !place.on_bone) || !has_length(place.along) || !has_length(place.across)) return std::nullopt;
+  if (place.along && place.across && place.across->cross(*place.along).norm() <= 1e-6 * place.across->norm() * place.along->norm()) return std::nullopt;
+  return place;
+}
+
 Parsed parse_place(const std::vector<std::string_view>& words) {
-  constexpr std::string_view kForm = "place TOOL at X Y Z along X Y Z` or `place TOOL at X Y Z along X Y Z on BODY";
-  if ((words.size() != 10 && words.size() != 12) || words[2] != "at" || words[6] != "along") return expected(kForm);
-  const auto at = vector_at(words, 3), along = vector_at(words, 7);
-  const auto body = words.size() == 12 ? number<std::uint32_t>(words[11]) : std::optional<std::uint32_t>(0);
-  if (!at || !along || !body || along->norm() < 1e-9 || (words.size() == 12 && words[10] != "on")) return expected(kForm);
-  return Command(RoomRequest(PlaceTool{std::string(words[1]), pose_along(*at, along->normalized()), BodyId{*body}}));
+  constexpr std::string_view kForm =
+      "place TOOL at X Y Z along X Y Z` or `place TOOL near X Y Z`, then `along X Y Z`, `across X Y Z`, `on BODY";
+  std::size_t next = 2;
+  const auto where = words.size() > 2 ? parse_where(words, next) : std::nullopt;
+  auto body = std::optional<std::uint32_t>(0);
+  if (next + 2 == words.size() && words[next] == "on") {
+    body = number<std::uint32_t>(words[next + 1]);
+    next += 2;
+  }
+  if (!where || !body || next != words.size()) return expected(kForm);
+  return Command(RoomRequest(PlaceTool{std::string(words[1]), *where, BodyId{*body}}));
+}
+
+// move, turn, seat, remove: of an item by its number.
+Parsed parse_item_command(const std::vector<std::string_view>& words) {
+  const std::string_view verb = words[0];
+  const auto item = words.size() > 1 ? number<std::uint32_t>(words[1]) : std::nullopt;
+  const bool known = item && *item > 0;
+  if (verb == "move") {
+    std::size_t next = 2;
+    const auto where = known ? parse_where(words, next) : std::nullopt;
+    if (!where || next != words.size()) return expected("move ITEM at X Y Z along X Y Z` or `move ITEM near X Y Z`, then `along X Y Z`, `across X Y Z");
+    return Command(RoomRequest(MoveItem{*item, *where}));
+  }
+  if (verb == "remove") {
+    if (!known || words.size() != 2) return expected("remove ITEM");
+    return Command(RoomRequest(RemoveItem{*item}));
+  }
+  const auto amount = words.size() == 3 ? number<double>(words[2]) : std::nullopt;
+  if (verb == "turn") {
+    if (!known || !amount) return expected("turn ITEM TURNS");
+    return Command(RoomRequest(TurnItem{*item, *amount}));
+  }
+  SeatItem seat{known ? *item : 0};
+  if (amount) seat.most_mm = *amount;
+  if (!known || words.size() > 3 || (words.size() == 3 && !amount) || !(seat.most_mm > 0.0)) return expected("seat ITEM` or `seat ITEM MOST_MM");
+  return Command(RoomRequest(seat));
 }
 
 Parsed parse_look(const std::vector<std::string_view>& words) {
@@ -141,11 +196,12 @@ Parsed parse_command(std::string_view line) {
   if (verb == "redo") return parse_number(words, "redo NUMBER", 1, [](std::uint32_t n) { return RedoLast{n}; });
   if (verb == "take-away") return parse_number(words, "take-away BODY", 0, [](std::uint32_t n) { return TakeAway{BodyId{n}}; });
   if (verb == "place") return parse_place(words);
+  if (verb == "move" || verb == "turn" || verb == "seat" || verb == "remove") return parse_item_command(words);
   if (verb == "save") return Command(RoomRequest(SaveBone{rest_of(line, verb)}));
   if (verb == "quit" && words.size() == 1) return Command(Quit{});
   return failure(ErrorCode::invalid_input, "there is no command `" + std::string(verb) +
-                                               "`; the commands are wait, look, tool, undo, redo, take-away, place, save, screenshot, "
-                                               "status and quit");
+                                               "`; the commands are wait, look, tool, undo, redo, take-away, place, move, turn, seat, "
+                                               "remove, save, screenshot, status and quit");
 }
 
 Result<ScriptReader> ScriptReader::open(const std::string& file) {

@@ -11,6 +11,7 @@
 #include "common/core/result.hpp"
 #include "common/geometry/pose.hpp"
 #include "viewer_client/scene/camera_view.hpp"
+#include "viewer_client/scene/item_place.hpp"
 
 namespace osteon {
 
@@ -54,13 +55,29 @@ struct TakeAway {
 };
 struct PlaceTool {
   std::string tool;
-  Pose pose_bone_item;
+  ItemPlace where;
   BodyId body;
+};
+// An item that stands, by the number that the room gave it.
+struct MoveItem {
+  std::uint32_t item = 0;
+  ItemPlace where;
+};
+struct TurnItem {
+  std::uint32_t item = 0;
+  double turns = 0;
+};
+struct SeatItem {
+  std::uint32_t item = 0;
+  double most_mm = 20.0;
+};
+struct RemoveItem {
+  std::uint32_t item = 0;
 };
 struct SaveBone {
   std::string file_name;  // empty: the server's own
 };
-using RoomRequest = std::variant<UndoLast, RedoLast, TakeAway, PlaceTool, SaveBone>;
+using RoomRequest = std::variant<UndoLast, RedoLast, TakeAway, PlaceTool, MoveItem, TurnItem, SeatItem, RemoveItem, SaveBone>;
 
 using Command = std::variant<WaitForSurface, WaitForSeq, WaitForBodies, WaitForItems, LookAtWhole, LookFrom, LookAtTool,
                              ShowTool, SaveScreenshot, SaveStatus, RoomRequest, Quit>;

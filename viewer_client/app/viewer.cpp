@@ -267,13 +267,15 @@ std::optional<Result<void>> Viewer::obey(const Command& command) {
 
 std::optional<Result<void>> Viewer::obey_room(const RoomRequest& request) {
   if (!asked_) {
-    const Result<RoomSeq> answer =
+    const Result<RoomAnswer> answer =
         options_.ask ? options_.ask(request) : failure(ErrorCode::unavailable, "this viewer has no room to ask");
     if (!answer) return Result<void>(tl::unexpected(answer.error()));
     if (std::holds_alternative<SaveBone>(request)) return Result<void>{};
     asked_ = *answer;
   }
-  if (!surface_shown_ || shown_seq_ < *asked_) return std::nullopt;
+  if (!surface_shown_ || shown_seq_ < asked_->place) return std::nullopt;
+  if (asked_->events) pending_->line += ": " + std::to_string(*asked_->events) + (*asked_->events == 1 ? " event" : " events");
+  if (!asked_->said.empty()) pending_->line += ": " + asked_->said;
   asked_.reset();
   return Result<void>{};
 }
@@ -286,6 +288,17 @@ std::string Viewer::summary_json() const {
   };
   nlohmann::ordered_json bodies = nlohmann::ordered_json::array();
   for (const BodyId body : bodies_) bodies.push_back(body.value);
+  nlohmann::ordered_json standing = nlohmann::ordered_json::array();
+  for (const SceneItem& item : items_) {
+    const Vec3 &at = item.pose_bone_item.position_mm, along = item.pose_bone_item.direction(Vec3::UnitZ());
+    standing.push_back({{"item", item.id},
+                        {"body", item.body.value},
+                        {"tool_hash", to_hex(item.tool)},
+                        {"at_mm", {at.x(), at.y(), at.z()}},
+                        {"along", {along.x(), along.y(), along.z()}},
+                        {"turns", item.turns},
+                        {"seated", item.seated}});
+  }
   const nlohmann::ordered_json summary{
       {"blocks", scene_.blocks()},
       {"regions", scene_.regions()},
@@ -294,6 +307,7 @@ std::string Viewer::summary_json() const {
       {"room_seq", shown_seq_.value},
       {"bodies", bodies},
       {"items", items_.size()},
+      {"standing", standing},
       {"frames", frames_},
       {"frame_ms", milliseconds(frame_times_)},
       {"update_ms", milliseconds(update_times_)},

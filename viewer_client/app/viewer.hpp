@@ -16,6 +16,7 @@
 #include "viewer_client/app/script.hpp"
 #include "viewer_client/render/window.hpp"
 #include "viewer_client/scene/inbox.hpp"
+#include "viewer_client/scene/room_answer.hpp"
 
 namespace osteon {
 
@@ -27,8 +28,8 @@ struct ViewerOptions {
   bool stop_at_error = false;       // a command that fails ends the run
   std::function<void(const CameraView&)> looked;  // hears after every turn where the window looks
   std::function<SpaceMouseState()> cap;           // moves the camera; its first button shows the whole, its second the tool
-  // Asks the room and waits for its answer: the place of the event.
-  std::function<Result<RoomSeq>(const RoomRequest&)> ask;
+  // Asks the room and waits for its answer.
+  std::function<Result<RoomAnswer>(const RoomRequest&)> ask;
 };
 
 // [render]
@@ -73,7 +74,7 @@ class Viewer {
   std::vector<CuttingState> states_;
   std::vector<SceneItem> items_;
   std::vector<BodyId> bodies_;
-  std::optional<RoomSeq> asked_;   // the event that the pending command has caused
+  std::optional<RoomAnswer> asked_;  // of the pending command
   bool tool_shown_ = true;
   bool interrupted_ = false;
   bool surface_complete_ = false;  // the whole surface has come

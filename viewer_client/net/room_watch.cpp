@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <cstdio>
 #include <mutex>
 #include <set>
 #include <thread>
@@ -64,6 +65,41 @@ Result<Response> ask(const std::shared_ptr<grpc::Channel>& channel,
   if (status.ok()) return response;
   const ErrorCode code = status.error_code() == grpc::StatusCode::INVALID_ARGUMENT ? ErrorCode::invalid_input : ErrorCode::unavailable;
   return failure(code, status.error_message());
+}
+
+template <class Response>
+Result<RoomAnswer> answered(const Response& response, std::optional<int> events = {}) {
+  return RoomAnswer{RoomSeq{response.room_seq()}, events, {}};
+}
+
+// The item as it stands in the room now.
+Result<SceneItem> standing_item(const std::shared_ptr<grpc::Channel>& channel, std::uint32_t id) {
+  const auto status = ask(channel, &v1::RoomService::Stub::GetStatus, v1::GetStatusRequest{});
+  if (!status) return tl::unexpected(status.error());
+  for (const v1::SceneItem& item : status->items())
+    if (item.item() == id) return wire::from_wire(item);
+  return failure(ErrorCode::not_found, "item " + std::to_string(id) + " does not stand in the scene");
+}
+
+// A pose, or what the server needs to find one on its bone. `before`: keeps the sides of an item that stands.
+void put(const ItemPlace& where, const Pose& before, v1::SetSceneItemRequest& request) {
+  const Vec3 across = where.across.value_or(before.direction(Vec3::UnitX()));
+  if (!where.on_bone) {
+    *request.mutable_item()->mutable_pose_bone_item() = wire::to_wire(pose_of(where, across));
+    return;
+  }
+  *request.mutable_item()->mutable_pose_bone_item() = wire::to_wire(before);
+  *request.mutable_onto_bone()->mutable_near_mm() = wire::to_wire(where.point_mm);
+  if (where.along) *request.mutable_onto_bone()->mutable_axis() = wire::to_wire(*where.along);
+  *request.mutable_onto_bone()->mutable_across() = wire::to_wire(across);
+}
+
+Result<RoomAnswer> set_item(const std::shared_ptr<grpc::Channel>& channel, const v1::SetSceneItemRequest& request) {
+  const auto answer = ask(channel, &v1::RoomService::Stub::SetSceneItem, request);
+  if (!answer) return tl::unexpected(answer.error());
+  const auto now = wire::from_wire(answer->set());
+  if (!now) return tl::unexpected(now.error());
+  return RoomAnswer{RoomSeq{answer->room_seq()}, {}, standing_text(*now)};
 }
 
 // The tools that the window can draw without being sent them.
@@ -372,34 +408,34 @@ void RoomWatch::look(const Look& from) {
 
 bool RoomWatch::interrupted() const { return impl_->interrupted.load(); }
 
-Result<RoomSeq> RoomWatch::undo(std::uint32_t count) {
+Result<RoomAnswer> RoomWatch::undo(std::uint32_t count) {
   const auto [channel, author] = impl_->line();
   v1::UndoRequest request;
   request.set_author(author);
   request.set_count(count);
   const auto answer = ask(channel, &v1::RoomService::Stub::Undo, request);
-  return answer ? Result<RoomSeq>(RoomSeq{answer->room_seq()}) : tl::unexpected(answer.error());
+  return answer ? answered(*answer, answer->undone_size()) : tl::unexpected(answer.error());
 }
 
-Result<RoomSeq> RoomWatch::redo(std::uint32_t count) {
+Result<RoomAnswer> RoomWatch::redo(std::uint32_t count) {
   const auto [channel, author] = impl_->line();
   v1::RedoRequest request;
   request.set_author(author);
   request.set_count(count);
   const auto answer = ask(channel, &v1::RoomService::Stub::Redo, request);
-  return answer ? Result<RoomSeq>(RoomSeq{answer->room_seq()}) : tl::unexpected(answer.error());
+  return answer ? answered(*answer, answer->redone_size()) : tl::unexpected(answer.error());
 }
 
-Result<RoomSeq> RoomWatch::remove_body(BodyId body) {
+Result<RoomAnswer> RoomWatch::remove_body(BodyId body) {
   const auto [channel, author] = impl_->line();
   v1::RemoveBodyRequest request;
   request.set_author(author);
   request.set_body(body.value);
   const auto answer = ask(channel, &v1::RoomService::Stub::RemoveBody, request);
-  return answer ? Result<RoomSeq>(RoomSeq{answer->room_seq()}) : tl::unexpected(answer.error());
+  return answer ? answered(*answer) : tl::unexpected(answer.error());
 }
 
-Result<RoomSeq> RoomWatch::place(const std::string& tool, const Pose& pose_bone_item, BodyId body) {
+Result<RoomAnswer> RoomWatch::place(const std::string& tool, const ItemPlace& where, BodyId body) {
   const auto [channel, author] = impl_->line();
   v1::ListToolsRequest list;
   list.set_author(author);
@@ -411,18 +447,66 @@ Result<RoomSeq> RoomWatch::place(const std::string& tool, const Pose& pose_bone_
     if (known.name() == tool) request.mutable_item()->set_tool_hash(known.tool_hash());
   if (request.item().tool_hash().empty()) return failure(ErrorCode::not_found, "the room knows no tool of the name " + tool);
   request.mutable_item()->set_body(body.value);
-  *request.mutable_item()->mutable_pose_bone_item() = wire::to_wire(pose_bone_item);
-  const auto answer = ask(channel, &v1::RoomService::Stub::SetSceneItem, request);
-  return answer ? Result<RoomSeq>(RoomSeq{answer->room_seq()}) : tl::unexpected(answer.error());
+  put(where, Pose{}, request);
+  return set_item(channel, request);
 }
 
-Result<RoomSeq> RoomWatch::save(const std::string& file_name) {
+Result<RoomAnswer> RoomWatch::move_item(std::uint32_t item, const ItemPlace& where) {
+  const auto [channel, author] = impl_->line();
+  const auto standing = standing_item(channel, item);
+  if (!standing) return tl::unexpected(standing.error());
+  v1::SetSceneItemRequest request;
+  request.set_author(author);
+  *request.mutable_item() = wire::to_wire(*standing);
+  put(where, standing->pose_bone_item, request);
+  return set_item(channel, request);
+}
+
+Result<RoomAnswer> RoomWatch::turn_item(std::uint32_t item, double turns) {
+  const auto [channel, author] = impl_->line();
+  const auto standing = standing_item(channel, item);
+  if (!standing) return tl::unexpected(standing.error());
+  v1::SetSceneItemRequest request;
+  request.set_author(author);
+  *request.mutable_item() = wire::to_wire(*standing);
+  request.set_thread_turns(turns);
+  return set_item(channel, request);
+}
+
+Result<RoomAnswer> RoomWatch::seat_item(std::uint32_t item, double most_mm) {
+  const auto [channel, author] = impl_->line();
+  const auto standing = standing_item(channel, item);
+  if (!standing) return tl::unexpected(standing.error());
+  v1::SetSceneItemRequest request;
+  request.set_author(author);
+  *request.mutable_item() = wire::to_wire(*standing);
+  request.set_drive_home_mm(most_mm);
+  const auto answer = ask(channel, &v1::RoomService::Stub::SetSceneItem, request);
+  if (!answer) return tl::unexpected(answer.error());
+  const auto now = wire::from_wire(answer->set());
+  if (!now) return tl::unexpected(now.error());
+  char way[80];
+  std::snprintf(way, sizeof way, "; advanced %.2f mm, %.0f %% of it on bone",
+                (now->pose_bone_item.position_mm - standing->pose_bone_item.position_mm).norm(), 100.0 * answer->contact_fraction());
+  return RoomAnswer{RoomSeq{answer->room_seq()}, {}, standing_text(*now) + way};
+}
+
+Result<RoomAnswer> RoomWatch::remove_item(std::uint32_t item) {
+  const auto [channel, author] = impl_->line();
+  v1::RemoveSceneItemRequest request;
+  request.set_author(author);
+  request.set_item(item);
+  const auto answer = ask(channel, &v1::RoomService::Stub::RemoveSceneItem, request);
+  return answer ? answered(*answer) : tl::unexpected(answer.error());
+}
+
+Result<RoomAnswer> RoomWatch::save(const std::string& file_name) {
   const auto [channel, author] = impl_->line();
   v1::SaveFieldsRequest request;
   request.set_author(author);
   request.set_file_name(file_name);
   const auto answer = ask(channel, &v1::RoomService::Stub::SaveFields, request);
-  return answer ? Result<RoomSeq>(RoomSeq{answer->room_seq()}) : tl::unexpected(answer.error());
+  return answer ? answered(*answer) : tl::unexpected(answer.error());
 }
 
 }  // namespace osteon

@@ -11,6 +11,8 @@
 #include "common/geometry/lattice.hpp"
 #include "common/surface/look.hpp"
 #include "viewer_client/scene/inbox.hpp"
+#include "viewer_client/scene/item_place.hpp"
+#include "viewer_client/scene/room_answer.hpp"
 
 namespace osteon {
 
@@ -47,13 +49,18 @@ class RoomWatch {
   // Where the window looks now; returns at once. The server is told of a real change, at most 4 times a second.
   void look(const Look& from);
 
-  // What a viewer may ask of the room, and the place of the event that follows. They wait for the answer. Errors:
-  // invalid_input, not_found (no such tool), unavailable (nothing to undo, no answer).
-  [[nodiscard]] Result<RoomSeq> undo(std::uint32_t count);
-  [[nodiscard]] Result<RoomSeq> redo(std::uint32_t count);
-  [[nodiscard]] Result<RoomSeq> remove_body(BodyId body);
-  [[nodiscard]] Result<RoomSeq> place(const std::string& tool, const Pose& pose_bone_item, BodyId body);
-  [[nodiscard]] Result<RoomSeq> save(const std::string& file_name);  // of the server; contained in the file
+  // What a viewer may ask of the room. They wait for the answer. Errors:
+  // invalid_input, not_found (no such tool or item), unavailable (nothing to undo, no answer).
+  [[nodiscard]] Result<RoomAnswer> undo(std::uint32_t count);
+  [[nodiscard]] Result<RoomAnswer> redo(std::uint32_t count);
+  [[nodiscard]] Result<RoomAnswer> remove_body(BodyId body);
+  [[nodiscard]] Result<RoomAnswer> place(const std::string& tool, const ItemPlace& where, BodyId body);
+  // Of an item that stands. By the rules of common/tools/scene.hpp, which the server applies to its bone.
+  [[nodiscard]] Result<RoomAnswer> move_item(std::uint32_t item, const ItemPlace& where);
+  [[nodiscard]] Result<RoomAnswer> turn_item(std::uint32_t item, double turns);
+  [[nodiscard]] Result<RoomAnswer> seat_item(std::uint32_t item, double most_mm);
+  [[nodiscard]] Result<RoomAnswer> remove_item(std::uint32_t item);
+  [[nodiscard]] Result<RoomAnswer> save(const std::string& file_name);  // of the server
 
  private:
   struct Impl;

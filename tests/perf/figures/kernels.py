@@ -69,6 +69,8 @@ def cutting(run):
             cold = times(f"cold/threads:{threads}", "p99_us")
             values[f"cut_{tool}_cold_p99{suffix}"] = over(cold / CUT_BUDGET_US, None, threads)
             values[f"cut_{tool}_cold{suffix}"] = over(times(f"cold/threads:{threads}", "median_us"), None, threads)
+            given = times(f"cold_given/threads:{threads}", "p99_us")
+            values[f"cut_{tool}_cold_given_p99{suffix}"] = over(given / CUT_BUDGET_US, None, threads)
         values[f"cut_{tool}_speedup_hot"] = over(plain / times("hot/threads:1"), None, 1)
         values[f"cut_{tool}_speedup_near"] = over(near / times("hot/threads:1"), None, 1)
         for way, prefix, counts in (("ours, 1 thread", "ours_", ""), ("ours, 2 threads", "ours_2_", ""),
@@ -82,28 +84,32 @@ def cutting(run):
     # Of several runs the middle one by its 99th percentile: what else the machine does must not decide.
     tools = {}
     for name, passes in repeated(run, "^cut_tool/", 7 if run.soak else 5).items():
-        _, tool, threads = name.split("/")
+        _, tool, way, threads = name.split("/")
         middle = sorted(passes, key=lambda b: b["p99_us"])[len(passes) // 2]
-        tools.setdefault(tool, {})[int(threads.removeprefix("threads:"))] = middle | {"max_us": max(b["max_us"] for b in passes)}
-    one = {tool: by_threads[1] for tool, by_threads in tools.items()}
-    slowest = max(one, key=lambda tool: one[tool]["p99_us"])
-    longest = max(one, key=lambda tool: one[tool]["max_us"])
-    rows = [("tool", "pitch mm", "us p50, 1 thread", "p99", "max", "us p50, 2 threads", "p99", "max", "visited", "computed",
-             "modified", "cuts", "memory kB")]
-    for tool, c in sorted(one.items()):
-        two = tools[tool].get(2, {})
-        rows.append((tool, f"{c['pitch_mm']:g}", *(f"{c[key]:.0f}" for key in ("median_us", "p99_us", "max_us")),
+        tools.setdefault((tool, way), {})[int(threads.removeprefix("threads:"))] = middle | {
+            "max_us": max(b["max_us"] for b in passes)}
+    one = {pose: by_threads[1] for pose, by_threads in tools.items()}
+    slowest = max(one, key=lambda pose: one[pose]["p99_us"])
+    longest = max(one, key=lambda pose: one[pose]["max_us"])
+    rows = [("tool", "begins", "mm deep", "pitch mm", "us p50, 1 thread", "p99", "max", "us p50, 2 threads", "p99", "max",
+             "visited", "computed", "modified", "cuts", "memory kB")]
+    for (tool, way), c in sorted(one.items()):
+        two = tools[tool, way].get(2, {})
+        rows.append((tool, way, f"{c['depth_mm']:g}", f"{c['pitch_mm']:g}",
+                     *(f"{c[key]:.0f}" for key in ("median_us", "p99_us", "max_us")),
                      *(f"{two.get(key, math.nan):.0f}" for key in ("median_us", "p99_us", "max_us")),
                      *(f"{c[key]:.0f}" for key in ("visited", "computed", "modified", "cuts")), f"{c['memory_bytes'] / 1e3:.0f}"))
-    run.tables.append((f"a cut of 8 ms by every tool that cuts, at its own level; the slowest is {slowest} (p99), the longest "
-                       f"single cut {one[longest]['max_us']:.0f} us by {longest}", rows))
+    run.tables.append((f"a cut of 8 ms by every tool that cuts, at its own level, entering bone and seated in it; the slowest is "
+                       f"{' '.join(slowest)} (p99), the longest single cut {one[longest]['max_us']:.0f} us by "
+                       f"{' '.join(longest)}", rows))
     for suffix, threads in (("", 1), ("_2", 2)):
         having = [by_threads[threads] for by_threads in tools.values() if threads in by_threads]
         for figure, key in (("tools_slowest_cut", "p99_us"), ("tools_slowest_cut_p50", "median_us")):
             parts = [c[key] / TOOL_BUDGET_US for c in having]
             values[figure + suffix] = Measured(max(parts), None, min(parts), max(parts), threads) if parts else Measured(None)
-    values["tools_longest_cut"] = Measured(one[longest]["max_us"], None, one[longest]["min_us"], one[longest]["max_us"], 1)
-    values["tools_measured"] = Measured(len(one))
+        most = [c["max_us"] for c in having] or [None]
+        values[f"tools_longest_cut{suffix}"] = Measured(max(most), None, min(most), max(most), threads)
+    values["tools_measured"] = Measured(len({tool for tool, _ in one}))
     return values
 
 
@@ -113,16 +119,18 @@ def surface(run):
     whole = {threads: b.get(f"mesh_whole_bone_versus_flying_edges/{threads}", {}) for threads in (1, 2)}
     differences = [abs(w["triangles"] - w["flying_edges_triangles"]) for w in whole.values() if w]
     frame = b.get("mesh_frame_of_33_cuts", {})
-    parts = [key for key in ("frame_ms", "frame_max_ms", "touch_ms", "blocks_ms", "flying_edges_ms", "blocks") if key in frame]
+    parts = [key for key in ("frame_ms", "frame_max_ms", "touch_ms", "blocks_ms", "cuts_ms", "flying_edges_ms", "blocks")
+             if key in frame]
     if parts:
-        run.tables.append(("a frame of 33 burr cuts: naming its stale blocks (touch) and making them", [
+        run.tables.append(("a frame of 33 burr cuts: naming its stale blocks (touch) and making them; the cuts are beside it", [
             tuple(parts), tuple(f"{frame[key]:.3g}" for key in parts)]))
     return {
         "mesh_block_speedup": spread(b.get("mesh_block_versus_flying_edges", {}), threads=1),
         "mesh_whole_bone_speedup": spread(whole[1], threads=1),
         "mesh_whole_bone_speedup_2": spread(whole[2], threads=2),
         "mesh_triangle_difference": Measured(int(max(differences)) if differences else None),
-        "mesh_frame_share": spread(frame),
+        "mesh_frame_share": spread(frame, threads=1),
+        "mesh_frame_share_with_cuts": spread(frame, "with_cuts", 1),
         "mesh_bytes_per_triangle": spread(b.get("mesh_bytes_per_triangle_cut", {}), "bytes_per_triangle"),
         "mesh_bytes_per_triangle_bone": spread(b.get("mesh_bytes_per_triangle_bone", {}), "bytes_per_triangle"),
         "mesh_encode": Measured(b["mesh_encode"]["real_time"], b["mesh_flying_edges"]["real_time"]),
@@ -167,42 +175,64 @@ def accuracy(run):
 LANES = (4, 8, 16)
 
 
-def set_property_run(run, cuts, orders, threads, program="osteon-set-property", lanes=0):
+# What a build of the kernel may compute at once: one without AVX has no more than 4 samples in a register.
+LANES_OF_BUILD = {"plain": 4, "avx2": 8}
+
+
+def set_property_run(run, cuts, orders, threads, first=0, program="osteon-set-property", lanes=LANES[-1]):
     kernel = program.removeprefix("osteon-set-property").lstrip("-") or "as built"
-    kernel += f", {lanes} lanes" if lanes else ""
-    run.say(f"set property: {cuts} cuts, {orders} orders, {threads} threads, kernel {kernel}")
-    return json.loads(run.output(program, cuts, orders, threads, *([lanes] if lanes else []), progress=True))
+    run.say(f"set property: {cuts} cuts, {orders} orders from number {first}, {threads} threads, kernel {kernel}, "
+            f"at most {lanes} lanes")
+    return json.loads(run.output(program, cuts, orders, threads, first, lanes, progress=True))
 
 
-def kernels_differing(run, cuts, expected):
-    """Kernels of other compilers and settings, two orders each: how many there are, and how many give another bone."""
+def kernels_tried(run, cuts, expected):
+    """Kernels of other compilers and settings, and the program's own with fewer lanes, two orders each: how many compilers
+    built all three (unoptimised, optimised without AVX, with AVX), how many builds, how many widths, how many differ."""
     programs = sorted(path.name for path in Path(run.programs).glob("osteon-set-property-*"))
-    outcomes = {f"{lanes} lanes": set_property_run(run, cuts, 2, 2, lanes=lanes) for lanes in LANES}
-    outcomes |= {name.removeprefix("osteon-set-property-"): set_property_run(run, cuts, 2, 2, name) for name in programs}
+    own = [set_property_run(run, cuts, 2, 2, lanes=lanes) for lanes in LANES]
+    own = {f"as built, {o['lanes']} lanes": o for o in own}  # a width that the processor has not is another one again
+    builds = {}
+    for program in programs:
+        name = program.removeprefix("osteon-set-property-")
+        lanes = LANES_OF_BUILD.get(name.split("-")[1], LANES[-1])
+        builds[name] = set_property_run(run, cuts, 2, 2, program=program, lanes=lanes)
+    ways = {}
+    for name in builds:
+        compiler, way = name.split("-")
+        ways.setdefault(compiler, set()).add(way.rstrip("0123456789"))
+    outcomes = own | builds
     differing = [name for name, o in outcomes.items() if o["differing"] or o["name"] != expected]
     run.tables.append((f"kernels, {cuts} cuts in two orders each", [("kernel", "name of the bone", "lanes", "seconds")] + [
         (name, o["name"][:16], o["lanes"], o["seconds"]) for name, o in outcomes.items()]))
-    return len(outcomes), len(differing)
+    return {"compilers": Measured(sum({"unoptimised", "plain", "avx"} <= had for had in ways.values())),
+            "kernels": Measured(len(builds)), "lanes": Measured(len(own)), "kernel_differences": Measured(len(differing))}
+
+
+def orders_tried(run, cuts, orders):
+    """As many orders again with two threads as with one, each another: how many gave another bone, how many were distinct."""
+    one = set_property_run(run, cuts, orders // 2, 1)
+    two = set_property_run(run, cuts, orders - orders // 2, 2, first=orders // 2)
+    differing = one["differing"] + two["differing"] + int(one["name"] != two["name"])
+    return one, Measured(differing), Measured(len({*one["order_numbers"], *two["order_numbers"]}))
 
 
 def set_property(run):
-    one, two = (set_property_run(run, 300, 10, threads) for threads in (1, 2))
-    kernels, differing = kernels_differing(run, 300, one["name"])
+    one, differing, orders = orders_tried(run, 300, 20)
     return {
-        "set_property_differences": Measured(one["differing"] + two["differing"] + int(one["name"] != two["name"])),
+        "set_property_differences": differing,
+        "set_property_orders": orders,
         "set_property_partly_cut": Measured(one["partly_cut"]),
-        "set_property_kernels": Measured(kernels),
-        "set_property_kernel_differences": Measured(differing),
+        **{f"set_property_{what}": value for what, value in kernels_tried(run, 300, one["name"]).items()},
     }
 
 
 def set_property_full(run):
-    one, two = (set_property_run(run, 10000, 50, threads) for threads in (1, 2))
-    _, differing = kernels_differing(run, 10000, one["name"])
+    one, differing, orders = orders_tried(run, 10000, 100)
     return {
-        "set_property_full_differences": Measured(one["differing"] + two["differing"] + int(one["name"] != two["name"])),
-        "set_property_full_orders": Measured(one["orders"] + two["orders"]),
-        "set_property_full_kernel_differences": Measured(differing),
+        "set_property_full_differences": differing,
+        "set_property_full_orders": orders,
+        "set_property_full_kernel_differences": kernels_tried(run, 10000, one["name"])["kernel_differences"],
     }
 
 
@@ -216,11 +246,23 @@ def growth(run):
     run.say("growth")
     out = json.loads(run.output("osteon-growth", 128, 256, 512, 1024, progress=True))
     sizes = {s["samples"]: s for s in out["sizes"]}
-    area, volume, used = (np.array([m[key] for m in out["memory"]]) for key in ("area_mm2", "volume_mm3", "bytes"))
-    per_area, linear = through_zero(area, used)
-    per_volume, _ = through_zero(volume, used)
+    # Groove by groove: sums of them would rise together whatever they were.
+    burs = []
+    rows = [("bur", "grooves", "mm3 least", "mm3 most", "bytes a mm3", "bytes a mm2", "correlation with volume", "with area")]
+    for bur in out["memory"]:
+        area, volume, used = (np.array([g[key] for g in bur["grooves"]]) for key in ("area_mm2", "volume_mm3", "bytes"))
+        per_volume, with_volume = through_zero(volume, used)
+        per_area, with_area = through_zero(area, used)
+        burs.append({"tool": bur["tool"], "area": area, "volume": volume, "bytes": used, "per_volume": per_volume,
+                     "per_area": per_area, "with_volume": with_volume})
+        rows.append((bur["tool"], len(used), f"{volume.min():.1f}", f"{volume.max():.1f}", f"{per_volume:.0f}", f"{per_area:.0f}",
+                     f"{with_volume:.4f}", f"{with_area:.4f}"))
+    both = {key: np.concatenate([b[key] for b in burs]) for key in ("volume", "area", "bytes")}
+    fits = [through_zero(both[key], both["bytes"]) for key in ("volume", "area")]
+    rows.append(("both", len(both["bytes"]), "", "", *(f"{slope:.0f}" for slope, _ in fits), *(f"{fit:.4f}" for _, fit in fits)))
     import pictures  # draws with matplotlib, which no other group needs
-    pictures.growth(out, per_area, run.folder / "growth.png")
+    pictures.growth(out, burs, run.folder / "growth.png")
+    run.tables.append(("memory that each groove adds, slopes through zero", rows))
     run.tables.append((f"growth, {out['sizes'][0]['cuts']} cuts of {out['tool']} in each bone, in turn; picture: "
                        f"{run.folder / 'growth.png'}",
                        [("samples", "us p50", "us p99", "over 128^3", "bytes a cut", "bone MB")] + [
@@ -230,9 +272,11 @@ def growth(run):
     return {
         **{f"growth_cut_{n}": Measured(sizes[n]["ratio_p50"], None, sizes[n]["ratio_min"], sizes[n]["ratio_max"], 1)
            for n in (256, 512, 1024)},
-        "growth_memory_per_area": Measured(per_area),
-        "growth_memory_per_volume": Measured(per_volume),
-        "growth_memory_linear": Measured(linear),
+        "growth_memory_per_volume": Measured(burs[0]["per_volume"]),
+        "growth_memory_per_volume_large": Measured(burs[1]["per_volume"]),
+        "growth_memory_per_area": Measured(burs[0]["per_area"]),
+        "growth_memory_per_area_large": Measured(burs[1]["per_area"]),
+        "growth_memory_linear": over([b["with_volume"] for b in burs])._replace(value=min(b["with_volume"] for b in burs)),
         "growth_memory_bone_ratio": Measured(largest["bytes_per_cut"] / sizes[128]["bytes_per_cut"]),
     }
 
@@ -257,19 +301,20 @@ def refinement(run):
     """The dissertation's Table 5.4: method 1 resamples the whole sub-volume that a tool meets, method 2 where it cuts."""
     run.say("adaptive resolution")
     out = json.loads(run.output("osteon-refinement-bench"))
-    rows = [("resolution, method", "first cut us", "later cuts us", "memory MB", "finest mm in 1 GB", "areas")]
+    rows = [("resolution, method", "first cut us", "later cuts us", "memory MB", "finest mm in 1 GB", "areas", "samples cut")]
     values = {}
     for times in ("2x", "4x"):
         for method in (1, 2):
             name = f"{times}_method{method}"
             rows.append((f"{times}, method {method}", f"{out[f'{name}_first_us_p50']:.0f}", f"{out[f'{name}_later_us_p50']:.0f}",
-                         f"{out[f'{name}_megabytes']:.2f}", f"{out[f'{name}_reachable_mm']:.4f}", out[f"{name}_areas"]))
+                         f"{out[f'{name}_megabytes']:.2f}", f"{out[f'{name}_reachable_mm']:.4f}", out[f"{name}_areas"],
+                         out[f"{times}_cut_samples"]))
         values |= {
             f"refinement_{times}_first": of(out, f"{times}_method2_first_us", f"{times}_method1_first_us", 1),
             f"refinement_{times}_later": of(out, f"{times}_method2_later_us", f"{times}_method1_later_us", 1),
             f"refinement_{times}_memory_saved": Measured(out[f"{times}_method1_megabytes"] / out[f"{times}_method2_megabytes"]),
         }
-    values["refinement_differences"] = Measured(sum(not out[f"{times}_same"] for times in ("2x", "4x")))
+    values["refinement_differences"] = Measured(sum(out[f"{times}_differing_samples"] for times in ("2x", "4x")))
     run.tables.append(("adaptive resolution, after Table 5.4", rows))
     return values
 

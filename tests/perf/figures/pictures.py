@@ -6,12 +6,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "deploy/session"))
 
-from plots import ACCENT, BONE, STEEL, plt  # noqa: E402  (the sessions' style; found through the path above)
+from plots import ACCENT, STEEL, plt  # noqa: E402  (the sessions' style; found through the path above)
 
 
-def growth(out, bytes_per_mm2, file):
-    """Cost of a cut over the bone's size; memory over what was cut."""
-    figure, (cost, memory) = plt.subplots(1, 2, figsize=(11, 4.2), constrained_layout=True)
+def growth(out, burs, file):
+    """Cost of a cut over the bone's size; memory that each groove added over its volume, and over its area."""
+    figure, (cost, by_volume, by_area) = plt.subplots(1, 3, figsize=(15, 4.2), constrained_layout=True)
     sizes = [s["samples"] for s in out["sizes"]]
     cost.plot(sizes, [s["us_p50"] for s in out["sizes"]], "o-", color=ACCENT, label="median")
     cost.plot(sizes, [s["us_p99"] for s in out["sizes"]], "o--", color=STEEL, label="99th percentile")
@@ -21,12 +21,18 @@ def growth(out, bytes_per_mm2, file):
     cost.set_xlabel("samples of the bone")
     cost.set_ylabel("one cut, µs")
     cost.legend()
-    area = np.array([m["area_mm2"] for m in out["memory"]])
-    memory.plot(area, [m["bytes"] / 1e6 for m in out["memory"]], ".", color=BONE, label="measured")
-    memory.plot(area, bytes_per_mm2 * area / 1e6, color=STEEL, lw=1, label=f"{bytes_per_mm2 / 1e3:.1f} kB/mm²")
-    memory.set_xlabel("surface cut, mm²")
-    memory.set_ylabel("memory of the cut field, MB")
-    memory.legend()
+    for memory, key, what, unit in ((by_volume, "volume", "bone removed by a groove", "mm³"),
+                                    (by_area, "area", "surface cut by a groove", "mm²")):
+        for bur, colour in zip(burs, (ACCENT, STEEL)):
+            slope = bur[f"per_{key}"]
+            memory.plot(bur[key], bur["bytes"] / 1e6, ".", color=colour, label=f"{bur['tool']}, {slope / 1e3:.1f} kB/{unit}")
+            ends = np.array([0.0, bur[key].max()])
+            memory.plot(ends, slope * ends / 1e6, color=colour, lw=1)
+        memory.set_xlim(left=0)
+        memory.set_ylim(bottom=0)
+        memory.set_xlabel(f"{what}, {unit}")
+        memory.set_ylabel("memory it added to the cut field, MB")
+        memory.legend()
     figure.savefig(file, dpi=110)
     plt.close(figure)
 

@@ -1,6 +1,7 @@
 // The room's events beside cuts. The other road to every bone: a fresh room that only ever had what is left.
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <random>
 
 #include "common/field/kernel.hpp"
@@ -30,14 +31,13 @@ Digest bone_after(const std::vector<Cut>& cuts) {
   return field.hash();
 }
 
-// The part of the block on one side of x = 0, as a saw would part it: by masks that take whole samples.
-Fragment half(const Case& bone, bool upper, double volume_mm3 = 1000.0) {
+// The part of the block whose samples have such an x, as a saw would part it: by masks that take whole samples.
+Fragment part(const Case& bone, const std::function<bool(int)>& has, double volume_mm3 = 1000.0) {
   const double h = bone.pitch_mm();
   const auto band = static_cast<std::int16_t>(4 * h * 1024);
   Fragment fragment;
   fragment.volume_mm3 = volume_mm3;
   fragment.bounds = bone.bounds();
-  (upper ? fragment.bounds.min_mm : fragment.bounds.max_mm).x() = 0.0;
   const CoordBox all = bone.bounds_samples();
   const Coord first = floor_to(all.min, kLeafSize);
   for (int x = first.x; x <= all.max.x; x += kLeafSize)
@@ -45,13 +45,20 @@ Fragment half(const Case& bone, bool upper, double volume_mm3 = 1000.0) {
       for (int z = first.z; z <= all.max.z; z += kLeafSize) {
         FieldLeaf taken{BodyId{0}, 0, {x, y, z}, std::vector<std::int16_t>(kLeafVoxels)}, left = taken;
         for (std::size_t i = 0; i < kLeafVoxels; ++i) {
-          const bool of_piece = (x + static_cast<int>(i / (kLeafSize * kLeafSize)) >= 0) == upper;
+          const bool of_piece = has(x + static_cast<int>(i / (kLeafSize * kLeafSize)));
           taken.values[i] = of_piece ? static_cast<std::int16_t>(-band) : band;
           left.values[i] = of_piece ? band : static_cast<std::int16_t>(-band);
         }
         if (std::ranges::any_of(taken.values, [](std::int16_t v) { return v < 0; })) fragment.taken.push_back(std::move(taken));
         if (std::ranges::any_of(left.values, [](std::int16_t v) { return v < 0; })) fragment.left.push_back(std::move(left));
       }
+  return fragment;
+}
+
+// One side of x = 0.
+Fragment half(const Case& bone, bool upper, double volume_mm3 = 1000.0) {
+  Fragment fragment = part(bone, [&](int x) { return (x >= 0) == upper; }, volume_mm3);
+  (upper ? fragment.bounds.min_mm : fragment.bounds.max_mm).x() = 0.0;
   return fragment;
 }
 
@@ -285,6 +292,61 @@ TEST(RoomSplit, APieceIsTakenAwayAndComesBack) {
   EXPECT_EQ(room.submit(cut)->rejection, Rejection::body);
   ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
   EXPECT_EQ(room.field_hash(), parted);
+}
+
+TEST(RoomSplit, OfTwoPiecesOfABodyTheLaterFallsWithTheEarlier) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  const auto cuts = strokes(surgeon, 2, 38);
+  for (const Cut& cut : cuts) commit(room, cut);
+  const auto first = room.split(BodyId{0}, {part(room.bone(), [](int x) { return x >= 6; })}, room.lease_epoch());
+  const auto second = room.split(BodyId{0}, {part(room.bone(), [](int x) { return x < -6; })}, room.lease_epoch());
+  ASSERT_TRUE(first && second);
+  ASSERT_EQ(room.bodies().size(), 3u);
+  const Digest parted = room.field_hash();
+  double apart_mm3 = -2.0 * room.bone().volume_mm3();
+  for (const BodyId body : room.bodies()) apart_mm3 += room.find_field(body)->removed_mm3();
+
+  // Else the bone of the first piece would be in the second as well.
+  const RoomSeq named[] = {first->room_seq};
+  const auto undone = room.undo(surgeon, named);
+  ASSERT_TRUE(undone) << undone.error().message;
+  EXPECT_EQ(undone->places, (std::vector<RoomSeq>{first->room_seq, second->room_seq}));
+  EXPECT_EQ(room.bodies(), std::vector<BodyId>{BodyId{0}});
+  EXPECT_EQ(room.field_hash(), bone_after(cuts));
+  EXPECT_NEAR(room.field().removed_mm3(), apart_mm3, 0.03 * room.bone().volume_mm3());
+
+  ASSERT_TRUE(room.redo_last(surgeon, 1));
+  EXPECT_EQ(room.field_hash(), parted);
+  // The later one alone falls alone.
+  const RoomSeq later[] = {second->room_seq};
+  const auto one = room.undo(surgeon, later);
+  ASSERT_TRUE(one) << one.error().message;
+  EXPECT_EQ(one->places, std::vector<RoomSeq>{second->room_seq});
+  EXPECT_EQ(room.bodies().size(), 2u);
+}
+
+TEST(RoomSplit, ABodyThatIsAwayMissesNoCut) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  const auto cuts = strokes(surgeon, 2, 39);
+  for (const Cut& cut : cuts) commit(room, cut);
+  const auto split = room.split(BodyId{0}, {half(room.bone(), true)}, room.lease_epoch());
+  ASSERT_TRUE(split);
+  const auto away = room.remove_body(surgeon, BodyId{0});
+  ASSERT_TRUE(away) << away.error().message;
+  Cut across = test::straight_cut(tool_named("burr-round-5"), {-4, 0, -1}, {4, 0, -1}, {0, 0, -1}, 3);
+  across.author = surgeon;
+  across.body = BodyId{1};
+  across.lease_epoch = room.lease_epoch();
+  commit(room, across);
+
+  const RoomSeq back[] = {away->room_seq};
+  ASSERT_TRUE(room.undo(surgeon, back));
+  EXPECT_GT(room.field().solid_mm({-3, 0, -0.5}), 0.0) << "it was cut while nobody saw it";
+  const RoomSeq whole[] = {split->room_seq};
+  ASSERT_TRUE(room.undo(surgeon, whole));
+  EXPECT_EQ(room.field_hash(), bone_after({cuts[0], cuts[1], across}));
 }
 
 TEST(RoomScene, KeepsWhatWasSetAndTakesItBack) {

@@ -69,15 +69,23 @@ class Reader final : public MeshSink {
     const std::lock_guard lock(mutex_);
     double nearest = 1e9;
     int level = kCoarsestLevel;
-    for (const auto& [key, payload] : blocks_)
-      for (const auto& p : decode_block(key, payload, level_pitch_mm(kPitch_mm, key.level))->positions_mm)
+    for (const auto& [key, payload] : blocks_) {
+      const auto mesh = decode_block(key, payload, level_pitch_mm(kPitch_mm, key.level));
+      for (const auto& p : mesh->positions_mm)
         if (const double distance = (Vec3(p[0], p[1], p[2]) - place_mm).norm(); distance < nearest) {
           nearest = distance;
           level = key.level;
         }
+    }
     return level;
   }
   const std::set<int>& first_levels() const { return first_; }
+  std::set<BodyId> bodies() const {
+    const std::lock_guard lock(mutex_);
+    std::set<BodyId> bodies;
+    for (const auto& [key, payload] : blocks_) bodies.insert(key.body);
+    return bodies;
+  }
   std::size_t triangles() const { return whole().triangles.size(); }
   // Edges that are not matched by one in the other direction.
   int open_edges() const {
@@ -160,6 +168,56 @@ TEST(NearDetail, FollowsTheLooksOfAllViewers) {
   EXPECT_EQ(one.hash(), host.surface_hash());
   for (Reader* reader : {&one, &two}) host.leave(*reader);
   in_full.leave(full);
+}
+
+// The ball beyond a plane across x, by masks of whole samples.
+Fragment cap(const Case& bone, double from_mm, double to_mm) {
+  Fragment fragment;
+  fragment.volume_mm3 = 1000.0;
+  fragment.bounds = bone.bounds();
+  const auto band = static_cast<std::int16_t>(4 * kPitch_mm * 1024);
+  const CoordBox all = bone.bounds_samples();
+  const Coord first = floor_to(all.min, kLeafSize);
+  for (int x = first.x; x <= all.max.x; x += kLeafSize)
+    for (int y = first.y; y <= all.max.y; y += kLeafSize)
+      for (int z = first.z; z <= all.max.z; z += kLeafSize) {
+        FieldLeaf taken{BodyId{0}, 0, {x, y, z}, std::vector<std::int16_t>(kLeafVoxels)}, left = taken;
+        for (std::size_t i = 0; i < kLeafVoxels; ++i) {
+          const double at_mm = kPitch_mm * (x + static_cast<int>(i / (kLeafSize * kLeafSize)));
+          const bool of_piece = at_mm >= from_mm && at_mm < to_mm;
+          taken.values[i] = static_cast<std::int16_t>(of_piece ? -band : band);
+          left.values[i] = static_cast<std::int16_t>(of_piece ? band : -band);
+        }
+        if (std::ranges::any_of(taken.values, [](std::int16_t v) { return v < 0; })) fragment.taken.push_back(std::move(taken));
+        if (std::ranges::any_of(left.values, [](std::int16_t v) { return v < 0; })) fragment.left.push_back(std::move(left));
+      }
+  return fragment;
+}
+
+TEST(NearDetail, ABodyTakesAllItsBlocksAndNoOthers) {
+  Room room(ball());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  ASSERT_TRUE(room.split(BodyId{0}, {cap(room.bone(), 15, 99)}, room.lease_epoch()));
+  ASSERT_TRUE(room.split(BodyId{0}, {cap(room.bone(), -99, -15)}, room.lease_epoch()));
+  HostRates rates = fast();
+  rates.pieces = 0ms;
+  RoomHost host(std::move(room), rates, {}, Detail::near);
+  Reader one(host.join(MemberKind::watcher));
+  host.watch_mesh(one, close_to({0, 0, kRadius_mm}, 8));  // so that both pieces are far
+  ASSERT_TRUE(test::wait_until([&] { return one.level_at({0, 0, kRadius_mm}) == 0; }, 20s));
+  const auto remove = [&](BodyId body) {
+    host.queue_event([=](Room& r) { return r.remove_body(surgeon, body); }, [](const Result<RoomEvent>& event) { EXPECT_TRUE(event); });
+  };
+  using Bodies = std::set<BodyId>;
+  ASSERT_EQ(one.bodies(), (Bodies{BodyId{0}, BodyId{1}, BodyId{2}}));
+  remove(BodyId{1});
+  EXPECT_TRUE(test::wait_until([&] { return one.bodies() == Bodies{BodyId{0}, BodyId{2}}; }, 20s));
+  EXPECT_EQ(one.open_edges(), 0) << "the body beside it lost nothing";
+  remove(BodyId{0});
+  EXPECT_TRUE(test::wait_until([&] { return one.bodies() == Bodies{BodyId{2}}; }, 20s));
+  EXPECT_EQ(one.open_edges(), 0);
+  EXPECT_EQ(one.hash(), host.surface_hash());
+  host.leave(one);
 }
 
 TEST(NearDetail, IsForLargeBonesUnlessAskedFor) {

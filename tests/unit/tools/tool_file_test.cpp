@@ -146,7 +146,7 @@ TEST(ToolFile, EveryBadInputIsNamedWithFileFieldAndRemedy) {
       {with(good("guide-3"), "bore_mm", "bore_mm: 6.1"), {"\"bore_mm\"", "from 0.2 to 6"}},
       {with(good("screw-1"), "core_diameter_mm", "core_diameter_mm: 3.5"), {"\"core_diameter_mm\"", "no thread"}},
       {with(good("trial-cup-50"), "thickness_mm", "thickness_mm: 21"), {"\"thickness_mm\" is 21", "from 1 to 20"}},
-      {with(good("screw-1"), "thread_pitch_mm", ""), {"\"thread_pitch_mm\" is missing", "a screw needs it"}},
+      {with(good("screw-1"), "thread_pitch_mm", ""), {"\"thread_pitch_mm\" is missing", "the kind screw needs it"}},
   };
   for (const auto& bad : cases) {
     const auto tool = parse_tool(bad.text, "mine.yaml");

@@ -42,9 +42,51 @@ TEST(Script, ReadsWhatIsAskedOfTheRoom) {
   const auto placed = std::get<PlaceTool>(asked("place guide-1 at 1 2 3 along 0 0 -2 on 4"));
   EXPECT_EQ(placed.tool, "guide-1");
   EXPECT_EQ(placed.body, BodyId{4});
-  EXPECT_EQ(placed.pose_bone_item.position_mm, Vec3(1, 2, 3));
-  EXPECT_LT((placed.pose_bone_item.rotation * Vec3::UnitZ() - Vec3(0, 0, -1)).norm(), 1e-12) << "+z is out of its tip";
+  EXPECT_FALSE(placed.where.on_bone);
+  const Pose pose = pose_of(placed.where);
+  EXPECT_EQ(pose.position_mm, Vec3(1, 2, 3));
+  EXPECT_LT((pose.rotation * Vec3::UnitZ() - Vec3(0, 0, -1)).norm(), 1e-12) << "+z is out of its tip";
   EXPECT_EQ(std::get<PlaceTool>(asked("place pin-2 at 0 0 0 along 1 0 0")).body, BodyId{0});
+}
+
+TEST(Script, ReadsWhereAnItemGoes) {
+  const auto asked = [](std::string_view line) { return parsed<RoomRequest>(line); };
+  const auto on_bone = std::get<PlaceTool>(asked("place guide-1 near 1 2 3"));
+  EXPECT_TRUE(on_bone.where.on_bone);
+  EXPECT_EQ(on_bone.where.point_mm, Vec3(1, 2, 3));
+  EXPECT_FALSE(on_bone.where.along || on_bone.where.across);
+  const auto all = std::get<PlaceTool>(asked("place guide-2 near 1 2 3 along 0 0 -1 across 0 1 1 on 2"));
+  EXPECT_EQ(all.where.along, Vec3(0, 0, -1));
+  EXPECT_EQ(all.where.across, Vec3(0, 1, 1));
+  EXPECT_EQ(all.body, BodyId{2});
+  const auto moved = std::get<MoveItem>(asked("move 4 at 1 2 3 along 0 0 -2 across 0 3 1"));
+  EXPECT_EQ(moved.item, 4u);
+  const Pose pose = pose_of(moved.where);
+  EXPECT_LT((pose.direction(Vec3::UnitZ()) - Vec3(0, 0, -1)).norm(), 1e-12);
+  EXPECT_LT((pose.direction(Vec3::UnitX()) - Vec3(0, 1, 0)).norm(), 1e-12) << "as near to across as the axis allows";
+  EXPECT_TRUE(std::get<MoveItem>(asked("move 4 near 1 2 3")).where.on_bone);
+  EXPECT_EQ(std::get<TurnItem>(asked("turn 3 -2.5")).turns, -2.5);
+  EXPECT_EQ(std::get<TurnItem>(asked("turn 3 -2.5")).item, 3u);
+  EXPECT_EQ(std::get<SeatItem>(asked("seat 5")).item, 5u);
+  EXPECT_EQ(std::get<SeatItem>(asked("seat 5 7")).most_mm, 7.0);
+  EXPECT_EQ(std::get<RemoveItem>(asked("remove 6")).item, 6u);
+}
+
+TEST(Script, AMovedItemKeepsItsSides) {
+  ItemPlace place;
+  place.along = Vec3(0, 0, 1);
+  EXPECT_LT((pose_of(place, Vec3(0, 5, 5)).direction(Vec3::UnitX()) - Vec3::UnitY()).norm(), 1e-12);
+  EXPECT_LT((pose_of(place, Vec3(0, 0, 1)).direction(Vec3::UnitZ()) - Vec3::UnitZ()).norm(), 1e-12) << "no way across";
+}
+
+TEST(Script, AnswersSayWhereAnItemStands) {
+  SceneItem item;
+  item.id = 3;
+  item.pose_bone_item = pose_along({1, -2.5, 3}, {0, 0, -1});
+  EXPECT_EQ(standing_text(item), "item 3 at 1.00 -2.50 3.00 along 0.000 0.000 -1.000");
+  item.turns = 4.5;
+  item.seated = true;
+  EXPECT_EQ(standing_text(item), "item 3 at 1.00 -2.50 3.00 along 0.000 0.000 -1.000, 4.50 turns in, seated");
 }
 
 TEST(Script, SkipsEmptyLinesAndComments) {
@@ -62,7 +104,11 @@ TEST(Script, SaysWhatItExpected) {
         "tool", "tool maybe", "screenshot", "status ", "quit now", "dance", "wait bodies",
         "wait items -1", "undo", "undo 0", "undo -1", "undo all", "redo", "redo 1 2", "take-away", "take-away x", "place",
         "place pin-1 at 0 0 0", "place pin-1 at 0 0 0 along 0 0 0", "place pin-1 at 0 0 x along 0 0 1",
-        "place pin-1 at 0 0 0 along 0 0 1 on", "place pin-1 at 0 0 0 along 0 0 1 in 2"}) {
+        "place pin-1 at 0 0 0 along 0 0 1 on", "place pin-1 at 0 0 0 along 0 0 1 in 2", "place pin-1 near", "place pin-1 near 0 0 nan",
+        "place pin-1 near 0 0 0 along 0 0 0", "place pin-1 near 0 0 0 along 0 0 1 across 0 0 2", "place pin-1 near 0 0 0 at 0 0 0",
+        "place pin-1 near 0 0 0 on", "move", "move 1", "move 0 near 0 0 0", "move 1 at 0 0 0", "move 1 near 0 0 0 on 2", "turn 1",
+        "turn 1 2 3", "turn 1 inf", "turn x 1", "seat", "seat 1 0", "seat 1 -2", "seat 1 x", "seat 1 2 3", "remove", "remove 0",
+        "remove 1 2"}) {
     const auto command = parse_command(line);
     ASSERT_FALSE(command) << line;
     EXPECT_EQ(command.error().code, ErrorCode::invalid_input);

@@ -145,6 +145,37 @@ TEST(Wire, ASceneItemComesBackAndBadOnesAreRefused) {
   EXPECT_FALSE(wire::from_wire(bad));
 }
 
+TEST(Wire, APlacingIsReadAndBadOnesAreRefused) {
+  v1::SetSceneItemRequest request;
+  const auto read = [&] { return wire::placing_from_wire(request); };
+  EXPECT_TRUE(read() && std::holds_alternative<std::monostate>(*read()));
+  *request.mutable_onto_bone()->mutable_near_mm() = wire::to_wire(Vec3(1, 2, 3));
+  ASSERT_TRUE(read());
+  EXPECT_EQ(std::get<OntoBone>(*read()).near_mm, Vec3(1, 2, 3));
+  EXPECT_EQ(std::get<OntoBone>(*read()).axis, std::nullopt);
+  EXPECT_EQ(std::get<OntoBone>(*read()).across, Vec3::UnitX());
+  *request.mutable_onto_bone()->mutable_axis() = wire::to_wire(Vec3(0, 0, -2));
+  *request.mutable_onto_bone()->mutable_across() = wire::to_wire(Vec3(0, 1, 0));
+  ASSERT_TRUE(read());
+  EXPECT_EQ(std::get<OntoBone>(*read()).axis, Vec3(0, 0, -2));
+  EXPECT_EQ(std::get<OntoBone>(*read()).across, Vec3(0, 1, 0));
+  *request.mutable_onto_bone()->mutable_axis() = wire::to_wire(Vec3(0, 0, 0));
+  EXPECT_FALSE(read());
+  request.mutable_onto_bone()->clear_axis();
+  request.mutable_onto_bone()->mutable_near_mm()->set_x(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_FALSE(read());
+  request.set_thread_turns(-2.5);
+  ASSERT_TRUE(read());
+  EXPECT_EQ(std::get<ByThread>(*read()).turns, -2.5);
+  request.set_thread_turns(std::numeric_limits<double>::infinity());
+  EXPECT_FALSE(read());
+  request.set_drive_home_mm(7.0);
+  ASSERT_TRUE(read());
+  EXPECT_EQ(std::get<DriveHome>(*read()).most_mm, 7.0);
+  request.set_drive_home_mm(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_FALSE(read());
+}
+
 TEST(Wire, ABlocksLevelHasASign) {
   for (int level = -2; level <= 2; ++level) {
     v1::MeshBlock block, parsed;

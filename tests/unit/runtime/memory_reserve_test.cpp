@@ -1,0 +1,51 @@
+// Pages that a thread has to wait for, with a reserve and without one.
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <cstring>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "common/runtime/memory_reserve.hpp"
+
+namespace osteon {
+namespace {
+
+long pages_waited_for() {
+  rusage usage{};
+  getrusage(RUSAGE_THREAD, &usage);
+  return usage.ru_minflt;
+}
+
+// Takes small blocks, as a cut field's leaves are, and writes all of each; what the system had to give meanwhile.
+long pages_for_blocks(std::vector<std::unique_ptr<char[]>>& kept, int count) {
+  constexpr std::size_t kBlock = 2048;
+  const long before = pages_waited_for();
+  for (int i = 0; i < count; ++i) {
+    kept.push_back(std::make_unique<char[]>(kBlock));
+    std::memset(kept.back().get(), i, kBlock);
+  }
+  return pages_waited_for() - before;
+}
+
+TEST(MemoryReserve, SmallBlocksNeedNoNewPagesAfterARefill) {
+  constexpr int kBlocks = 512;  // 1 MB
+  // A thread of its own, so that nothing was freed in its part of the heap before.
+  long without = 0, with = 0, again = 0;
+  std::thread([&] {
+    std::vector<std::unique_ptr<char[]>> kept;
+    kept.reserve(4 * kBlocks);
+    without = pages_for_blocks(kept, kBlocks);
+    MemoryReserve reserve(4 << 20);
+    with = pages_for_blocks(kept, kBlocks);
+    reserve.refill();
+    again = pages_for_blocks(kept, kBlocks);
+  }).join();
+  EXPECT_GT(without, 200);
+  EXPECT_LT(with, 10);
+  EXPECT_LT(again, 10);
+}
+
+}  // namespace
+}  // namespace osteon
