@@ -21,7 +21,7 @@ struct LawInputs {
   double engaged_area_mm2 = 0;   // that area
   double milling_sum = 0;        // sum of milling_resistance() of a sharp tool (MillingParams::wear 1), N·s/mm per rad/s
   double directed_density = 0;   // sum over engaged points of share of the active area · density · max(0, -inward·feed), g/cm3
-  double edge_length_mm = 0;     // of the cutting edges in bone, all teeth; 0: as `engaged` says
+  double edge_length_mm = 0;     // of the cutting edges in bone, all teeth, as LawTool counts them; 0: as `engaged` says
   double mean_arm_mm = 0;        // of the engaged area from the axis; 0: LawTool::arm_mm
   double teeth_engaged = 0;      // of a saw; 0: as `engaged` says
   double wear = 1.0;             // 1 sharp; a blunt tool needs about twice the thrust
@@ -63,11 +63,13 @@ struct ForceLaw {
   std::string_view notes;
   LawRange limits = {};
   bool (*fits)(ToolKind kind) noexcept = nullptr;  // whether it can be chosen for such a tool
-  double across = 0;          // force across the feed, out of the bone, for each newton of the resistance that cuts
   // [haptic] Any thread. A spindle that stands gives the law that does not cut: no feed at all.
   FeedLaw (*feed_law)(const LawTool& tool, const LawInputs& inputs) noexcept = nullptr;
   // [haptic] Torque on the spindle, N mm, that goes with a resistance along the feed; of saws the torque of equal power.
   double (*torque_nmm)(const LawTool& tool, const LawInputs& inputs, double thrust_n) noexcept = nullptr;
+  // [haptic] Force across the feed that goes with a resistance along it, N: of what turns, against the motion of its flank; of
+  // saws along the teeth's stroke, to and fro with them. Null: those of all edges cancel, or the law says nothing of it.
+  double (*across_n)(const LawTool& tool, const LawInputs& inputs, double thrust_n) noexcept = nullptr;
 };
 
 [[nodiscard]] std::span<const ForceLaw> force_laws();
@@ -82,6 +84,9 @@ struct ForceLaw {
 enum class OutOfRange : std::uint8_t { speed = 1, feed = 2, density = 4, diameter = 8, depth_of_cut = 16, tooth_speed = 32 };
 [[nodiscard]] unsigned out_of_range(const ForceLaw& law, const LawTool& tool, const LawInputs& inputs,
                                     double feed_mm_per_s) noexcept;
+// What each bit is called, the lowest first.
+[[nodiscard]] std::span<const std::string_view> out_of_range_names();
+[[nodiscard]] std::string out_of_range_words(unsigned bits);  // "speed, feed"; "" for zero
 [[nodiscard]] std::string out_of_range_sentence(const ForceLaw& law, unsigned bits);  // "" for zero
 
 }  // namespace osteon

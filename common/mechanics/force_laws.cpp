@@ -75,6 +75,10 @@ FeedLaw agus(const LawTool& tool, const LawInputs& in) noexcept {
           .max_feed_mm_per_s = heel_feed(tool, in),
           .threshold_n = 0.0};
 }
+// (7.5) far from the pole.
+double agus_across(const LawTool& tool, const LawInputs& in, double thrust_n) noexcept {
+  return agus_of(tool, in).friction * thrust_n;
+}
 double agus_torque(const LawTool& tool, const LawInputs& in, double thrust_n) noexcept {
   return agus_of(tool, in).friction * thrust_n * arm_mm(tool, in);
 }
@@ -96,6 +100,10 @@ FeedLaw milling(const LawTool& tool, const LawInputs& in) noexcept {
           .exponent = 1.0,
           .max_feed_mm_per_s = heel_feed(tool, in),
           .threshold_n = 0.0};
+}
+// (7.8): the edges' ploughing has no part in it.
+double milling_across(const LawTool& tool, const LawInputs& in, double thrust_n) noexcept {
+  return milling_radial({}, Newtons{std::max(0.0, thrust_n - ploughing_n(tool, in))}).value();
 }
 double milling_law_torque(const LawTool& tool, const LawInputs& in, double thrust_n) noexcept {
   return thrust_n * arm_mm(tool, in);
@@ -139,6 +147,9 @@ FeedLaw saw(const LawTool& tool, const LawInputs& in) noexcept {
 }
 double saw_torque(const LawTool& tool, const LawInputs& in, double thrust_n) noexcept {
   return thrust_n > 0.0 ? sawing_torque(sawing_of(tool, in.wear), density_of(in), teeth_in(tool, in)).value() : 0.0;
+}
+double saw_across(const LawTool& tool, const LawInputs& in, double thrust_n) noexcept {
+  return thrust_n > 0.0 ? sawing_cutting_force(sawing_of(tool, in.wear), density_of(in), teeth_in(tool, in)).value() : 0.0;
 }
 
 ReamingParams reaming_of(const LawTool& tool, const LawInputs& in) noexcept {
@@ -209,7 +220,8 @@ constexpr std::array kLaws{
              .limits = {.spindle_rpm = {10'000, 80'000}, .density_g_cm3 = {1.5, 2.1}},
              .fits = turns,
              .feed_law = agus,
-             .torque_nmm = agus_torque},
+             .torque_nmm = agus_torque,
+             .across_n = agus_across},
     ForceLaw{.name = "milling",
              .title = "Milling force from the rate of removal",
              .equation = "F_t = K_t MRR / v_c + k_e L, v_c = omega r; F_r = K_r (F_t - k_e L)",
@@ -223,9 +235,9 @@ constexpr std::array kLaws{
                       "it. Below 0.15 R the cutting speed is taken as constant: at the pole it hardly cuts.",
              .limits = {.spindle_rpm = {5'000, 80'000}, .density_g_cm3 = {0.2, 2.1}},
              .fits = turns,
-             .across = 0.5,
              .feed_law = milling,
-             .torque_nmm = milling_law_torque},
+             .torque_nmm = milling_law_torque,
+             .across_n = milling_across},
     ForceLaw{.name = "spring-damper",
              .title = "Spring and damper of the surface",
              .equation = "F = t_s N/|N| - t_r V, along the feed t_s + t_r v",
@@ -260,7 +272,8 @@ constexpr std::array kLaws{
              .torque_nmm = lips_torque},
     ForceLaw{.name = "saw",
              .title = "Sawing from single teeth",
-             .equation = "F = 0.15 n 7.5 (1 + 0.30 (d - 2)/8) N, v pitch = 0.15 d 2 stroke strokes/s; M = F_c stroke/pi",
+             .equation = "F = 0.15 n 7.5 (1 + 0.30 (d - 2)/8) N, v pitch = 0.15 d 2 stroke strokes/s; F_c = 0.15 n 4 N along "
+                         "the stroke; M = F_c stroke/pi",
              .number = "",
              .source = "James, Pearlman and Saigal 2012, 2013",
              .inputs = "n teeth in bone, d um of depth per tooth, v mm/s, stroke mm, pitch mm, rho g/cm3; F N, M N mm",
@@ -272,7 +285,8 @@ constexpr std::array kLaws{
              .limits = {.density_g_cm3 = {1.5, 2.1}, .depth_um = {2, 10}, .tooth_mm_per_s = {1700, 7000}},
              .fits = is_saw,
              .feed_law = saw,
-             .torque_nmm = saw_torque},
+             .torque_nmm = saw_torque,
+             .across_n = saw_across},
     ForceLaw{.name = "reamer",
              .title = "Reaming as milling along the axis",
              .equation = "T = (K_r K_t t + k_e) L, t = 60 v/(N Z); M = (K_t t + k_e) L r",
@@ -375,14 +389,23 @@ unsigned out_of_range(const ForceLaw& law, const LawTool& tool, const LawInputs&
   return bits;
 }
 
-std::string out_of_range_sentence(const ForceLaw& law, unsigned bits) {
-  constexpr std::pair<OutOfRange, std::string_view> kNames[] = {
-      {OutOfRange::speed, "speed"},       {OutOfRange::feed, "feed"},
-      {OutOfRange::density, "density"},   {OutOfRange::diameter, "diameter"},
-      {OutOfRange::depth_of_cut, "depth of cut"}, {OutOfRange::tooth_speed, "speed of the teeth"}};
+std::span<const std::string_view> out_of_range_names() {
+  static constexpr std::string_view kNames[] = {"speed",    "feed",         "density",
+                                                "diameter", "depth of cut", "speed of the teeth"};
+  return kNames;
+}
+
+std::string out_of_range_words(unsigned bits) {
   std::string what;
-  for (const auto& [bit, name] : kNames)
-    if (bits & static_cast<unsigned>(bit)) what += (what.empty() ? "" : ", ") + std::string(name);
+  for (const std::string_view name : out_of_range_names()) {
+    if (bits & 1u) what += (what.empty() ? "" : ", ") + std::string(name);
+    bits >>= 1;
+  }
+  return what;
+}
+
+std::string out_of_range_sentence(const ForceLaw& law, unsigned bits) {
+  const std::string what = out_of_range_words(bits);
   if (what.empty()) return {};
   return "the law \"" + std::string(law.name) + "\" is used outside its range (" + std::string(law.range) + "): " + what;
 }

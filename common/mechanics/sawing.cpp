@@ -44,9 +44,12 @@ FeedLaw sawing_law(const SawingParams& params, RevolutionsPerMinute strokes, Gra
           .threshold_n = 0.0};
 }
 
+Newtons sawing_cutting_force(const SawingParams& params, GramsPerCm3 density, double teeth) noexcept {
+  return params.bearing_share * teeth * tooth_cutting_force(params, density);
+}
+
 NewtonMillimetres sawing_torque(const SawingParams& params, GramsPerCm3 density, double teeth) noexcept {
-  return NewtonMillimetres{params.bearing_share * teeth * tooth_cutting_force(params, density).value() * params.stroke_mm /
-                           std::numbers::pi};
+  return NewtonMillimetres{sawing_cutting_force(params, density, teeth).value() * params.stroke_mm / std::numbers::pi};
 }
 
 }  // namespace osteon

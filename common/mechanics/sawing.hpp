@@ -33,6 +33,8 @@ struct SawingParams {
 // The law of a moment: `teeth` in bone.
 [[nodiscard]] FeedLaw sawing_law(const SawingParams& params, RevolutionsPerMinute strokes, GramsPerCm3 density,
                                  double teeth) noexcept;
+// Along the stroke, of the teeth in bone together: it turns round with them.
+[[nodiscard]] Newtons sawing_cutting_force(const SawingParams& params, GramsPerCm3 density, double teeth) noexcept;
 // On a crank that makes the strokes, by equal power: M = F_c · stroke / pi.
 [[nodiscard]] NewtonMillimetres sawing_torque(const SawingParams& params, GramsPerCm3 density, double teeth) noexcept;
 

@@ -30,7 +30,7 @@ struct GridPlace {
 };
 
 // Of ContactSums, in its order; plain, as the loops for wide registers must not instantiate anything that others share.
-constexpr int kTotals = 12;
+constexpr int kTotals = 13;
 struct Totals {
   double sum[kTotals] = {};
   float nearest = kLeftOut_mm;
@@ -173,6 +173,7 @@ void append(ContactSet& set, const std::vector<ContactPoint>& points, double lea
       set.ny.push_back(static_cast<float>(point.outward.y()));
       set.nz.push_back(static_cast<float>(point.outward.z()));
       set.area_mm2.push_back(real ? static_cast<float>(point.area_mm2) : 0.0f);
+      set.edge.push_back(real ? static_cast<float>(point.edge) : 0.0f);
       set.arm_mm.push_back(static_cast<float>(std::max({point.axis_distance_mm, least_arm_mm, 1e-3})));
       radius = std::max(radius, (point.inset_mm - centre).norm());
     }
@@ -252,8 +253,9 @@ ContactSums evaluate_contact(const Patch& patch, const ContactSet& set, const Co
           sum[4],
           static_cast<double>(totals.nearest),
           sum[5],
-          {sum[6], sum[7], sum[8]},
-          {sum[9], sum[10], sum[11]}};
+          sum[6],
+          {sum[7], sum[8], sum[9]},
+          {sum[10], sum[11], sum[12]}};
 }
 
 int limit_contact_lanes(int lanes) {

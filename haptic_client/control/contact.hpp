@@ -17,6 +17,7 @@ struct ContactPoint {
   Vec3 outward;      // unit normal out of the tool
   double area_mm2;
   double axis_distance_mm;
+  double edge = 0;   // cutting edge that it stands for, mm; of a saw, how many teeth
 };
 
 inline constexpr int kGroupPoints = 16;
@@ -36,6 +37,7 @@ struct ContactSet {
   std::vector<float> x, y, z;                  // inset places, tool frame
   std::vector<float> nx, ny, nz;               // outward
   std::vector<float> area_mm2, arm_mm;         // arm: from the tool's axis, not below the caller's least
+  std::vector<float> edge;
   std::vector<Ball> balls;
   int active = 0, passive = 0;                 // points; passive ones begin with their group
   int active_groups = 0;
@@ -80,6 +82,7 @@ struct ContactSums {
   double arm_mm3 = 0;            // engaged area times arm
   double nearest_mm = kLeftOut_mm;
   double turned_area_mm2 = 0;    // engaged area, not projected
+  double edge = 0;               // of the engaged points
   Vec3 force = Vec3::Zero();     // sum of -n · area · facing · density
   Vec3 torque = Vec3::Zero();
 };

@@ -118,7 +118,7 @@ OSTEON_INLINE unsigned bits_of(RowInt mask) {
 }
 
 struct RowSums {
-  Row area{}, engaged{}, density{}, milling{}, arm{}, turned{}, fx{}, fy{}, fz{}, mx{}, my{}, mz{};
+  Row area{}, engaged{}, density{}, milling{}, arm{}, turned{}, edge{}, fx{}, fy{}, fz{}, mx{}, my{}, mz{};
   Row nearest;
 };
 
@@ -133,6 +133,7 @@ OSTEON_INLINE void add_up(const ContactSet& set, const Task& task, std::size_t f
   sums.nearest = low(sums.nearest, distance);
   sums.engaged += engaged;
   sums.turned += in_bone ? area : nothing;
+  sums.edge += in_bone ? load(&set.edge[first]) : nothing;
   sums.arm += engaged * arm;
   const Row weight = engaged * density;
   sums.density += weight;
@@ -275,7 +276,7 @@ static void evaluate(const ContactSet& set, const Task& task, ContactValues& val
     for (int lane = 1; lane < kLanes; ++lane) nearest = least[lane] < nearest ? least[lane] : nearest;
     values.nearest_mm[g] = nearest;
   }
-  const Row* const rows[] = {&sums.area, &sums.engaged, &sums.density, &sums.milling, &sums.arm, &sums.turned,
+  const Row* const rows[] = {&sums.area, &sums.engaged, &sums.density, &sums.milling, &sums.arm, &sums.turned, &sums.edge,
                              &sums.fx,   &sums.fy,      &sums.fz,      &sums.mx,      &sums.my,  &sums.mz};
   for (int i = 0; i < kTotals; ++i) result.sum[i] = total(*rows[i]);
   for (int lane = 0; lane < kLanes; ++lane)

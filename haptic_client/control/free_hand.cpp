@@ -92,10 +92,9 @@ Result<ReadyPlan> make_free_hand(const FreeHandOptions& options, const Case& bon
   step.stand_off_mm = kStandOff_mm;
   step.rotation = view_along(toward);
   step.item = *tool;
-  const Result<const ForceLaw*> law = choose_law(*tool, options.law);
-  if (!law) return tl::unexpected(law.error());
-  ready.tools.emplace_back(*tool, bone.pitch_mm(), options.wear);
-  ready.tools.back().law = *law;
+  Result<ToolModel> model = ToolModel::make(*tool, bone.pitch_mm(), options.wear, options.law);
+  if (!model) return tl::unexpected(model.error());
+  ready.tools.push_back(std::move(*model));
   ready.tools.back().spindle.full_rpm = std::max(1.0, step.spindle_rpm);
   ready.steps.push_back(std::move(step));
   return ready;

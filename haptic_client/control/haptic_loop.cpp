@@ -121,6 +121,8 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   report.density_g_cm3 = step.density_g_cm3;
   report.engaged = step.engaged;
   report.torque_nmm = step.torque_nmm;
+  report.across_n = step.across_n;
+  report.out_of_range = step.out_of_range;
   report.phase = step.cutting          ? CuttingPhase::cutting
                  : step.contact        ? CuttingPhase::rubbing
                  : spindle_.rpm > 1.0  ? CuttingPhase::free
@@ -205,6 +207,8 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   motor.normal_n = force_bone_n_ / s;
   motor.axis = report.pose_bone_proxy.direction(Vec3::UnitZ());
   motor.cutting = report.phase == CuttingPhase::cutting;
+  motor.across_n = report.across_n;
+  motor.stroke = report.pose_bone_proxy.direction(model.stroke);
   if (params_.tool_effects) motor.pull_n = effects_[static_cast<std::size_t>(tool_)].pull_n();
   Vec3 motor_n = s * motor_.step(motor, params_.dt_s);
   if (!params_.motor_effects || !safe) motor_n.setZero();

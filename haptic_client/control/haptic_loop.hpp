@@ -79,6 +79,8 @@ struct LoopReport {
   EnergyReport energy;                   // of the coupling, at the handle
   double guide_play_mm = 0;              // while guided: how far the tip may be off the opening's middle
   double spindle_rpm = 0, feed_mm_per_s = 0, density_g_cm3 = 0, engaged = 0, torque_nmm = 0;
+  double across_n = 0;                   // of the law, across the feed; the hand feels it through the motor's port
+  unsigned out_of_range = 0;             // bits of OutOfRange: where the law is used outside what it was made for
   CuttingPhase phase = CuttingPhase::idle;
   int tool = 0;
   std::uint64_t state_seq = 0;           // counts ticks

@@ -403,6 +403,7 @@ Proxy::Engagement Proxy::engagement(const Tick& tick, const Vec3& direction) noe
             (step - static_cast<double>(below)) * static_cast<double>(model.strength[below + 1] - model.strength[below]);
         sums.engaged_mm2 -= area;
         sums.turned_area_mm2 -= point.area_mm2;
+        sums.edge -= point.edge;
         sums.density_mm2 -= area * density;
         sums.milling -= area / arm * strength;
         sums.arm_mm3 -= area * arm;
@@ -427,6 +428,7 @@ Proxy::Engagement Proxy::engagement(const Tick& tick, const Vec3& direction) noe
     in.engaged_area_mm2 = sums.engaged_mm2;
     in.milling_sum = sums.milling;
     in.mean_arm_mm = sums.arm_mm3 / sums.engaged_mm2;
+    (model.feed == Feeding::in_plane ? in.teeth_engaged : in.edge_length_mm) = std::max(0.0, sums.edge);
     in.directed_density = std::max(0.0, sums.density_mm2) / model.active_area_mm2;
   }
   return now;
@@ -438,6 +440,7 @@ void Proxy::note_forces(const Tick& tick, const Engagement& now, const Vec3& dir
   report.cutting_force_n = thrust_n * direction;
   report.torque_nmm = model.law->torque_nmm(model.law_tool, now.inputs, thrust_n);
   if (tick.around.effects) report.torque_nmm = tick.around.effects->torque_nmm(report.torque_nmm);
+  if (model.law->across_n) report.across_n = model.law->across_n(model.law_tool, now.inputs, thrust_n);
   // Each engaged face bears its share (7.12, 7.14): their moment about the tip, and the spindle's own, which the bone turns
   // back.
   const double along = -pose_.direction(now.sums.force).dot(direction);
@@ -526,6 +529,7 @@ void Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm,
       report.cutting = true;
       report.heel_contact = feed.heel_contact;
       note_forces(tick, now, direction, feed.cutting_n, report);
+      report.out_of_range |= out_of_range(*model.law, model.law_tool, now.inputs, feed.feed_mm_per_s);
       cut_mm += step_mm;
       report.cutting_work_mj += feed.cutting_n * step_mm;
     }

@@ -35,6 +35,8 @@ struct ProxyStep {
   double engaged = 0;          // share of the leading projected area in bone
   double engaged_area_mm2 = 0; // that area
   double torque_nmm = 0;       // of the bone on the spindle, about the tool's axis
+  double across_n = 0;         // of the bone on the tool across the feed, as ForceLaw::across_n says
+  unsigned out_of_range = 0;   // bits: outside of which of its limits the law was used
   Vec3 cutting_force_n = Vec3::Zero();  // of the tool on the bone
   double cutting_work_mj = 0;  // of the law's force over the way cut in this tick, its parts added; never negative
   // What was being cut ended in this tick or with the one before: the tool has stopped there, its coupling still

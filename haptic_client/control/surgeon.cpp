@@ -167,10 +167,9 @@ Result<ReadyStep> make_ready(const PlanStep& plan, const Case& bone, const ToolF
   }
   step.spindle_rpm = plan.spindle_rpm > 0.0 ? plan.spindle_rpm : tool->spindle_rpm;
   step.tool = static_cast<int>(ready.tools.size());
-  const Result<const ForceLaw*> law = choose_law(*tool, plan.law);
-  if (!law) return tl::unexpected(law.error());
-  ready.tools.emplace_back(*tool, bone.pitch_mm(), plan.wear);
-  ready.tools.back().law = *law;
+  Result<ToolModel> model = ToolModel::make(*tool, bone.pitch_mm(), plan.wear, plan.law);
+  if (!model) return tl::unexpected(model.error());
+  ready.tools.push_back(std::move(*model));
   ready.tools.back().spindle.full_rpm = std::max(1.0, step.spindle_rpm);
   if (plan.action == Action::burr) {
     plan_sweep(bone, *tool, step);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "common/core/check.hpp"
 #include "common/mechanics/cutting_effects.hpp"
@@ -30,6 +31,43 @@ Tool at_stroke_ends(const Tool& tool) {
   return swept;
 }
 
+// Z edges over a ring of radius r and width dr are Z dr long, on an area of 2 pi r dr: so the cutting edge of a turned tool is
+// shared among its points by their area over their distance from the axis, of what goes along its axis by the area as seen
+// along it. All of the faces that look into the usual feed, wholly in bone, have the edge that LawTool counts.
+void share_edge(const ToolModel& model, std::vector<ContactPoint>& active) {
+  const Vec3 feed = model.axial ? Vec3::UnitZ() : Vec3::UnitX();
+  double whole = 0.0;
+  for (ContactPoint& point : active) {
+    // A point on the axis stands for a disc about it.
+    const double arm_mm = std::max(point.axis_distance_mm, 0.5 * std::sqrt(point.area_mm2 / std::numbers::pi));
+    if (arm_mm > 0.0) point.edge = point.area_mm2 / arm_mm * (model.axial ? point.outward.z() : 1.0);
+    if (point.outward.dot(feed) >= model.least_facing) whole += point.edge;
+  }
+  for (ContactPoint& point : active) point.edge *= whole > 0.0 ? model.law_tool.edge_length_mm / whole : 0.0;
+}
+
+// A saw's teeth as a row of points along its toothed edge over the whole stroke, each with so many of them as are there on
+// average: the blade comes to the ends of its stroke for a part of the time only. They stand for no area, which is the faces'.
+void add_teeth(const ToolModel& model, std::vector<ContactPoint>& active) {
+  constexpr double kApart_mm = 0.5;
+  const Tool& tool = model.tool;
+  const bool swings = tool.kind == ToolKind::oscillating_saw;
+  // Half of the stroke and of the toothed edge, along the arc about the pivot or straight.
+  const double a = 0.5 * model.law_tool.stroke_mm;
+  const double b = swings ? tool.pivot_mm * std::asin(std::min(1.0, 0.5 * tool.width_mm / tool.pivot_mm)) : 0.5 * tool.cutting_length_mm;
+  const int count = static_cast<int>(std::ceil(2.0 * (a + b) / kApart_mm));
+  const double apart = 2.0 * (a + b) / count;
+  for (int i = 0; i < count; ++i) {
+    const double at = (i + 0.5) * apart - (a + b), angle = swings ? at / tool.pivot_mm : 0.0;
+    const Vec3 outward = swings ? Vec3(std::sin(angle), 0, std::cos(angle)) : Vec3::UnitX();
+    const Vec3 p = swings ? Vec3(tool.pivot_mm * (outward - Vec3::UnitZ()))
+                          : Vec3(0.5 * tool.width_mm, 0, at - 0.5 * tool.cutting_length_mm);
+    const double there = a > 0.0 ? (std::min(a, at + b) - std::max(-a, at - b)) / (2.0 * a) : 1.0;
+    active.push_back({p, p - model.inset * outward, outward, 0.0, std::hypot(p.x(), p.y()),
+                      there * apart / model.law_tool.tooth_pitch_mm});
+  }
+}
+
 Implicit touching_solid(const Tool& tool) {
   return is_saw(tool.kind) ? unite(tool_solid(tool), cut_solid(tool)) : tool_solid(tool);
 }
@@ -45,6 +83,12 @@ std::vector<SamplePoint> points_of(const Tool& tool, int count) {
     points.push_back(p);
   }
   return points;
+}
+
+const ForceLaw& own_law(const Tool& tool) {
+  const Result<const ForceLaw*> own = choose_law(tool);
+  OSTEON_CHECK(own.has_value());
+  return **own;
 }
 
 }  // namespace
@@ -76,6 +120,15 @@ Feeding feeding(ToolKind kind) noexcept {
 }
 
 ToolModel::ToolModel(const Tool& definition, double pitch_mm, double blunt, int points)
+    : ToolModel(definition, pitch_mm, blunt, points, own_law(definition)) {}
+
+Result<ToolModel> ToolModel::make(const Tool& definition, double pitch_mm, double blunt, std::string_view law_name) {
+  const Result<const ForceLaw*> chosen = choose_law(definition, law_name);
+  if (!chosen) return tl::unexpected(chosen.error());
+  return ToolModel(definition, pitch_mm, blunt, 0, **chosen);
+}
+
+ToolModel::ToolModel(const Tool& definition, double pitch_mm, double blunt, int points, const ForceLaw& by)
     : tool(definition),
       solid(touching_solid(definition)),
       feed(feeding(definition.kind)),
@@ -83,8 +136,10 @@ ToolModel::ToolModel(const Tool& definition, double pitch_mm, double blunt, int 
       outline(definition, axial),
       cut_level(std::min(definition.cut_level, finest_level(pitch_mm))),
       fine_pitch_mm(level_pitch_mm(pitch_mm, cut_level)),
-      wear(blunt) {
+      wear(blunt),
+      law(&by) {
   inset = 0.5 * fine_pitch_mm + kQuantum_mm;
+  law_tool = osteon::law_tool(tool);
   // A broach's sides look forward by their taper only, and cut all the same.
   const bool sides_cut = tool.kind == ToolKind::broach;
   if (sides_cut) least_facing = 0.5 * std::sin(tool.taper_rad);
@@ -100,6 +155,8 @@ ToolModel::ToolModel(const Tool& definition, double pitch_mm, double blunt, int 
     (cuts ? active : passive).push_back(point);
     if (cuts) active_area_mm2 += point.area_mm2;
   }
+  if (is_saw(tool.kind)) add_teeth(*this, active);
+  else if (tool.kind != ToolKind::broach && tool.kind != ToolKind::mesh) share_edge(*this, active);
   // The very point of what has one, which stands for no area: rings leave it out.
   if (point_height_mm(tool) > 0.0)
     active.push_back({Vec3::Zero(), {0, 0, -inset}, Vec3::UnitZ(), 0.0, 0.0});
@@ -111,10 +168,8 @@ ToolModel::ToolModel(const Tool& definition, double pitch_mm, double blunt, int 
   for (std::size_t i = 0; i < strength.size(); ++i)
     strength[i] = static_cast<float>(
         kFar_mm * milling_resistance(milling, 1.0, kFar_mm, kMostDensity_g_cm3 * static_cast<double>(i) / kDensitySteps));
-  law_tool = osteon::law_tool(tool);
-  const Result<const ForceLaw*> own = choose_law(tool, {});
-  law = own ? *own : &default_law(tool);
   spindle = motor_of(tool);
+  if (is_saw(tool.kind)) stroke = tool.kind == ToolKind::oscillating_saw ? Vec3::UnitX() : Vec3::UnitZ();
 }
 
 }  // namespace osteon::haptic

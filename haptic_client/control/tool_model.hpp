@@ -1,7 +1,9 @@
 // A tool made ready for the haptic loop: its contact points, how it is fed, and the law by which it cuts.
 #pragma once
+#include <string_view>
 #include <vector>
 
+#include "common/core/result.hpp"
 #include "common/mechanics/force_law.hpp"
 #include "common/mechanics/spindle.hpp"
 #include "common/tools/tool_solid.hpp"
@@ -42,10 +44,16 @@ struct ToolModel {
   const ForceLaw* law = nullptr;        // never null
   LawTool law_tool;
   SpindleParams spindle;
+  Vec3 stroke = Vec3::Zero();           // of a saw: along which its teeth go to and fro, tool frame; zero: it turns or stands
 
-  // `pitch_mm`: h of the case. The law is the tool's own if it names one that suits it, else its kind's. `points`: on the
-  // part that cuts, at least; 0: as many as its size asks for.
+  // `pitch_mm`: h of the case. The law is the tool's own, its kind's where it names none; whoever loads a tool has seen that
+  // it fits (choose_law), else this aborts. `points`: on the part that cuts, at least; 0: as many as its size asks for.
   ToolModel(const Tool& tool, double pitch_mm, double wear = 1.0, int points = 0);
+  // The same with the law of this name, if it is not empty, instead of the tool's own. Error invalid_input: choose_law's.
+  [[nodiscard]] static Result<ToolModel> make(const Tool& tool, double pitch_mm, double wear, std::string_view law_name);
+
+ private:
+  ToolModel(const Tool& tool, double pitch_mm, double wear, int points, const ForceLaw& law);
 };
 
 }  // namespace osteon::haptic

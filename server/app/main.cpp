@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/mechanics/force_law.hpp"
 #include "common/runtime/command_line.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
@@ -91,6 +92,9 @@ Result<void> load_tools(const std::filesystem::path& folder, ToolBox& box) {
   for (const std::filesystem::path& file : files) {
     const Result<Tool> tool = load_tool_file(file);
     if (!tool) return tl::unexpected(tool.error());
+    // Who holds it would find out too late.
+    if (const Result<const ForceLaw*> law = choose_law(*tool); !law)
+      return failure(law.error().code, file.string() + ": \"law\": " + law.error().message);
     const auto entries = box.entries();
     const auto same = std::find_if(entries.begin(), entries.end(), [&](const auto* e) { return e->tool.name == tool->name; });
     if (same != entries.end() && (*same)->hash != tool->hash())

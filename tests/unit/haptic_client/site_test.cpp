@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "haptic_client/control/free_hand.hpp"
 #include "haptic_client/control/surgeon.hpp"
 #include "tests/unit/haptic_client/bench.hpp"
 
@@ -64,6 +65,36 @@ TEST(Plan, NamesWhatIsWrong) {
   step.entry.toward = Vec3(0, 0, -1);
   step.tool = "burr-round-5";
   EXPECT_NE(message(step).find("choose a drill"), std::string::npos);
+}
+
+// A tool whose file names a law that there is not, or that is for others, is refused whoever takes it up, in a sentence that
+// names tool, law and remedy; another law that fits can be chosen instead.
+TEST(Plan, RefusesAToolWithALawThatDoesNotFit) {
+  const Case bone = block_case();
+  for (const char* law : {"hooke", "saw"}) {
+    const ToolFinder find = [&](std::string_view name) -> Result<Tool> {
+      Tool tool = *find_tool(name);
+      tool.law = law;
+      return tool;
+    };
+    PlanStep step;
+    step.action = Action::drill;
+    step.tool = "drill-3.2";
+    step.entry.toward = Vec3(0, 0, -1);
+    const auto planned = make_ready({step}, bone, find);
+    const auto by_hand = make_free_hand({.tool = "drill-3.2", .at_mm = std::nullopt}, bone, find);
+    ASSERT_FALSE(planned);
+    ASSERT_FALSE(by_hand);
+    for (const Error& error : {planned.error(), by_hand.error()}) {
+      EXPECT_EQ(error.code, ErrorCode::invalid_input);
+      for (const std::string part : {std::string("drill-3.2"), '"' + std::string(law) + '"', std::string("choose one of chi")})
+        EXPECT_NE(error.message.find(part), std::string::npos) << error.message;
+    }
+    step.law = "allotta";
+    const auto instead = make_ready({step}, bone, find);
+    ASSERT_TRUE(instead) << instead.error().message;
+    EXPECT_EQ(instead->tools[0].law->name, "allotta");
+  }
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <vector>
 
 #include "haptic_client/control/haptic_loop.hpp"
@@ -36,7 +37,7 @@ class Rig {
     input_.spindle_rpm = tool.spindle_rpm;
     loop_.take_up(0, input_.pose_device_tool, WorkspaceMapping{});
     build(input_.pose_device_tool);
-    move({}, 0.5);
+    move(Vec3::Zero(), 0.5);
   }
   LoopReport tick() {
     const LoopReport report = loop_.tick(input_, patch_);
@@ -124,6 +125,51 @@ TEST(ToolEffects, AToolResistsByTheLawThatIsChosen) {
     // The spindle droops by some percent under the load.
     EXPECT_NEAR(mean.force_n, chosen.newtons, 0.05 * chosen.newtons) << (chosen.law ? chosen.law : "default");
   }
+}
+
+// A bar 10 mm wide under a blade of 19 mm with 14 teeth: 10 / (19/14) teeth are in it, 0.15 of which bear; each with the thrust
+// of its depth of cut at 1 mm/s, and 4 N along the cut, which the crank feels and the hand along the stroke.
+TEST(ToolEffects, ASawsForceIsOfTheTeethOverTheBar) {
+  const Tool saw = *find_tool("saw-oscillating-2");
+  const auto bar = osteon::test::make_bone(
+      {Vec3(-8, -10, -3), Vec3(8, 10, 15)}, 0.5,
+      [](const Vec3& p) { return std::max({-p.z(), p.z() - 12.0, std::abs(p.x()) - 5.0, std::abs(p.y()) - 7.0}); },
+      [](const Vec3&) { return 1.9; });
+  Rig rig(bar, saw);
+  const Mean mean = between(rig.move({0, 0, 4.0}, 4.0), 1.5, 3.0);
+  ASSERT_GT(mean.ticks, 1000);
+  const double pitch = 19.0 / 14.0, stroke = 80.0 * 5.0 * std::numbers::pi / 180.0, bearing = 0.15 * 10.0 / pitch;
+  const double depth_um = 1e3 * 1.0 * pitch / (0.15 * 2.0 * stroke * 200.0);
+  const double thrust_n = bearing * 7.5 * (1.0 + 0.3 * (depth_um - 2.0) / 8.0);
+  std::printf("  saw over 10 mm: %.2f N, by hand %.2f N; %.2f N mm, by hand %.2f N mm\n", mean.force_n, thrust_n, mean.torque_nmm,
+              bearing * 4.0 * stroke / std::numbers::pi);
+  // Contact points are half a millimetre apart.
+  EXPECT_NEAR(mean.force_n, thrust_n, 0.06 * thrust_n);
+  EXPECT_NEAR(mean.torque_nmm, bearing * 4.0 * stroke / std::numbers::pi, 0.06 * mean.torque_nmm);
+}
+
+// A reamer over a hole of half its radius meets half of its edges, though three quarters of its face: half the thrust.
+TEST(ToolEffects, AReamersThrustIsOfTheEdgesInBone) {
+  const Tool reamer = *find_tool("reamer-cylinder");
+  const auto thrust_n = [&](double hole_mm) {
+    const auto block = osteon::test::make_bone(
+        {Vec3(-13, -13, -3), Vec3(13, 13, 15)}, 0.5,
+        [=](const Vec3& p) {
+          const double face = std::max({-p.z(), p.z() - 12.0, std::abs(p.x()) - 10.0, std::abs(p.y()) - 10.0});
+          return hole_mm > 0.0 ? std::max(face, hole_mm - p.head<2>().norm()) : face;
+        },
+        [](const Vec3&) { return 0.6; });
+    Rig rig(block, reamer);
+    const Mean mean = between(rig.move({0, 0, 6.0}, 12.0), 4.0, 5.5);
+    EXPECT_GT(mean.ticks, 1000);
+    return mean.force_n;
+  };
+  // By hand: 0.5 mm/s, 300 rpm, 6 teeth: chips of 1/60 mm; all six edges of 6 mm; Chi's growth with density.
+  const double whole_n = (0.5 * 200.0 / 60.0 + 0.01) * 36.0 * std::pow(0.6 / 1.9, 1.1841);
+  const double whole = thrust_n(0.0), ring = thrust_n(3.0);
+  std::printf("  reamer: %.2f N, by hand %.2f N; over a hole of half its radius %.2f N\n", whole, whole_n, ring);
+  EXPECT_NEAR(whole, whole_n, 0.05 * whole_n);  // its spindle droops a little
+  EXPECT_NEAR(ring / whole, 0.5, 0.04);
 }
 
 // 15 mm of cortical bone are ten diameters of a 1.5 mm drill: torque and thrust rise, and withdrawal clears it.

@@ -264,6 +264,34 @@ TEST(ForceLaws, ALawIsChosenByTheToolOrInstead) {
   EXPECT_FALSE(choose_law(*find_tool("broach-1"), "chi"));
 }
 
+// Builtin tools were never loaded by a user: all of them name a law that fits, or none.
+TEST(ForceLaws, FitEveryBuiltinTool) {
+  for (const Tool& tool : builtin_tools()) EXPECT_TRUE(choose_law(tool).has_value()) << tool.name;
+}
+
+// Across the feed: (7.8) K_r of what cuts, without the edges' ploughing; (7.5) mu of the contact's force; of a saw's teeth
+// the force along the cut, which depth does not change and torque is made of. All round a drill or reamer it cancels.
+TEST(ForceLaws, ActAcrossTheFeedAsTheirEquationsSay) {
+  const LawTool burr = tool_of("burr-round-5"), blade = tool_of("saw-oscillating-1");
+  const LawInputs milled{.spindle_rpm = 20'000, .density_g_cm3 = 1.9, .engaged = 1.0, .edge_length_mm = 40.0};
+  const FeedLaw milling = law("milling").feed_law(burr, milled);
+  EXPECT_NEAR(milling.offset_n, 0.4, 1e-12);  // 0.01 N/mm
+  for (const double feed : {2.0, 8.0}) {
+    const double thrust = resistance_n(milling, feed);
+    EXPECT_NEAR(law("milling").across_n(burr, milled, thrust), 0.5 * (thrust - 0.4), 1e-9);
+  }
+  EXPECT_EQ(law("milling").across_n(burr, milled, 0.3), 0.0);
+  EXPECT_NEAR(law("agus").across_n(burr, milled, 6.0), 0.3 * 6.0, 1e-12);
+  const LawInputs sawn{.spindle_rpm = 12'000, .density_g_cm3 = 1.9, .teeth_engaged = 10.0};
+  for (const double thrust : {12.0, 15.0}) {
+    const double across = law("saw").across_n(blade, sawn, thrust);
+    EXPECT_NEAR(across, 0.15 * 10.0 * 4.0, 1e-9);
+    EXPECT_NEAR(law("saw").torque_nmm(blade, sawn, thrust), across * blade.stroke_mm / std::numbers::pi, 1e-9);
+  }
+  EXPECT_EQ(law("saw").across_n(blade, sawn, 0.0), 0.0);
+  for (const char* name : {"chi", "allotta", "reamer", "broach"}) EXPECT_EQ(law(name).across_n, nullptr) << name;
+}
+
 TEST(ForceLaws, SayWhenTheyAreUsedOutsideTheirRange) {
   const ForceLaw& chi = law("chi");
   const LawTool drill = tool_of("drill-3.2");
@@ -279,6 +307,8 @@ TEST(ForceLaws, SayWhenTheyAreUsedOutsideTheirRange) {
   for (const char* part : {"\"chi\"", "outside its range", "speed", "feed"})
     EXPECT_NE(sentence.find(part), std::string::npos) << sentence;
   EXPECT_EQ(sentence.find("density,"), std::string::npos);
+  EXPECT_EQ(out_of_range_words(0x3f), "speed, feed, density, diameter, depth of cut, speed of the teeth");
+  EXPECT_EQ(out_of_range_words(static_cast<unsigned>(OutOfRange::tooth_speed)), "speed of the teeth");
 
   LawTool thick = drill;
   thick.diameter_mm = 12.0;
