@@ -36,6 +36,7 @@ double sampled_mm(const SampledDistance& mesh, const Vec3& p) noexcept {
 CutShape::CutShape(const Tool& tool, bool open_behind) : open_behind_(open_behind) {
   const CutBody body = tool.cut_body();
   kind_ = body.kind;
+  behind_mm_ = tool.cutting_length_mm;
   const auto add = [&](const Vec3& n, double offset_mm) { planes_[static_cast<std::size_t>(count_++)] = {n, offset_mm}; };
   constexpr double kSideways = 1e-9;
   if (kind_ == CutKind::ball) radius_mm_ = kQuantum_mm * body.radius;
@@ -44,9 +45,11 @@ CutShape::CutShape(const Tool& tool, bool open_behind) : open_behind_(open_behin
     radius_mm_ = kQuantum_mm * body.dome;
     double widest = 0.0, narrowest = std::numeric_limits<double>::max();
     const std::size_t corners = std::min(body.profile.size(), kMostProfileCorners);
+    behind_mm_ = 0.0;
     for (std::size_t i = 0; i < corners; ++i) {
       const ProfileCorner a = body.profile[i], b = body.profile[(i + 1) % corners];
       widest = std::max(widest, kQuantum_mm * a.r);
+      behind_mm_ = std::max(behind_mm_, -kQuantum_mm * a.z);
       narrowest = std::min(narrowest, kQuantum_mm * a.r);
       const double er = kQuantum_mm * (b.r - a.r), ez = kQuantum_mm * (b.z - a.z), length = std::hypot(er, ez);
       if (!(length > 0.0) || (a.r == 0 && b.r == 0)) continue;  // the axis is no face

@@ -21,6 +21,8 @@ class CutShape {
   // [haptic] `out`: its gradient, a unit vector out of the body.
   [[nodiscard]] double distance_mm(const Vec3& point_mm, Vec3& out) const noexcept;
   [[nodiscard]] bool open_behind() const noexcept { return open_behind_; }
+  // How far behind its tip it cuts.
+  [[nodiscard]] double behind_mm() const noexcept { return behind_mm_; }
   // A ball's sweep is a capsule about its middle.
   [[nodiscard]] bool is_ball() const noexcept { return kind_ == CutKind::ball; }
   [[nodiscard]] double radius_mm() const noexcept { return radius_mm_; }
@@ -36,6 +38,7 @@ class CutShape {
   bool open_behind_ = false;
   int count_ = 0;
   std::array<Plane, kMostHullPlanes + 4> planes_;
+  double behind_mm_ = 0;
   double radius_mm_ = 0;  // ball, and the dome that rounds a turned body's end
   std::shared_ptr<const SampledDistance> sampled_;  // shared with the tool, immutable
 };

@@ -12,6 +12,7 @@ void EnergyLedger::reset() noexcept {
   account_mj_ = filled_mj_ = 0.0;
   report_.episode_mj = report_.stored_mj = report_.tank_mj = report_.ended_mj = 0.0;
   report_.ended = report_.held_back = open_ = false;
+  surprise_mm_per_s2_ = params_.surprise_mm_per_s2;
 }
 
 void EnergyLedger::observe(const Vec3& handle_moved_mm) noexcept {
@@ -21,6 +22,10 @@ void EnergyLedger::observe(const Vec3& handle_moved_mm) noexcept {
   account_mj_ -= given_mj;
   report_.episode_mj += given_mj;
   filled_mj_ = std::max(0.0, -damping_n_.dot(handle_moved_mm));
+  // Who has held still surprises little: else a slow, light feed would be held back for good.
+  const double seen = params_.wary * (handle_moved_mm - moved_mm_).norm() / (params_.dt_s * params_.dt_s);
+  const double fading = surprise_mm_per_s2_ * std::exp(-params_.dt_s / params_.lately_s);
+  surprise_mm_per_s2_ = std::min(params_.surprise_mm_per_s2, std::max({seen, fading, params_.calm_mm_per_s2}));
   moved_mm_ = handle_moved_mm;
 }
 
@@ -67,7 +72,7 @@ Vec3 EnergyLedger::limited(const Vec3& wanted_n, const Vec3& damping_n, bool tou
   open_ = true;
   if (!(wanted > 0.0)) return force_n_;
   // Held for a tick while the handle goes on as it did, give or take what it can accelerate.
-  const double out_mm = moved_mm_.dot(wanted_n) / wanted + params_.surprise_mm_per_s2 * params_.dt_s * params_.dt_s;
+  const double out_mm = moved_mm_.dot(wanted_n) / wanted + surprise_mm_per_s2_ * params_.dt_s * params_.dt_s;
   const double given_mj = wanted * out_mm, most_mj = std::max(0.0, account_mj_ + params_.allowance_mj);
   double share = 1.0;
   if (given_mj > most_mj) {

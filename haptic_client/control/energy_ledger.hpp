@@ -13,6 +13,8 @@ struct EnergyParams {
   double allowance_mj = 0.008;            // that one contact may give more than it got
   double tank_mj = 2.0;                   // most of the damping's work that is kept for later
   double surprise_mm_per_s2 = 10000.0;    // a hand and its device are taken to accelerate less than this [A]
+  double calm_mm_per_s2 = 2000.0;         // and less than this, or `wary` times what they did lately, while that is less [A]
+  double wary = 2.0, lately_s = 0.2;      // [A]
 };
 
 // Energies at the handle, mJ: force shown to the hand times the way of the handle.
@@ -32,7 +34,7 @@ struct EnergyReport {
 // orientation, lengths of the handle's own motion.
 class EnergyLedger {
  public:
-  explicit EnergyLedger(const EnergyParams& params = {}) : params_(params) {}
+  explicit EnergyLedger(const EnergyParams& params = {}) : params_(params), surprise_mm_per_s2_(params.surprise_mm_per_s2) {}
 
   // Another tool, or the clutch: what was stored is gone.
   void reset() noexcept;
@@ -56,6 +58,7 @@ class EnergyLedger {
   EnergyReport report_;
   Vec3 force_n_ = Vec3::Zero(), damping_n_ = Vec3::Zero();  // held since the last tick
   Vec3 moved_mm_ = Vec3::Zero();                            // in the last tick
+  double surprise_mm_per_s2_;                               // that is reckoned with now
   double account_mj_ = 0;   // put in by the hand and still there: in the spring, or in the tank
   double filled_mj_ = 0;    // by damping, in this tick
   bool open_ = false;       // a contact is under way

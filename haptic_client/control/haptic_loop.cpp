@@ -109,7 +109,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
     proxy_.end_sweep();
   }
   if (step.locked) spindle_ = {};
-  record(model, step.near_bone, report);
+  record(model, step, report);
 
   report.pose_bone_proxy = proxy_.pose();
   report.pose_bone_device = pose_bone_device;
@@ -238,17 +238,18 @@ Vec3 HapticLoop::slewed(const Vec3& wanted_n, double hand_mm, int periods, LoopR
   return from_n + step_n * (most_n / step_n.norm());
 }
 
-void HapticLoop::record(const ToolModel& model, bool near_bone, LoopReport& report) noexcept {
-  if (near_bone && !recorder_.recording() && proxy_.begin_sweep(model)) {
-    recorder_.begin(proxy_.pose(), model.tool.cutting_length_mm);
+void HapticLoop::record(const ToolModel& model, const ProxyStep& step, LoopReport& report) noexcept {
+  if (step.near_bone && !recorder_.recording() && proxy_.begin_sweep(model)) {
+    recorder_.begin(proxy_.cut_pose(), model.tool.cutting_length_mm);
     quiet_ticks_ = 0;
     return;
   }
   if (!recorder_.recording()) return;
-  recorder_.add(proxy_.pose());
-  quiet_ticks_ = near_bone ? 0 : quiet_ticks_ + 1;
+  // A tool that stands rubs with its points, its faces a little within the bone: that is no cut.
+  if (step.may_cut) recorder_.add(proxy_.cut_pose());
+  quiet_ticks_ = step.near_bone ? 0 : quiet_ticks_ + 1;
 
-  const bool over = quiet_ticks_ >= kQuietTicks;
+  const bool over = quiet_ticks_ >= kQuietTicks || !step.may_cut;
   if (!recorder_.due() && !over) return;
   CutPiece piece;
   if (recorder_.close(piece)) {

@@ -109,7 +109,7 @@ class HapticLoop {
   [[nodiscard]] double coupling_n_per_mm() const noexcept { return coupling_n_per_mm_; }
 
  private:
-  void record(const ToolModel& model, bool near_bone, LoopReport& report) noexcept;
+  void record(const ToolModel& model, const ProxyStep& step, LoopReport& report) noexcept;
   void wear_and_clog(const ToolModel& model, const ProxyStep& step, const Vec3& spring_n) noexcept;
   [[nodiscard]] double load_nmm(const ProxyStep& step, double pressed_n) noexcept;
   // The force on the handle: the coupling's within ramp, slew limit and energy, and the motor's.

@@ -25,6 +25,9 @@ constexpr double kFlatField = 0.3;     // a gradient shorter than this says noth
 constexpr double kBite = 0.3, kSteepest = 3.0, kWholePoint = 0.9;
 constexpr double kSkiveSpeed_mm_per_s = 30.0;
 constexpr double kMostSkive_mm = 3.0;
+// Play of a tool in its own hole, in insets: points that stand round it some millimetres apart let it go a little farther
+// between them.
+constexpr double kPlay = 1.5;
 constexpr double kDrawnOut_mm = 1.0;   // in a tick, of a tool that is locked in bone
 
 const ContactPoint& point_at(const ToolModel& model, int i) noexcept {
@@ -41,6 +44,21 @@ bool walls_meet_bone(const ToolModel& model) noexcept {
 }
 bool skives(ToolKind kind) noexcept { return kind == ToolKind::drill || kind == ToolKind::pin || kind == ToolKind::end_drill; }
 
+// Where a hole's axis goes when the tool in it has moved: two points of the axis, each with this much play across it.
+Pose with_play(const Pose& hole, const Pose& tool, double arm_mm, double play_mm) noexcept {
+  const Vec3 axis = tool.direction(Vec3::UnitZ());
+  const auto followed = [&](const Vec3& from, const Vec3& to) {
+    const double along_mm = (to - from).dot(axis);
+    const Vec3 aside_mm = to - from - along_mm * axis;
+    const double size_mm = aside_mm.norm();
+    const double share = size_mm > play_mm ? 1.0 - play_mm / size_mm : 0.0;
+    return Vec3(from + along_mm * axis + share * aside_mm);
+  };
+  const Vec3 behind(0, 0, -arm_mm), tip = followed(hole.position_mm, tool.position_mm);
+  const Vec3 along = tip - followed(hole.point(behind), tool.point(behind));
+  return {tip, (Eigen::Quaterniond::FromTwoVectors(axis, along) * tool.rotation).normalized()};
+}
+
 Pose halfway(const Pose& a, const Pose& b) noexcept {
   return {0.5 * (a.position_mm + b.position_mm), a.rotation.slerp(0.5, b.rotation)};
 }
@@ -55,7 +73,7 @@ Proxy::Proxy() : conditions_(std::make_unique<Conditions>()) {
 }
 
 void Proxy::place(const Pose& pose_bone_tool) noexcept {
-  pose_ = pose_bone_tool;
+  pose_ = cut_pose_ = pose_bone_tool;
   sweep_count_ = 0;
   sweeping_ = cut_before_ = returned_ = locked_ = false;
   skive_mm_.setZero();
@@ -79,7 +97,16 @@ double Proxy::Sweep::left_mm(const Vec3& p, Vec3& out) const noexcept {
   }
   double distance = shape->distance_mm(pose_to_bone.point(p), out);
   out = -to.direction(out);
-  if (shape->open_behind()) return -distance;
+  if (shape->open_behind()) {
+    // The hole before it began is older: that tool may have stood elsewhere in its play.
+    const Vec3 axis = to.direction(Vec3::UnitZ());
+    const double ahead = (p - from.position_mm).dot(axis) + shape->behind_mm();
+    if (ahead < -distance) {
+      out = axis;
+      return ahead;
+    }
+    return -distance;
+  }
   for (const Pose* other : {&pose_middle_bone, &pose_from_bone}) {
     Vec3 way;
     const double there = shape->distance_mm(other->point(p), way);
@@ -92,14 +119,15 @@ double Proxy::Sweep::left_mm(const Vec3& p, Vec3& out) const noexcept {
 
 bool Proxy::begin_sweep(const ToolModel& model) noexcept {
   if (sweep_count_ >= kMostSweeps) return false;
+  if (!sweeping_) cut_pose_ = pose_;
   sweeping_ = true;
   Sweep& sweep = sweeps_[static_cast<std::size_t>(sweep_count_++)];
   sweep.shape = &model.outline;
   sweep.own_cut = 0;
   sweep.open = true;
-  sweep.from = pose_;
-  sweep.pose_from_bone = sweep.pose_middle_bone = pose_.inverse();
-  sweep.reach(pose_);
+  sweep.from = cut_pose_;
+  sweep.pose_from_bone = sweep.pose_middle_bone = cut_pose_.inverse();
+  sweep.reach(cut_pose_);
   return true;
 }
 
@@ -108,9 +136,9 @@ void Proxy::closed(const ToolModel& model, std::uint64_t own_cut) noexcept {
   Sweep& sweep = sweeps_[static_cast<std::size_t>(sweep_count_ - 1)];
   sweep.own_cut = own_cut;
   constexpr double kSameAxis_rad = 1e-6, kSameAxis_mm = 0.02;
-  const Vec3 away_mm = pose_.position_mm - sweep.to.position_mm;
-  const Vec3 axis = pose_.direction(Vec3::UnitZ());
-  if (sweep.shape->open_behind() && pose_.rotation.angularDistance(sweep.to.rotation) < kSameAxis_rad &&
+  const Vec3 away_mm = cut_pose_.position_mm - sweep.from.position_mm;
+  const Vec3 axis = cut_pose_.direction(Vec3::UnitZ());
+  if (sweep.shape->open_behind() && cut_pose_.rotation.angularDistance(sweep.from.rotation) < kSameAxis_rad &&
       (away_mm - away_mm.dot(axis) * axis).norm() < kSameAxis_mm)
     return;
   sweep.open = false;
@@ -125,11 +153,13 @@ void Proxy::end_sweep() noexcept {
   sweeping_ = false;
 }
 
-void Proxy::update_sweep() noexcept {
+void Proxy::update_sweep(const ToolModel& model) noexcept {
   if (!sweeping_) return;
   Sweep& sweep = sweeps_[static_cast<std::size_t>(sweep_count_ - 1)];
-  if (sweep.shape->open_behind() && (pose_.position_mm - sweep.to.position_mm).dot(pose_.direction(Vec3::UnitZ())) <= 0.0) return;
-  sweep.reach(pose_);
+  const bool open_behind = sweep.shape->open_behind();
+  cut_pose_ = open_behind ? with_play(cut_pose_, pose_, sweep.shape->behind_mm(), kPlay * model.inset) : pose_;
+  if (open_behind && (cut_pose_.position_mm - sweep.to.position_mm).dot(cut_pose_.direction(Vec3::UnitZ())) <= 0.0) return;
+  sweep.reach(cut_pose_);
 }
 
 void Proxy::forget_contained(const Patch& patch) noexcept {
@@ -533,7 +563,7 @@ void Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm,
       cut_mm += step_mm;
       report.cutting_work_mj += feed.cutting_n * step_mm;
     }
-    update_sweep();
+    update_sweep(model);
     extension_mm -= step_mm;
     free_mm -= engaged ? 0.0 : step_mm;
     if (blocked) break;
@@ -657,14 +687,14 @@ ProxyStep Proxy::step(const ToolModel& model, const Patch& patch, const Pose& po
     cut_before_ = false;
     return report;
   }
-  tick.may_cut = may_cut && !returned_ && model.feed != Feeding::none && spindle_rpm >= kMinCuttingRpm;
+  tick.may_cut = report.may_cut = may_cut && !returned_ && model.feed != Feeding::none && spindle_rpm >= kMinCuttingRpm;
   if (tick.may_cut) {
     cut_towards(tick, pose_bone_device, report);
   } else {
     skive_mm_.setZero();
     travel(tick, pose_bone_device, nullptr, true, report);
   }
-  update_sweep();
+  if (tick.may_cut) update_sweep(model);  // else it would creep on through bone by what its points are inset, without turning
   cut_before_ = report.cutting && !report.breakthrough;
 
   // What turned the tool may have pushed it back by more than it cut.

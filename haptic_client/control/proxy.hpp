@@ -26,6 +26,7 @@ struct ProxyStep {
   bool covered = true;         // the patch reaches all of the tool that matters
   bool contact = false;        // something holds the tool back
   bool cutting = false;        // it advances into bone
+  bool may_cut = false;        // it would, where the force suffices: it turns, and nothing forbids it
   bool near_bone = false;      // the cutting part touches or may remove bone
   bool heel_contact = false;
   bool returned = false;       // bone came back where the tool is: it cuts nothing until it has left that
@@ -75,10 +76,14 @@ class Proxy {
   void end_sweep() noexcept;
   [[nodiscard]] bool sweeps_full() const noexcept { return sweep_count_ >= kMostSweeps - 1; }
   [[nodiscard]] const Pose& pose() const noexcept { return pose_; }
+  // [haptic] From where it takes bone away. A tool that goes along its axis plays in its hole by what its points are inset,
+  // and the hole follows only beyond that play: else a drill that is pressed sideways would widen it tick by tick.
+  [[nodiscard]] const Pose& cut_pose() const noexcept { return cut_pose_; }
 
  private:
   // What the cutting part has taken away since a patch was built: from one place to another. Of what goes along its axis
-  // the deepest place holds all others, and one sweep goes on for as long as it is not turned.
+  // the deepest place holds all others from where the sweep began on, and one sweep goes on for as long as it keeps to
+  // its axis.
   struct Sweep {
     const CutShape* shape = nullptr;  // of the tool in hand
     Pose from, to;                    // pose_bone_tool; `to`: the deepest, where that holds all
@@ -138,11 +143,11 @@ class Proxy {
   [[nodiscard]] bool bone_returned(const Tick& tick, const Pose& wanted, ProxyStep& report) noexcept;
   void note_forces(const Tick& tick, const Engagement& now, const Vec3& direction, double thrust_n, ProxyStep& report) noexcept;
   [[nodiscard]] bool near_bone(const Tick& tick) noexcept;
-  void update_sweep() noexcept;
+  void update_sweep(const ToolModel& model) noexcept;
   void forget_contained(const Patch& patch) noexcept;
 
   static constexpr int kMostSweeps = 48;
-  Pose pose_;
+  Pose pose_, cut_pose_;
   std::array<Sweep, kMostSweeps> sweeps_;
   int sweep_count_ = 0;
   bool sweeping_ = false;

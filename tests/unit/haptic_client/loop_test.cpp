@@ -280,6 +280,79 @@ TEST(DrillInItsHole, IsHeldSidewaysAndFreeAlongTheAxis) {
   EXPECT_EQ(report.force_physical_n.norm(), 0.0);
 }
 
+// A hand at the loop whose cuts go through a replica, as late as a real client's; the device and bone frames are alike.
+class HandOnBlock {
+ public:
+  explicit HandOnBlock(const char* tool) : loop_(LoopParams{.ramp_s = 1e-9}, {ToolModel(*find_tool(tool), bone_.pitch_mm())}) {
+    lead({0, 0, -1});
+    loop_.take_up(0, input_.pose_device_tool, WorkspaceMapping{});
+    builder_.build(replica_.bodies(), loop_.tool(0), input_.pose_device_tool, patch_);
+  }
+  void lead(const Vec3& to) { input_.pose_device_tool.position_mm = to; }
+  // One tick with the handle this far ahead of the tool along z.
+  LoopReport push(double ahead_mm, double x_mm = 0.0) {
+    lead({x_mm, 0, tip_mm().z() + ahead_mm});
+    return tick();
+  }
+  LoopReport tick() {
+    report_ = loop_.tick(input_, patch_);
+    CutPiece piece;
+    while (loop_.take_piece(piece)) replica_.add_own(cut_of(piece, loop_.tool(0), AuthorId{1}, 0));
+    if (++ticks_ % 12 == 0) {
+      for (const ChangedLeaves& change : replica_.take_changes()) builder_.changed(bone_.pitch_mm(), change.level, change.origins);
+      builder_.build(replica_.bodies(), loop_.tool(0), report_.pose_bone_proxy, patch_);
+      patch_.own_cuts = replica_.last_own();
+    }
+    return report_;
+  }
+  [[nodiscard]] Vec3 tip_mm() const { return ticks_ ? report_.pose_bone_proxy.position_mm : Vec3(0, 0, -1); }
+  void drill_to(double z_mm) {
+    input_.spindle_rpm = 1000;
+    for (int i = 0; i < 20'000 && tip_mm().z() < z_mm; ++i) push(0.55);
+    ASSERT_GE(tip_mm().z(), z_mm);
+  }
+
+  Case bone_ = block_case();
+  HapticLoop loop_;
+  Replica replica_{bone_, BodyId{}};
+  PatchBuilder builder_;
+  Patch patch_;
+  LoopInput input_;
+  LoopReport report_;
+  std::int64_t ticks_ = 0;
+};
+
+// However long it is pressed, a drill that does not turn stays where it is, but for what its points are inset, and takes
+// nothing away.
+TEST(DrillInItsHole, TakesNothingWhileItStands) {
+  HandOnBlock hand("drill-3.2");
+  hand.drill_to(2.0);
+  hand.input_.spindle_rpm = 0.0;
+  for (int i = 0; i < 1000 && hand.report_.spindle_rpm > 1.0; ++i) hand.push(0.0);
+  ASSERT_LT(hand.report_.spindle_rpm, 1.0);
+  const double from_mm = hand.tip_mm().z();
+  for (int i = 0; i < 100; ++i) hand.push(-0.01);  // lets the last cut close
+  const double removed_mm3 = hand.replica_.removed_mm3();
+  for (int i = 0; i < 1000; ++i) hand.push(0.58);  // 29 N
+  EXPECT_NEAR(hand.report_.force_physical_n.z(), -29.0, 0.1);
+  EXPECT_LT(hand.tip_mm().z(), from_mm + hand.loop_.tool(0).inset);
+  EXPECT_EQ(hand.replica_.removed_mm3(), removed_mm3);
+}
+
+// Pulled sideways by 35 N while it drills on, it leans in its play, and its hole goes on along it: by the play over the
+// depth for each millimetre drilled. It does not cut its way sideways.
+TEST(DrillInItsHole, DoesNotCreepAsideWhileItTurns) {
+  HandOnBlock hand("drill-3.2");
+  constexpr double kDeep_mm = 3.0;
+  hand.drill_to(kDeep_mm);
+  const double play_mm = hand.loop_.tool(0).inset;
+  for (int i = 0; i < 1500; ++i) hand.push(0.55, 0.7);
+  const double drilled_mm = hand.tip_mm().z() - kDeep_mm;
+  EXPECT_GT(drilled_mm, 0.5);
+  EXPECT_LT(hand.tip_mm().x(), play_mm * (3.0 + 2.0 * drilled_mm / kDeep_mm));
+  EXPECT_LT(hand.report_.force_physical_n.x(), -15.0);
+}
+
 TEST(Burr, TakesAWindowToItsDepth) {
   PlanStep step;
   step.action = Action::burr;
