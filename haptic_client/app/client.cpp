@@ -109,6 +109,7 @@ class Client {
     outcome_.coupling_n_per_mm = session_.loop().coupling_n_per_mm();
     outcome_.workspace_scale = session_.loop().mapping().scale();
     outcome_.steps = session_.results();
+    outcome_.outside_range = ranges_.uses();
     outcome_.field_hash = replica_.hash();
     outcome_.removed_total_mm3 = replica_.removed_mm3();
     outcome_.room_seq = replica_.room_seq();
@@ -391,6 +392,7 @@ class Client {
       while (rows_.try_pop(row)) {
         any = true;
         log_.write(row, tool_name(row));
+        note_range(row);
         recorder_.push(row);
       }
       if (any && link_ok_) room_.send(state_of(row));
@@ -418,6 +420,13 @@ class Client {
 
   [[nodiscard]] const std::string& tool_name(const TickRow& row) const { return tool_names_[static_cast<std::size_t>(row.report.tool)]; }
 
+  void note_range(const TickRow& row) {
+    if (row.report.out_of_range == 0) return;
+    const ToolModel& model = session_.plan().tools[static_cast<std::size_t>(row.report.tool)];
+    const std::string sentence = ranges_.note(model, row.report);
+    if (!sentence.empty()) log::warn("force law outside its range", {{"tool", model.tool.name}, {"because", sentence}});
+  }
+
   [[nodiscard]] CuttingState state_of(const TickRow& row) const {
     const LoopReport& r = row.report;
     CuttingState state;
@@ -441,6 +450,7 @@ class Client {
     const LoopReport& r = row.report;
     std::printf("%s %s: depth %.1f mm, force %.1f N, feed %.2f mm/s, %.0f rpm (%s)", tool_name(row).c_str(), name(row.phase),
                 row.depth_mm, r.force_physical_n.norm(), r.feed_mm_per_s, r.spindle_rpm, name(r.phase));
+    if (r.out_of_range != 0) std::printf(", outside the range of its law: %s", out_of_range_words(r.out_of_range).c_str());
     const RoomHealth health = room_health_;
     if (health != RoomHealth::follows) std::printf(", held: %s, %zu cuts unconfirmed", name(health), unconfirmed_.load());
     if (live_.refresh()) {
@@ -461,6 +471,7 @@ class Client {
   PatchBuilder builder_;       // replica thread
   SessionLog log_;             // reporter thread
   Recorder recorder_;          // filled by the reporter thread
+  RangeWatch ranges_;          // reporter thread, until it is joined
   std::vector<std::string> tool_names_;  // never changes
 
   LatestValue<Patch> patches_;     // replica → haptic

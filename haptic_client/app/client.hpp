@@ -37,6 +37,7 @@ struct ClientOutcome {
   std::uint64_t held_for_room_ticks = 0;  // in which spindle and force were down because the room did not follow
   double patch_p50_us = 0, patch_p99_us = 0;
   Recorder::Outcome recording;
+  std::vector<RangeWatch::Use> outside_range;  // of force laws
   DeviceLimits limits;
   LoopParams loop;
   double coupling_n_per_mm = 0, workspace_scale = 0;  // of the last step: K_c, and bone mm for each mm of the handle

@@ -88,6 +88,9 @@ json step_summary(const ReadyStep& step, const StepResult& result, double remove
 
 json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string_view device, int losses) {
   const TickStats& ticks = outcome.ticks;
+  json outside = json::object();
+  for (const RangeWatch::Use& use : outcome.outside_range)
+    outside[std::string(use.law->name)] = {{"ticks", use.ticks}, {"what", out_of_range_words(use.bits)}};
   json steps = json::array();
   for (std::size_t i = 0; i < plan.steps.size(); ++i)
     steps.push_back(step_summary(plan.steps[i], outcome.steps[i], outcome.removed_mm3[i]));
@@ -124,6 +127,7 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string
           {"recording", {{"rows", outcome.recording.rows}, {"dropped", outcome.recording.dropped}, {"trouble", outcome.recording.trouble}}},
           {"cuts", outcome.cuts.size()},
           {"rejected", outcome.rejected},
+          {"laws_outside_range", outside},
           {"steps", steps},
           {"removed_mm3", outcome.removed_total_mm3},
           {"field_hash", to_hex(outcome.field_hash)},

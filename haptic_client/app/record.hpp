@@ -39,6 +39,24 @@ struct CutRow {
 [[nodiscard]] std::string law_name(const ToolModel& model);
 // Of the bits of LoopReport::events, the lowest first.
 [[nodiscard]] std::vector<std::string> event_names();
+// Of the bits of LoopReport::out_of_range, the lowest first.
+[[nodiscard]] std::vector<std::string> range_names();
+
+// Where a session used force laws outside the range that they were made for. One thread.
+class RangeWatch {
+ public:
+  struct Use {
+    const ForceLaw* law = nullptr;
+    unsigned bits = 0;         // of OutOfRange, all that were ever seen
+    std::uint64_t ticks = 0;   // spent outside
+  };
+  // A sentence when a law is used outside its range for the first time in the session, else nothing.
+  [[nodiscard]] std::string note(const ToolModel& model, const LoopReport& report);
+  [[nodiscard]] const std::vector<Use>& uses() const { return uses_; }  // each law once
+
+ private:
+  std::vector<Use> uses_;
+};
 
 // Rows are written as they come; a disk that is full shows at finish().
 class SessionLog {

@@ -344,6 +344,9 @@ void RecordFile::Impl::make_columns() {
     const auto tool = static_cast<std::size_t>(r.report.tool);
     return tool < law_of_tool.size() ? law_of_tool[tool] : std::uint8_t{0};
   }));
+  add(column<std::uint8_t, R>("data/law_out_of_range", "1", "",
+                              "bits: outside of which of its limits the law was used, named in metadata/range_bits",
+                              [](const R& r) { return r.report.out_of_range; }));
   add(column<std::uint32_t, R>("data/events", "1", "", "bits: what the loop met in the tick, named in metadata/event_bits",
                                [](const R& r) { return r.report.events; }));
   add(column<std::uint32_t, R>(recording::kButtons, "1", "", "bits: 1 clutch, 2 spindle",
@@ -419,7 +422,7 @@ bool RecordFile::Impl::make_metadata() {
   const Hdf5Handle readme = make_value(file.id(), "metadata/README", readme_type.id(), kReadme);
   ok = ok && voxel.ok() && readme.ok() && set_text(voxel.id(), "units", "mm3") &&
        make_texts(file.id(), "metadata/tools", tools) && make_texts(file.id(), "metadata/laws", laws) &&
-       make_texts(file.id(), "metadata/event_bits", event_names());
+       make_texts(file.id(), "metadata/event_bits", event_names()) && make_texts(file.id(), "metadata/range_bits", range_names());
   // What only the end can say: there from the start, because nothing new may appear while others read.
   const std::string nothing(64, '\0');
   const std::uint64_t zero = 0;

@@ -67,6 +67,7 @@ TickRow row(std::uint64_t i) {
   row.report.density_g_cm3 = random.between(0, 2);
   row.report.feed_mm_per_s = random.between(0, 20);
   row.report.phase = i % 2 ? CuttingPhase::cutting : CuttingPhase::free;
+  row.report.out_of_range = static_cast<unsigned>(i % 64);
   row.report.tool = static_cast<int>(i / 700 % 2);
   row.reading.pose_device_tool = pose(random);
   row.reading.buttons = static_cast<std::uint32_t>(i % 4);
@@ -203,6 +204,9 @@ assert np.allclose(np.diff(f["data/time"][:]), 1e-3, atol=2e-6) and f["data/time
 assert [t.decode() for t in f["metadata/tools"][:]] == ["drill-3.2", "burr-round-5"]
 assert [t.decode() for t in f["metadata/laws"][:]] == ["chi", "milling"]
 assert f["data/law"][699] == 0 and f["data/law"][700] == 1 and f["burr_change/burr_size"][:].tolist() == [3.2, 5.0]
+assert (f["data/law_out_of_range"][:] == np.arange(1300) % 64).all()
+bits = [t.decode() for t in f["metadata/range_bits"][:]]
+assert bits == ["speed", "feed", "density", "diameter", "depth of cut", "speed of the teeth"], bits
 assert f["burr_change/row"][:].tolist() == [0, 700] and f["burr_change/scale"][0] == 1.5
 assert f["metadata/voxel_volume"][()] == 0.125 and f["metadata"].attrs["force_scale"] == 0.0466
 assert b"bone" in f["metadata/README"][()]
@@ -218,6 +222,30 @@ print("%.6f,%.6f,%.6f,%.6f,%.6f" % (f["high_frequency_poses/drill_pose/pose"][i,
   ASSERT_EQ(std::sscanf(read.out.c_str(), "%lf,%lf,%lf,%lf,%lf", &got[0], &got[1], &got[2], &got[3], &got[4]), 5);
   ASSERT_EQ(std::sscanf(expected, "%lf,%lf,%lf,%lf,%lf", &want[0], &want[1], &want[2], &want[3], &want[4]), 5);
   for (int i = 0; i < 5; ++i) EXPECT_NEAR(got[i], want[i], i < 2 ? 1e-6 : 4e-6) << i;  // poses are doubles, forces floats
+}
+
+// Each law is told of once in a session, with what it was first outside of; all that follows is counted.
+TEST(RangeWatch, TellsOfEachLawOnce) {
+  const ToolModel drill(*find_tool("drill-3.2"), 0.5), other(*find_tool("drill-3.5"), 0.5), saw(*find_tool("saw-oscillating-1"), 0.5);
+  const auto outside = [](OutOfRange what) {
+    LoopReport report;
+    report.out_of_range = static_cast<unsigned>(what);
+    return report;
+  };
+  RangeWatch watch;
+  EXPECT_EQ(watch.note(drill, LoopReport{}), "");
+  EXPECT_TRUE(watch.uses().empty());
+  const std::string first = watch.note(drill, outside(OutOfRange::feed));
+  EXPECT_NE(first.find("\"chi\""), std::string::npos) << first;
+  EXPECT_NE(first.find("feed"), std::string::npos) << first;
+  EXPECT_EQ(watch.note(drill, outside(OutOfRange::density)), "");
+  EXPECT_EQ(watch.note(other, outside(OutOfRange::feed)), "");  // another tool, the same law
+  EXPECT_NE(watch.note(saw, outside(OutOfRange::depth_of_cut)).find("\"saw\""), std::string::npos);
+  ASSERT_EQ(watch.uses().size(), 2u);
+  EXPECT_EQ(watch.uses()[0].law->name, "chi");
+  EXPECT_EQ(watch.uses()[0].ticks, 3u);
+  EXPECT_EQ(out_of_range_words(watch.uses()[0].bits), "feed, density");
+  EXPECT_EQ(watch.uses()[1].ticks, 1u);
 }
 
 // A child that records as fast as it can, saying after each chunk how many rows it has written.

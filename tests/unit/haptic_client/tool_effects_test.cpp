@@ -127,6 +127,29 @@ TEST(ToolEffects, AToolResistsByTheLawThatIsChosen) {
   }
 }
 
+// Chi's law was made for 0.3 to 2.0 g/cm3 and 0.5 to 3 mm/s: every tick that cuts says what it is outside of, others nothing.
+TEST(ToolEffects, ALawSaysWhereItIsOutsideItsRange) {
+  const Tool drill = *find_tool("drill-3.2");
+  const struct { double density, feed; unsigned outside; } kMoments[] = {
+      {1.9, 1.0, 0u},
+      {0.2, 1.0, static_cast<unsigned>(OutOfRange::density)},
+      {0.6, 5.0, static_cast<unsigned>(OutOfRange::feed)},
+      {0.2, 5.0, static_cast<unsigned>(OutOfRange::density) | static_cast<unsigned>(OutOfRange::feed)}};
+  for (const auto& moment : kMoments) {
+    Rig rig(slab(12.0, moment.density), drill);
+    int cutting = 0;
+    for (const LoopReport& r : rig.move({0, 0, 9.0}, 9.0 / moment.feed)) {
+      const double z = r.pose_bone_proxy.position_mm.z();
+      if (r.phase != CuttingPhase::cutting) EXPECT_EQ(r.out_of_range, 0u);
+      else if (z > 5.0 && z < 7.0) {
+        ++cutting;
+        EXPECT_EQ(r.out_of_range, moment.outside) << moment.density << " g/cm3, " << r.feed_mm_per_s << " mm/s";
+      }
+    }
+    EXPECT_GT(cutting, 200);
+  }
+}
+
 // A bar 10 mm wide under a blade of 19 mm with 14 teeth: 10 / (19/14) teeth are in it, 0.15 of which bear; each with the thrust
 // of its depth of cut at 1 mm/s, and 4 N along the cut, which the crank feels and the hand along the stroke.
 TEST(ToolEffects, ASawsForceIsOfTheTeethOverTheBar) {
