@@ -12,7 +12,8 @@ namespace osteon::haptic {
 class DeviceExchange {
  public:
   using Time = std::chrono::steady_clock::time_point;
-  static constexpr std::chrono::milliseconds kForceHeld{10};  // [A] ten missed ticks of the haptic thread
+  // Three ticks of the haptic thread: a frame of the device that comes after the third one missed shows no force.
+  static constexpr std::chrono::milliseconds kForceHeld{3};
   static constexpr int kReadsWithoutSample = 20;              // [A] then the device counts as silent
 
   DeviceExchange() { go_absent(); }
@@ -31,13 +32,12 @@ class DeviceExchange {
     publish(last_);
   }
   void go_absent() noexcept { go(DeviceStatus::absent); }
-  // [I/O] The force that is wanted now; none when the haptic thread has written nothing for a while.
+  // [I/O] The force that is wanted now; none when the haptic thread has written nothing for kForceHeld. What counts is when
+  // it was written, so a force also ends on time that this thread, having been late itself, sees for the first time.
   [[nodiscard]] DeviceOutput demanded(Time now) noexcept {
-    if (outputs_.refresh()) {
-      written_ = now;
-      any_written_ = true;
-    }
-    return any_written_ && now - written_ < kForceHeld ? outputs_.value() : DeviceOutput{};
+    if (outputs_.refresh()) any_written_ = true;
+    const Written& last = outputs_.value();
+    return any_written_ && now - last.at < kForceHeld ? last.output : DeviceOutput{};
   }
   // [I/O or connection thread, while no I/O thread runs] Nothing that was written before counts any more.
   void forget_output() noexcept {
@@ -57,15 +57,19 @@ class DeviceExchange {
     }
     return reading;
   }
-  // [haptic]
-  void write(const DeviceOutput& output) noexcept { outputs_.store(output); }
+  // [haptic] `now`: of the same clock as in demanded().
+  void write(const DeviceOutput& output, Time now = std::chrono::steady_clock::now()) noexcept { outputs_.store({output, now}); }
 
  private:
+  struct Written {
+    DeviceOutput output;
+    Time at{};
+  };
+
   LatestValue<DeviceReading> readings_;
-  LatestValue<DeviceOutput> outputs_;
+  LatestValue<Written> outputs_;
   DeviceReading last_;             // I/O
   std::uint64_t samples_ = 0;      // I/O
-  Time written_{};                 // I/O
   bool any_written_ = false;       // I/O
   int reads_since_ = 0;            // haptic
 };

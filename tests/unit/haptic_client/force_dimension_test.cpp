@@ -29,7 +29,7 @@ class ForceDimensionArm : public WithArm {
     return device_->read();
   }
   // Whether the device comes to show this much, while the force is written again and again: a machine that takes the
-  // core from the test for 10 ms sees it end meanwhile.
+  // core from the test for 3 ms sees it end meanwhile.
   bool shows(const DeviceOutput& output, const std::function<bool()>& enough) {
     return wait_until([&] { return device_->write(output), (void)device_->read(), enough(); }, kPatience);
   }
@@ -109,7 +109,7 @@ TEST_F(ForceDimensionArm, AHundredThousandCyclesAgainstASpring) {
   };
   const auto begin = arm()->cycles.load();
   while (arm()->cycles < begin + 100000) turn();
-  // A machine that takes the core from us for 10 ms sees the force end, and then return.
+  // A machine that takes the core from us for 3 ms sees the force end, and then return.
   EXPECT_TRUE(wait_until(
       [&] {
         double y_mm = 0.0;

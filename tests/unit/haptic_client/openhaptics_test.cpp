@@ -34,7 +34,7 @@ class Phantom : public WithArm {
     return device_->read();
   }
   // Whether the device comes to show this much, while the force is written again and again: a machine that takes the
-  // core from the test for 10 ms sees it end meanwhile.
+  // core from the test for 3 ms sees it end meanwhile.
   bool shows(const DeviceOutput& output, const std::function<bool()>& enough) {
     return wait_until([&] { return device_->write(output), (void)device_->read(), enough(); }, kPatience);
   }
@@ -125,7 +125,7 @@ TEST_F(Phantom, AHundredThousandCycles) {
   while (arm()->cycles < begin + 100000) turn();
   EXPECT_EQ(heap.count(), 0);
   EXPECT_GT(reads, 1000u);
-  // A machine that takes the core from us for 10 ms sees the force end, and then return.
+  // A machine that takes the core from us for 3 ms sees the force end, and then return.
   EXPECT_TRUE(wait_until(
       [&] {
         double x_mm = 0.0;
