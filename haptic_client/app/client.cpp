@@ -39,7 +39,9 @@ constexpr auto kJoinPatience = 30s;           // without anything from the room
 constexpr std::size_t kMostFromRoom = 4096;   // events that may wait for the replica; the network waits beyond that
 constexpr std::size_t kTickTimes = 8192;  // ticks whose wake-up time is remembered
 
-std::int64_t ns(Clock::time_point t) { return std::chrono::duration_cast<std::chrono::nanoseconds>(t.time_since_epoch()).count(); }
+std::int64_t ns(Clock::time_point t) {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(t.time_since_epoch()).count();
+}
 
 // What the room sends, on its way to the replica's thread.
 struct Committed {
@@ -105,7 +107,8 @@ class Client {
     outcome_.stopped = stop_.requested() && !session_.done() && !session_.endless();
     if (!outcome_.stopped && replica_.unconfirmed() > 0)
       return failure(ErrorCode::unavailable, "the server has not confirmed the last " + std::to_string(replica_.unconfirmed()) +
-                                                 " cuts within " + std::to_string(kConfirmPatience.count()) + " s; look at the server's log");
+                                                 " cuts within " + std::to_string(kConfirmPatience.count()) +
+                                                 " s; look at the server's log");
     outcome_.coupling_n_per_mm = session_.loop().coupling_n_per_mm();
     outcome_.workspace_scale = session_.loop().mapping().scale();
     outcome_.steps = session_.results();
@@ -132,7 +135,8 @@ class Client {
     info.case_title = room_.bone().info().title;
     info.pitch_mm = room_.bone().pitch_mm();
     info.author = room_.room().author.value;
-    for (const ToolModel& model : session_.plan().tools) info.tools.push_back({model.tool.name, law_name(model), model.tool.diameter_mm});
+    for (const ToolModel& model : session_.plan().tools)
+      info.tools.push_back({model.tool.name, law_name(model), model.tool.diameter_mm});
     return info;
   }
 
@@ -274,7 +278,8 @@ class Client {
     while (session_.loop().take_piece(piece)) {
       const Cut cut = cut_of(piece, session_.loop().tool(piece.tool), room_.room().author, lease_epoch_);
       unsent_.push_back(cut);
-      const std::int64_t closed_ns = tick_times_[static_cast<std::size_t>(piece.closed_tick) % kTickTimes].load(std::memory_order_relaxed);
+      const std::int64_t closed_ns =
+          tick_times_[static_cast<std::size_t>(piece.closed_tick) % kTickTimes].load(std::memory_order_relaxed);
       outcome_.cuts.push_back({piece.author_seq, 0, closed_ns, 0});
       // Sent before it is felt: the room's answer is what takes longest.
       send_waiting();
@@ -418,7 +423,9 @@ class Client {
     }
   }
 
-  [[nodiscard]] const std::string& tool_name(const TickRow& row) const { return tool_names_[static_cast<std::size_t>(row.report.tool)]; }
+  [[nodiscard]] const std::string& tool_name(const TickRow& row) const {
+    return tool_names_[static_cast<std::size_t>(row.report.tool)];
+  }
 
   void note_range(const TickRow& row) {
     if (row.report.out_of_range == 0) return;
@@ -456,8 +463,9 @@ class Client {
     if (live_.refresh()) {
       const TickStats now = live_.value().since(told_);
       told_ = live_.value();
-      std::printf(", loop %.0f us (99 of 100: %.0f), late %.0f us (%.0f), %llu missed", now.work.percentile_us(50), now.work.percentile_us(99),
-                  now.lateness.percentile_us(50), now.lateness.percentile_us(99), static_cast<unsigned long long>(now.missed));
+      std::printf(", loop %.0f us (99 of 100: %.0f), late %.0f us (%.0f), %llu missed", now.work.percentile_us(50),
+                  now.work.percentile_us(99), now.lateness.percentile_us(50), now.lateness.percentile_us(99),
+                  static_cast<unsigned long long>(now.missed));
     }
     std::printf("\n");
     std::fflush(stdout);

@@ -45,6 +45,7 @@ struct ClientOutcome {
 
 // Runs a session to its end and waits until the room has confirmed every cut. Errors: unavailable (the server went away;
 // force and spindle are down by then, or it stopped confirming), internal (the log cannot be written).
-[[nodiscard]] Result<ClientOutcome> run_client(RoomSession& room, Session& session, const ClientOptions& options, const StopSignal& stop);
+[[nodiscard]] Result<ClientOutcome> run_client(RoomSession& room, Session& session, const ClientOptions& options,
+                                               const StopSignal& stop);
 
 }  // namespace osteon::haptic

@@ -36,15 +36,18 @@ std::string list_devices(const std::vector<DeviceLine>& lines) {
 
 int run_devices(int argc, char** argv) {
   DeviceOptions options;
-  CLI::App app("Lists the devices that --device can name, what of them is here, and what is missing.",
-               "osteon-haptic devices");
+  CLI::App app(
+      "Lists the devices that --device can name, what of them is here, and what is missing. Exits with 1 when a file that "
+      "you name cannot be used.",
+      "osteon-haptic devices");
   add_device_options(app, options);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
-  std::fputs(list_devices(look_for_devices(options)).c_str(), stdout);
+  const std::vector<DeviceLine> lines = look_for_devices(options);
+  std::fputs(list_devices(lines).c_str(), stdout);
   std::puts(
       "Joined by \"+\" they work together: one for the hand, then a spacemouse for its rotation, a pedal for the "
       "spindle.");
-  return 0;
+  return std::ranges::any_of(lines, [](const DeviceLine& line) { return line.finding.wrong_file; }) ? 1 : 0;
 }
 
 }  // namespace osteon::haptic

@@ -7,15 +7,22 @@ namespace osteon::haptic {
 Result<HandChoice> HandChoice::make(const HandOptions& options, DeviceNotice notice) {
   HandChoice choice;
   choice.options_ = options;
-  const bool simulated = options.device.starts_with("simulated"), recorded = options.device.starts_with("recorded:");
-  if (simulated) {
-    const Result<SimulatedDeviceParams> device = find_simulated_device(options.device);
-    if (!device) return tl::unexpected(device.error());
-    choice.simulated_ = *device;
+  if (options.device.starts_with("recorded:") && options.device.size() > std::string_view("recorded:").size()) {
+    Result<std::unique_ptr<RecordedDevice>> device =
+        make_recorded_device(options.device.substr(std::string_view("recorded:").size()));
+    if (!device) return failure(device.error().code, "--device: " + device.error().message);
+    choice.recorded_ = std::move(*device);
+    choice.simulated_ = {options.device, choice.recorded_->limits()};
+  } else if (const Result<SimulatedDeviceParams> simulated = find_simulated_device(options.device)) {
+    choice.simulated_ = *simulated;
     if (options.plan.empty())
       return failure(ErrorCode::invalid_input, "--device " + options.device +
                                                    " has a hand of our own making, which needs a --plan; name a device "
                                                    "for your own hand (osteon-haptic devices lists them) or give one");
+  } else {
+    Result<std::unique_ptr<CombinedDevice>> device = make_devices(options.device, options.devices);
+    if (!device) return tl::unexpected(device.error());
+    choice.person_ = std::move(*device);
   }
   if (options.plan.empty() == options.tool.empty())
     return failure(ErrorCode::invalid_input,
@@ -25,30 +32,22 @@ Result<HandChoice> HandChoice::make(const HandOptions& options, DeviceNotice not
   if (!options.plan.empty() && !options.law.empty())
     return failure(ErrorCode::invalid_input, "--law is for a hand without a plan; write \"law\" into the plan's steps");
   if (options.plan.empty()) {
-    if (Result<void> taken = choice.take_person(std::move(notice)); !taken) return tl::unexpected(taken.error());
+    if (Result<void> taken = choice.take_tool(); !taken) return tl::unexpected(taken.error());
+    if (Result<void> connected = choice.connect(notice); !connected) return tl::unexpected(connected.error());
     return choice;
   }
-  if (!simulated && !recorded) {
-    if (const auto known = make_devices(options.device, options.devices); !known) return tl::unexpected(known.error());
+  if (choice.person_)
     return failure(
         ErrorCode::invalid_input,
         "--device " + options.device +
             " is held by a person, who needs no plan; leave out --plan and give --tool, or take --device simulated");
-  }
-  if (recorded) {
-    Result<std::unique_ptr<RecordedDevice>> device =
-        make_recorded_device(options.device.substr(std::string_view("recorded:").size()));
-    if (!device) return tl::unexpected(device.error());
-    choice.recorded_ = std::move(*device);
-    choice.simulated_ = {options.device, choice.recorded_->limits()};
-  }
   Result<std::vector<PlanStep>> plan = read_plan(options.plan);
   if (!plan) return tl::unexpected(plan.error());
   choice.plan_ = std::move(*plan);
   return choice;
 }
 
-Result<void> HandChoice::take_person(DeviceNotice notice) {
+Result<void> HandChoice::take_tool() {
   const Result<Vec3> toward = read_view(options_.view);
   if (!toward) return tl::unexpected(toward.error());
   free_ = {.tool = options_.tool,
@@ -70,9 +69,11 @@ Result<void> HandChoice::take_person(DeviceNotice notice) {
     return failure(law.error().code, "--law: " + law.error().message);
   if (!(options_.wear >= 1.0 && options_.wear <= 5.0))
     return failure(ErrorCode::invalid_input, "--wear must be from 1, sharp, to 5");
-  Result<std::unique_ptr<CombinedDevice>> device = make_devices(options_.device, options_.devices);
-  if (!device) return tl::unexpected(device.error());
-  person_ = std::move(*device);
+  return {};
+}
+
+Result<void> HandChoice::connect(const DeviceNotice& notice) {
+  if (!person_) return {};
   for (const auto& part : person_->parts()) {
     connections_.push_back(std::make_unique<DeviceConnection>(*part, notice));
     if (const Result<void> started = connections_.back()->start(); !started)
@@ -82,14 +83,16 @@ Result<void> HandChoice::take_person(DeviceNotice notice) {
 }
 
 Result<std::unique_ptr<Session>> HandChoice::on(const Case& bone, double force_scale) {
-  if (person_) {
+  // What a hand did against one force it would not have done against another.
+  if (recorded_ && force_scale == 0.0) force_scale = recorded_->session().force_scale;
+  if (options_.plan.empty()) {
     Result<ReadyPlan> ready = make_free_hand(free_, bone);
     if (!ready) return tl::unexpected(ready.error());
-    return std::make_unique<FreeHandSession>(std::move(*ready), *person_, force_scale);
+    HapticDevice& device = person_ ? static_cast<HapticDevice&>(*person_) : *recorded_;
+    return std::make_unique<FreeHandSession>(std::move(*ready), device, force_scale);
   }
   Result<ReadyPlan> ready = make_ready(plan_, bone);
   if (!ready) return failure(ready.error().code, "the plan " + options_.plan.string() + ", " + ready.error().message);
-  if (recorded_ && force_scale == 0.0) force_scale = recorded_->session().force_scale;
   auto session = std::make_unique<SimulatedSession>(std::move(*ready), simulated_, force_scale);
   if (recorded_) session->play(*recorded_);
   return session;

@@ -14,7 +14,7 @@ namespace osteon::haptic {
 struct HandOptions {
   std::string device = "simulated";
   std::filesystem::path plan;     // a simulated hand's, or a recording's
-  std::string tool;               // a person's
+  std::string tool;               // a person's, or of a person's recording
   std::string view = "front", at; // read_view(), read_point(); `at` empty: the bone's middle
   double spindle_rpm = 0;         // 0: the tool's own
   std::string law;                // a person's: force law of the tool; empty: the tool's own
@@ -40,7 +40,10 @@ class HandChoice {
 
  private:
   HandChoice() = default;
-  Result<void> take_person(DeviceNotice notice);
+  // Checks what a hand without a plan was told.
+  Result<void> take_tool();
+  // Opens a person's devices.
+  Result<void> connect(const DeviceNotice& notice);
 
   HandOptions options_;
   std::vector<PlanStep> plan_;

@@ -120,11 +120,16 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string
             {"work_max_us", ticks.work.max_us()}}},
           {"lateness", durations(ticks.lateness)},
           {"work", durations(ticks.work)},
-          {"patches", {{"built", outcome.patches}, {"p50_us", outcome.patch_p50_us}, {"p99_us", outcome.patch_p99_us},
-                       {"uncovered_ticks", outcome.uncovered_ticks}, {"cuts_waiting_ticks", outcome.cuts_waiting_ticks}}},
+          {"patches",
+           {{"built", outcome.patches},
+            {"p50_us", outcome.patch_p50_us},
+            {"p99_us", outcome.patch_p99_us},
+            {"uncovered_ticks", outcome.uncovered_ticks},
+            {"cuts_waiting_ticks", outcome.cuts_waiting_ticks}}},
           {"held_for_room_ticks", outcome.held_for_room_ticks},
           {"rows_dropped", outcome.rows_dropped},
-          {"recording", {{"rows", outcome.recording.rows}, {"dropped", outcome.recording.dropped}, {"trouble", outcome.recording.trouble}}},
+          {"recording",
+           {{"rows", outcome.recording.rows}, {"dropped", outcome.recording.dropped}, {"trouble", outcome.recording.trouble}}},
           {"cuts", outcome.cuts.size()},
           {"rejected", outcome.rejected},
           {"laws_outside_range", outside},
@@ -138,7 +143,9 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string
 // What a person should know of the devices, as it happens.
 void tell(DeviceEvent event, std::string_view device, const std::string& sentence) {
   switch (event) {
-    case DeviceEvent::lost: log::warn("device lost", {{"device", device}, {"because", sentence}, {"force", "none until it is back"}}); break;
+    case DeviceEvent::lost:
+      log::warn("device lost", {{"device", device}, {"because", sentence}, {"force", "none until it is back"}});
+      break;
     case DeviceEvent::back: log::info("device back", {{"device", device}}); break;
     case DeviceEvent::advice: log::warn("device waits", {{"device", device}, {"for", sentence}}); break;
     case DeviceEvent::ready: log::info("device ready", {{"device", device}}); break;
@@ -168,36 +175,54 @@ Result<void> run(Options& options, const StopSignal& stop) {
   if (!outcome) return tl::unexpected(outcome.error());
   if (Result<void> written = write_cut_log(options.cut_log, outcome->cuts); !written) return written;
   if (!options.summary.empty())
-    if (Result<void> written = write_file(options.summary, summary_of(*outcome, (*session)->plan(), hand->device_name(), losses).dump(2) + "\n"); !written) return written;
+    if (Result<void> written =
+            write_file(options.summary, summary_of(*outcome, (*session)->plan(), hand->device_name(), losses).dump(2) + "\n");
+        !written)
+      return written;
   std::printf("%s: %s %zu steps, %zu cuts, %.1f mm3 removed, field %.12s at %llu\n", kProgram,
-              outcome->stopped ? "stopped in" : "done", (*session)->plan().steps.size(), outcome->cuts.size(), outcome->removed_total_mm3,
-              to_hex(outcome->field_hash).c_str(), static_cast<unsigned long long>(outcome->room_seq.value));
+              outcome->stopped ? "stopped in" : "done", (*session)->plan().steps.size(), outcome->cuts.size(),
+              outcome->removed_total_mm3, to_hex(outcome->field_hash).c_str(),
+              static_cast<unsigned long long>(outcome->room_seq.value));
   return {};
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc > 1 && (std::string_view(argv[1]) == "check" || std::string_view(argv[1]) == "--check")) return run_check(argc - 1, argv + 1);
+  if (argc > 1 && (std::string_view(argv[1]) == "check" || std::string_view(argv[1]) == "--check"))
+    return run_check(argc - 1, argv + 1);
   if (argc > 1 && std::string_view(argv[1]) == "laws") return run_laws(argc - 1, argv + 1);
   if (argc > 1 && std::string_view(argv[1]) == "devices") return run_devices(argc - 1, argv + 1);
   Options options;
-  CLI::App app("Feels and cuts the bone of a room at 1 kHz: with your hand at a haptic device, or with a simulated one that carries out a plan. "
-               "Other commands: check, devices, laws (each with --help).", kProgram);
+  CLI::App app(
+      "Feels and cuts the bone of a room at 1 kHz: with your hand at a haptic device, or with a simulated one that carries out a "
+      "plan. "
+      "Other commands: check, devices, laws (each with --help).",
+      kProgram);
   app.add_option("--server", options.room.address, "HOST:PORT of osteon-server")->required();
   app.add_option("--plan", options.hand.plan, "JSON file with the steps of a simulated surgeon");
   app.add_option("--tool", options.hand.tool, "The tool for your own hand, e.g. drill-3.2; no --plan then");
-  app.add_option("--device", options.hand.device, "simulated or simulated-3.3N (a simulated hand, with a --plan), recorded:FILE (a recording, with its --plan), or for your hand "
-                 "one of osteon-haptic devices, others added by \"+\": phantom, falcon+spacemouse+pedal")->capture_default_str();
-  app.add_option("--view", options.hand.view, "Your hand: from where you look, front, back, left, right, top or bottom of the patient, or the direction x,y,z")->capture_default_str();
-  app.add_option("--at", options.hand.at, "Your hand: the place x,y,z in mm over which the tool begins; by default the bone's middle");
+  app.add_option("--device", options.hand.device,
+                 "simulated or simulated-3.3N (a simulated hand, with a --plan), recorded:FILE (a recording, with its --plan or "
+                 "--tool), or for your hand "
+                 "one of osteon-haptic devices, others added by \"+\": phantom, falcon+spacemouse+pedal")
+      ->capture_default_str();
+  app.add_option("--view", options.hand.view,
+                 "Your hand: from where you look, front, back, left, right, top or bottom of the patient, or the direction x,y,z")
+      ->capture_default_str();
+  app.add_option("--at", options.hand.at,
+                 "Your hand: the place x,y,z in mm over which the tool begins; by default the bone's middle");
   app.add_option("--rpm", options.hand.spindle_rpm, "Your hand: the spindle's full speed; by default the tool's own");
-  app.add_option("--law", options.hand.law, "Your hand: the force law by which the tool resists, see osteon-haptic laws; by default the tool's own");
-  app.add_option("--wear", options.hand.wear, "Your hand: how blunt the tool is, from 1, sharp; about 2 is blunt")->capture_default_str();
+  app.add_option("--law", options.hand.law,
+                 "Your hand: the force law by which the tool resists, see osteon-haptic laws; by default the tool's own");
+  app.add_option("--wear", options.hand.wear, "Your hand: how blunt the tool is, from 1, sharp; about 2 is blunt")
+      ->capture_default_str();
   add_device_options(app, options.hand.devices);
-  app.add_option("--scale", options.client.force_scale, "Rendered over physical force; by default the device's continuous force / 30 N");
+  app.add_option("--scale", options.client.force_scale,
+                 "Rendered over physical force; by default the device's continuous force / 30 N");
   app.add_option("--session-log", options.client.session_log, "CSV with a row for each millisecond");
-  app.add_option("--record", options.client.record, "HDF5 file with a row for each millisecond: poses, wrenches, spindle, bone; --device recorded:FILE plays it");
+  app.add_option("--record", options.client.record,
+                 "HDF5 file with a row for each millisecond: poses, wrenches, spindle, bone; --device recorded:FILE plays it");
   app.add_option("--cut-log", options.cut_log, "CSV with a row for each cut");
   app.add_option("--summary", options.summary, "JSON written at the end: steps, forces, loop times, field hash");
   app.add_option("--cache", options.room.cache, "Folder where fetched cases are kept")->capture_default_str();

@@ -152,7 +152,8 @@ PlanStep read_step(const json& object) {
       throw Wrong("\"leave\" must be true or false, and belongs to a drill with a pin and \"to_mm\"");
     step.leave = object.at("leave").get<bool>();
   }
-  if (step.through_guide && object.contains("entry")) throw Wrong("\"entry\" and \"guide\" exclude each other: the guide says where");
+  if (step.through_guide && object.contains("entry"))
+    throw Wrong("\"entry\" and \"guide\" exclude each other: the guide says where");
   if (!step.through_guide) step.entry = read_entry(object);
   return step;
 }

@@ -34,7 +34,8 @@ class FreeHandSession final : public Session {
 
   SessionTick tick(const Patch& patch, bool link_ok, int periods = 1,
                    const std::vector<PlacedGuide>* room_guides = nullptr) noexcept override;
-  [[nodiscard]] bool done() const noexcept override { return false; }
+  // When its device is over; a person goes on until asked to stop.
+  [[nodiscard]] bool done() const noexcept override { return device_.over(); }
   [[nodiscard]] bool endless() const noexcept override { return true; }
   [[nodiscard]] HapticLoop& loop() noexcept override { return loop_; }
   [[nodiscard]] const ReadyPlan& plan() const noexcept override { return plan_; }

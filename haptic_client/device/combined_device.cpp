@@ -21,6 +21,7 @@ Result<std::unique_ptr<CombinedDevice>> CombinedDevice::make(std::vector<std::un
       if (result->pedal_) return wrong("two devices for the spindle; name one pedal");
       result->pedal_ = &part;
     } else if (info.turns && info.force_axes == 0) {
+      if (part.name() == parts[0]->name()) return wrong(std::string(part.name()) + " is named twice; name it once");
       if (result->turning_) return wrong("two devices for the rotation; name one");
       result->turning_ = &part;
     } else {

@@ -19,6 +19,7 @@ class CombinedDevice final : public HapticDevice {
   [[nodiscard]] DeviceInfo info() const override;
   // Neither the hand nor its rotation may be missing; without its pedal the spindle only stands still.
   [[nodiscard]] DeviceReading read() noexcept override;
+  [[nodiscard]] bool over() const noexcept override { return parts_[0]->over(); }
   // A torque belongs to the handle that turns: it is shown only where one device does both.
   void write(const DeviceOutput& output) noexcept override;
 

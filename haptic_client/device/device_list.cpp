@@ -34,7 +34,7 @@ Made make_numbered_force_dimension(const std::string& argument, const DeviceOpti
 }
 
 Made make_recorded(const std::string& argument, const DeviceOptions&) {
-  if (argument.empty()) return failure(ErrorCode::invalid_input, "--device recorded needs a file: recorded:FILE");
+  if (argument.empty()) return failure(ErrorCode::invalid_input, "--device recorded: it needs a file; name it, recorded:FILE");
   Result<std::unique_ptr<RecordedDevice>> device = make_recorded_device(argument);
   if (!device) return tl::unexpected(device.error());
   return Made(std::move(*device));
@@ -54,21 +54,22 @@ constexpr std::array<Kind, 7> kKinds{{
      [](const std::string&, const DeviceOptions& options) -> Made {
        return make_falcon({.firmware = options.falcon_firmware});
      },
-     [](const DeviceOptions&) { return look_for_falcon(); }},
+     [](const DeviceOptions& options) { return look_for_falcon({.firmware = options.falcon_firmware}); }},
     {"spacemouse", "SpaceMouse: six degrees of freedom without force, or the rotation for another", "",
      [](const std::string&, const DeviceOptions&) -> Made { return make_space_mouse(); },
      [](const DeviceOptions&) { return look_for_space_mouse(); }},
     {"pedal", "foot pedal, a switch for the spindle", "",
      [](const std::string&, const DeviceOptions&) -> Made { return make_foot_pedal(); },
-     [](const DeviceOptions&) { return look_for_foot_pedals(); }},
+     [](const DeviceOptions&) { return look_for_foot_pedals(false); }},
     {"pedal-axis", "a joystick's axis as a proportional pedal for the spindle", "",
      [](const std::string&, const DeviceOptions&) -> Made {
        FootPedalOptions pedal;
        pedal.proportional = true;
        return make_foot_pedal(pedal);
      },
-     nullptr},
-    {"recorded", "a recording, played again", "FILE", make_recorded, nullptr},
+     [](const DeviceOptions&) { return look_for_foot_pedals(true); }},
+    {"recorded", "a recording that --record wrote, played again: recorded:FILE", "FILE", make_recorded,
+     [](const DeviceOptions&) { return DeviceFinding{{"always there"}, ""}; }},
 }};
 
 std::string all_names() {
@@ -78,10 +79,14 @@ std::string all_names() {
   return names;
 }
 
-Made make_one(std::string_view text, const DeviceOptions& options) {
+// `text`: one of the names that were joined in `whole`.
+Made make_one(std::string_view text, std::string_view whole, const DeviceOptions& options) {
   const std::size_t colon = text.find(':');
   const std::string_view name = text.substr(0, colon);
   const std::string argument(colon == std::string_view::npos ? std::string_view{} : text.substr(colon + 1));
+  const std::string told = "--device " + std::string(whole) + ": ";
+  if (name == "recorded" && text != whole)
+    return failure(ErrorCode::invalid_input, told + "a recording is played alone; name nothing beside it");
   for (const Kind& kind : kKinds) {
     if (kind.name != name) continue;
     if (kind.argument.empty() && colon != std::string_view::npos)
@@ -89,8 +94,11 @@ Made make_one(std::string_view text, const DeviceOptions& options) {
                                                    std::string(name) + "; leave out the colon");
     return kind.make(argument, options);
   }
-  return failure(ErrorCode::not_found,
-                 "there is no device \"" + std::string(name) + "\"; choose among " + all_names() + ", joined by \"+\"");
+  if (find_simulated_device(name))
+    return failure(ErrorCode::invalid_input,
+                   told + std::string(name) + " has a hand of our own making; name it alone, with a --plan");
+  const std::string what = name.empty() ? "a name is missing" : "there is no device \"" + std::string(name) + '"';
+  return failure(ErrorCode::not_found, told + what + "; choose among " + all_names() + ", joined by \"+\"");
 }
 
 }  // namespace
@@ -98,10 +106,11 @@ Made make_one(std::string_view text, const DeviceOptions& options) {
 Result<std::unique_ptr<CombinedDevice>> make_devices(std::string_view names, const DeviceOptions& options) {
   std::vector<std::unique_ptr<HapticDevice>> parts;
   // A recording's path may hold any letter, so it stands alone.
+  const std::string_view whole = names;
   const bool alone = names.starts_with("recorded:");
   while (true) {
     const std::size_t plus = alone ? std::string_view::npos : names.find('+');
-    Made part = make_one(names.substr(0, plus), options);
+    Made part = make_one(names.substr(0, plus), whole, options);
     if (!part) return tl::unexpected(part.error());
     parts.push_back(std::move(*part));
     if (plus == std::string_view::npos) break;
@@ -117,7 +126,7 @@ std::vector<DeviceLine> look_for_devices(const DeviceOptions& options) {
                    {{"always there"}, ""}});
   lines.push_back({"simulated-3.3N", "the same at a desktop device's force", {{"always there"}, ""}});
   for (const Kind& kind : kKinds)
-    if (kind.look) lines.push_back({kind.name, kind.what, kind.look(options)});
+    lines.push_back({kind.name, kind.what, kind.look(options)});
   return lines;
 }
 

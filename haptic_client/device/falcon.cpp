@@ -171,20 +171,30 @@ class Falcon final : public HapticDevice {
 }  // namespace
 
 std::unique_ptr<HapticDevice> make_falcon(FalconOptions options) { return std::make_unique<Falcon>(std::move(options)); }
-DeviceFinding look_for_falcon() { return FalconUsb::look(); }
+
+DeviceFinding look_for_falcon(const FalconOptions& options) {
+  DeviceFinding finding = FalconUsb::look();
+  if (options.firmware.empty()) return finding;
+  if (const auto image = read_falcon_firmware(options.firmware); !image) {
+    finding.missing += (finding.missing.empty() ? "" : "; ") + image.error().message;
+    finding.wrong_file = true;
+  }
+  return finding;
+}
 
 Result<std::vector<std::uint8_t>> read_falcon_firmware(const std::filesystem::path& file) {
   const std::string named = "the Falcon's firmware " + file.string();
   std::error_code error;
   const auto status = std::filesystem::status(file, error);
-  if (!std::filesystem::exists(status)) return failure(ErrorCode::not_found, named + " is not there; name a file that is");
+  if (!std::filesystem::exists(status))
+    return failure(ErrorCode::not_found, named + " is not there; correct the path of --falcon-firmware");
   if (!std::filesystem::is_regular_file(status))
-    return failure(ErrorCode::invalid_input, named + " is not a file; name the image itself");
+    return failure(ErrorCode::invalid_input, named + " is not a file; name the image itself with --falcon-firmware");
   const std::uintmax_t size = std::filesystem::file_size(file, error);
   if (error || size == 0 || size > kLargestImage)
     return failure(ErrorCode::invalid_input,
                    named + " has " + (error ? std::string("an unknown number of") : std::to_string(size)) +
-                       " bytes, which no image of it has; name the image that belongs to the device");
+                       " bytes, which no image of it has; name the image that belongs to the device with --falcon-firmware");
   std::vector<std::uint8_t> image(static_cast<std::size_t>(size));
   std::ifstream in(file, std::ios::binary);
   if (!in.read(reinterpret_cast<char*>(image.data()), static_cast<std::streamsize>(image.size())))

@@ -21,7 +21,8 @@ struct FalconOptions {
 // Limits: 8 N, 3 N/mm, 40 mm; continuous is what the motors' range gives in every direction at every place of that
 // workspace [A: how warm they get is not known].
 [[nodiscard]] std::unique_ptr<HapticDevice> make_falcon(FalconOptions options);
-[[nodiscard]] DeviceFinding look_for_falcon();
+// Opens nothing, but reads the firmware where a file is named.
+[[nodiscard]] DeviceFinding look_for_falcon(const FalconOptions& options = {});
 
 // The image that the boot loader takes. Errors: not_found, invalid_input; each names the file.
 [[nodiscard]] Result<std::vector<std::uint8_t>> read_falcon_firmware(const std::filesystem::path& file);

@@ -134,12 +134,11 @@ void PedalAxis::take(double share) noexcept {
 
 std::unique_ptr<HapticDevice> make_foot_pedal(const FootPedalOptions& options) { return std::make_unique<FootPedal>(options); }
 
-DeviceFinding look_for_foot_pedals() {
+DeviceFinding look_for_foot_pedals(bool proportional) {
   DeviceFinding finding;
-  for (const HidFound& device : list_hid_devices()) {
-    if (is_switch(device)) finding.found.push_back(described(device, "foot pedal"));
-    if (is_joystick(device)) finding.found.push_back(described(device, "joystick, for pedal-axis"));
-  }
+  for (const HidFound& device : list_hid_devices())
+    if (proportional ? is_joystick(device) : is_switch(device))
+      finding.found.push_back(described(device, proportional ? "joystick" : "foot pedal"));
   return finding;
 }
 

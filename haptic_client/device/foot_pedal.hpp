@@ -43,7 +43,7 @@ struct FootPedalOptions {
 
 // As a device it only reads a spindle: no place, no force.
 [[nodiscard]] std::unique_ptr<HapticDevice> make_foot_pedal(const FootPedalOptions& options = {});
-// Both kinds.
-[[nodiscard]] DeviceFinding look_for_foot_pedals();
+// Of one kind: switches, or joysticks whose axis could be a pedal.
+[[nodiscard]] DeviceFinding look_for_foot_pedals(bool proportional = false);
 
 }  // namespace osteon::haptic

@@ -342,6 +342,7 @@ DeviceFinding look_for_force_dimension(const ForceDimensionOptions& options) {
   const Result<const Library*> library = load(options.library);
   if (!library) {
     finding.missing = library.error().message;
+    finding.wrong_file = !options.library.empty();
     return finding;
   }
   const dhd::Api& call = (*library)->call;

@@ -104,6 +104,8 @@ class HapticDevice {
 
   // [haptic]
   [[nodiscard]] virtual DeviceReading read() noexcept = 0;
+  // [haptic] It has given its last reading for good, as a recording does at its end.
+  [[nodiscard]] virtual bool over() const noexcept { return false; }
   // [haptic] Never more than the device's limits reaches the motors.
   virtual void write(const DeviceOutput& output) noexcept = 0;
 };
@@ -112,6 +114,7 @@ class HapticDevice {
 struct DeviceFinding {
   std::vector<std::string> found;  // one line for each device that is there, e.g. "Phantom Omni, serial 50415500155"
   std::string missing;             // a sentence: what is not there or does not work, and the remedy; empty: nothing
+  bool wrong_file = false;         // a file that the user named for it cannot be used; `missing` tells why
 };
 
 // Within `most`, same direction.

@@ -411,6 +411,7 @@ DeviceFinding look_for_openhaptics(const OpenHapticsOptions& options) {
   const Result<const Library*> library = load(options.library);
   if (!library) {
     finding.missing = library.error().message;
+    finding.wrong_file = !options.library.empty();
     return finding;
   }
   if (in_use.exchange(true)) {

@@ -38,8 +38,7 @@ class RecordedDevice final : public HapticDevice {
   void write(const DeviceOutput&) noexcept override {}
 
   [[nodiscard]] const RecordedSession& session() const { return session_; }
-  // [haptic]
-  [[nodiscard]] bool over() const noexcept { return next_ >= session_.readings.size(); }
+  [[nodiscard]] bool over() const noexcept override { return next_ >= session_.readings.size(); }
 
  private:
   std::string name_;

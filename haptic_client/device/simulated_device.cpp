@@ -4,7 +4,8 @@ namespace osteon::haptic {
 
 Result<SimulatedDeviceParams> find_simulated_device(std::string_view name) {
   // Force, stiffness and workspace of a PHANToM Omni, as its vendor gives them; its motors are taken never to be warm.
-  static const SimulatedDeviceParams kDevices[] = {{}, {"simulated-3.3N", {.peak_n = 3.3, .continuous_n = 3.3, .stiffness_n_per_mm = 0.7, .workspace_radius_mm = 100.0}}};
+  static const SimulatedDeviceParams kDevices[] = {
+      {}, {"simulated-3.3N", {.peak_n = 3.3, .continuous_n = 3.3, .stiffness_n_per_mm = 0.7, .workspace_radius_mm = 100.0}}};
   std::string names;
   for (const SimulatedDeviceParams& device : kDevices) {
     if (device.name == name) return device;
@@ -15,7 +16,9 @@ Result<SimulatedDeviceParams> find_simulated_device(std::string_view name) {
 
 SimulatedDevice::SimulatedDevice(const SimulatedDeviceParams& params) : params_(params), hand_(HandParams{}, Vec3::Zero()) {}
 
-DeviceReading SimulatedDevice::read() noexcept { return {.pose_device_tool = {hand_.position_mm(), rotation_}, .buttons = buttons_}; }
+DeviceReading SimulatedDevice::read() noexcept {
+  return {.pose_device_tool = {hand_.position_mm(), rotation_}, .buttons = buttons_};
+}
 
 void SimulatedDevice::write(const DeviceOutput& output) noexcept {
   force_n_ = clamped(output.force_n, params_.limits.peak_n);  // a real amplifier saturates too

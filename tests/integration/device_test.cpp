@@ -156,6 +156,28 @@ TEST_F(PhantomInRoom, WaitsForItsUserWhereItMustBeCalibrated) {
   EXPECT_EQ(arm_->unsafe_forces, 0u);
 }
 
+// The recording of a hand moves the tool again, with the force scale it was made with, and the session ends with it.
+TEST_F(PhantomInRoom, AHandsRecordingIsPlayedWithItsForceScale) {
+  const Stage stage(16.0);
+  Process haptic = start(stage, {"--scale", "0.07", "--record", stage / "hand.h5"});
+  ASSERT_TRUE(haptic.wait_for_out("free_hand", kPatience)) << haptic.err();
+  move_hand(0, 0, -13, 15.0);
+  ASSERT_TRUE(wait_until([&] { return arm_.force_n() > 0.1; }, 10s)) << haptic.out();
+  ASSERT_EQ(haptic.terminate(), 0) << haptic.err();
+  EXPECT_EQ(read_json(stage / "hand.json")["force_scale"], 0.07);
+
+  const std::string recording = "recorded:" + (stage / "hand.h5").string();
+  Process again = stage.start("osteon-haptic", {"--server", stage.address(), "--device", recording, "--tool", "drill-3.2",
+                                                "--view", "top", "--at", "2,-3,0", "--summary", stage / "again.json",
+                                                "--cache", stage / "cache"});
+  ASSERT_EQ(again.wait(kPatience), 0) << again.err();
+  const auto summary = read_json(stage / "again.json");
+  EXPECT_EQ(summary["device"], recording);
+  EXPECT_EQ(summary["force_scale"], 0.07);
+  EXPECT_EQ(summary["device_limits"]["continuous_n"], Arm::kContinuous_n);
+  EXPECT_GT(summary["steps"][0]["peak_force_n"].get<double>(), 1.0);
+}
+
 TEST_F(PhantomInRoom, WhatIsWrongIsSaidBeforeAServerIsLookedFor) {
   const auto said = [&](std::vector<std::string> more) {
     std::vector<std::string> all{"--server", "127.0.0.1:1", "--patience", "0"};
@@ -171,6 +193,11 @@ TEST_F(PhantomInRoom, WhatIsWrongIsSaidBeforeAServerIsLookedFor) {
   EXPECT_THAT(said({"--device", "phantom", "--tool", "drill-3.2", "--view", "above"}), HasSubstr("--view must be"));
   EXPECT_THAT(said({"--device", "phantom", "--tool", "drill-3.2", "--at", "here"}), HasSubstr("--at"));
   EXPECT_THAT(said({"--device", "phantom+phantom", "--tool", "drill-3.2"}), HasSubstr("cannot be added"));
+  EXPECT_THAT(said({"--device", "simulated+pedal", "--tool", "drill-3.2"}), HasSubstr("name it alone"));
+  EXPECT_THAT(said({"--device", "fantom"}), HasSubstr("there is no device \"fantom\""));
+  EXPECT_THAT(said({"--device", "recorded:/nowhere.h5", "--tool", "drill-3.2"}), HasSubstr("/nowhere.h5"));
+  EXPECT_THAT(said({"--device", "falcon", "--falcon-firmware", "/nowhere.bin", "--tool", "drill-3.2"}),
+              HasSubstr("/nowhere.bin is not there; correct the path of --falcon-firmware"));
   EXPECT_THAT(said({"--device", "phantom", "--tool", "drill-3.2"}), HasSubstr("install the vendor's OpenHaptics"));
   EXPECT_THAT(said({"--device", "phantom", "--libhd", OSTEON_STAND_IN_DHD, "--tool", "drill-3.2"}),
               HasSubstr("hdInitDevice"));
@@ -192,7 +219,11 @@ TEST_F(PhantomInRoom, DevicesAreListedWithWhatIsMissing) {
   EXPECT_EQ(list.exit_code, 0);
   EXPECT_THAT(list.out, HasSubstr("not here: OpenHaptics (libHD.so) is not installed"));
   EXPECT_THAT(list.out, HasSubstr("not here: Force Dimension's libdhd is not installed"));
-  for (const char* name : {"simulated", "falcon", "spacemouse", "pedal"}) EXPECT_THAT(list.out, HasSubstr(name));
+  for (const char* name : {"simulated", "falcon", "spacemouse", "pedal ", "pedal-axis", "recorded"})
+    EXPECT_THAT(list.out, HasSubstr(name));
+  list = run(program("osteon-haptic"), {"devices", "--libhd", "/nowhere/libHD.so"});
+  EXPECT_EQ(list.exit_code, 1);
+  EXPECT_THAT(list.out, HasSubstr("there is no file /nowhere/libHD.so"));
   EXPECT_EQ(arm_->opened, arm_->closed);
 }
 

@@ -27,18 +27,40 @@ TEST(DeviceExchange, IsAbsentUntilSomethingWasRead) {
 
 TEST(DeviceExchange, AForceLastsAsLongAsItIsWritten) {
   DeviceExchange exchange;
-  Time now{std::chrono::hours(1)};
-  exchange.write({Vec3(1, 2, 3)});
-  EXPECT_EQ(exchange.demanded(now).force_n, Vec3(1, 2, 3));
-  EXPECT_EQ(exchange.demanded(now + 9ms).force_n, Vec3(1, 2, 3));
-  EXPECT_EQ(exchange.demanded(now + 10ms).force_n, Vec3(0, 0, 0));
-  EXPECT_EQ(exchange.demanded(now + 11ms).force_n, Vec3(0, 0, 0));
-  exchange.write({Vec3(4, 0, 0)});
-  EXPECT_EQ(exchange.demanded(now + 12ms).force_n, Vec3(4, 0, 0));
+  const Time start{std::chrono::hours(1)};
+  exchange.write({Vec3(1, 2, 3)}, start);
+  EXPECT_EQ(exchange.demanded(start).force_n, Vec3(1, 2, 3));
+  EXPECT_EQ(exchange.demanded(start + 2999us).force_n, Vec3(1, 2, 3));
+  EXPECT_EQ(exchange.demanded(start + 3ms).force_n, Vec3(0, 0, 0));
+  EXPECT_EQ(exchange.demanded(start + 1h).force_n, Vec3(0, 0, 0));
+  exchange.write({Vec3(4, 0, 0)}, start + 10ms);
+  EXPECT_EQ(exchange.demanded(start + 11ms).force_n, Vec3(4, 0, 0));
+  // A force that the device's thread sees late is as old as it is.
+  exchange.write({Vec3(6, 0, 0)}, start + 20ms);
+  EXPECT_EQ(exchange.demanded(start + 23ms).force_n, Vec3(0, 0, 0));
   // What was written before a device was opened again is not shown.
-  exchange.write({Vec3(5, 0, 0)});
+  exchange.write({Vec3(5, 0, 0)}, start + 30ms);
   exchange.forget_output();
-  EXPECT_EQ(exchange.demanded(now + 13ms).force_n, Vec3(0, 0, 0));
+  EXPECT_EQ(exchange.demanded(start + 30ms).force_n, Vec3(0, 0, 0));
+}
+
+// Haptic thread and device at 1 kHz, their ticks apart by any part of one: the last force lasts through two missed ticks
+// and ends with the third. A tick that is late, but not by three, interrupts nothing.
+TEST(DeviceExchange, TheForceIsZeroAfterThreeMissedTicks) {
+  constexpr int kLastTick = 20;
+  for (const auto phase : {1us, 250us, 500us, 750us, 999us}) {
+    for (const int pause : {1, 2, 3}) {
+      DeviceExchange exchange;
+      const Time start{std::chrono::hours(1)};
+      for (int ms = 0; ms <= kLastTick + 6; ++ms) {
+        if (ms <= kLastTick && (kLastTick - ms) % pause == 0) exchange.write({Vec3(0, 0, 2)}, start + ms * 1ms);
+        const bool begun = ms >= kLastTick % pause;
+        const int missed = std::max(0, ms - kLastTick);
+        const Vec3 shown = exchange.demanded(start + ms * 1ms + phase).force_n;
+        EXPECT_EQ(shown.z(), begun && missed < 3 ? 2.0 : 0.0) << "phase " << phase.count() << " us, tick " << ms;
+      }
+    }
+  }
 }
 
 TEST(DeviceExchange, ASilentDeviceIsNotTrusted) {
@@ -233,12 +255,37 @@ TEST(DeviceList, NamesArePutTogetherOrRefusedWithTheRemedy) {
   };
   EXPECT_NE(message("fantom").find("choose among"), std::string::npos);
   EXPECT_NE(message("").find("choose among"), std::string::npos);
-  EXPECT_NE(message("phantom+").find("choose among"), std::string::npos);
+  EXPECT_NE(message("phantom+").find("--device phantom+: a name is missing"), std::string::npos);
+  EXPECT_NE(message("phantom+simulated").find("simulated has a hand of our own making; name it alone"), std::string::npos);
+  EXPECT_NE(message("spacemouse+spacemouse").find("spacemouse is named twice"), std::string::npos);
+  EXPECT_NE(message("falcon+spacemouse+spacemouse").find("two devices for the rotation"), std::string::npos);
+  for (const char* nothing : {"recorded", "recorded:"})
+    EXPECT_NE(message(nothing).find("it needs a file; name it, recorded:FILE"), std::string::npos) << nothing;
+  EXPECT_NE(message("falcon+recorded:/nowhere.h5").find("a recording is played alone"), std::string::npos);
+  EXPECT_NE(message("recorded:/nowhere.h5+pedal").find("there is no file /nowhere.h5+pedal"), std::string::npos);
   EXPECT_NE(message("pedal").find("first device must be one for the hand"), std::string::npos);
   EXPECT_NE(message("phantom+falcon").find("cannot be added"), std::string::npos);
   EXPECT_NE(message("phantom+pedal+pedal-axis").find("two devices for the spindle"), std::string::npos);
   EXPECT_NE(message("falcon:1").find("leave out the colon"), std::string::npos);
   EXPECT_NE(message("force-dimension:x").find("0 to 15"), std::string::npos);
+}
+
+// The list names all that --device takes, and tells of a file that the user named whether it can be used.
+TEST(DeviceList, ShowsEveryKindAndWhatIsWrongWithTheFilesOfTheUser) {
+  const DeviceOptions wrong{
+      .libhd = "/nowhere/libHD.so", .libdhd = "/nowhere/libdhd.so", .falcon_firmware = "/nowhere/falcon.bin"};
+  std::vector<std::string_view> names;
+  for (const DeviceLine& line : look_for_devices({})) {
+    names.push_back(line.name);
+    EXPECT_FALSE(line.finding.wrong_file) << line.name;
+  }
+  EXPECT_EQ(names, (std::vector<std::string_view>{"simulated", "simulated-3.3N", "phantom", "force-dimension", "falcon",
+                                                  "spacemouse", "pedal", "pedal-axis", "recorded"}));
+  for (const DeviceLine& line : look_for_devices(wrong)) {
+    const bool has_file = line.name == "phantom" || line.name == "force-dimension" || line.name == "falcon";
+    EXPECT_EQ(line.finding.wrong_file, has_file) << line.name;
+    if (has_file) EXPECT_NE(line.finding.missing.find("/nowhere/"), std::string::npos) << line.name;
+  }
 }
 
 TEST(DynamicLibrary, TellsMissingFromWrong) {

@@ -34,7 +34,7 @@ std::string why(const Result<void>& result) { return result ? "" : result.error(
 
 TEST_F(HidOnUsb, NothingIsThere) {
   EXPECT_TRUE(look_for_space_mouse().found.empty());
-  EXPECT_TRUE(look_for_foot_pedals().found.empty());
+  for (const bool proportional : {false, true}) EXPECT_TRUE(look_for_foot_pedals(proportional).found.empty());
   for (const auto& device : {make_space_mouse(), make_foot_pedal(), make_foot_pedal({.proportional = true})}) {
     const Result<void> opened = device->open();
     ASSERT_FALSE(opened);
@@ -130,6 +130,7 @@ TEST_F(HidOnUsb, ACameraFollowsWhicheverCapIsThere) {
 TEST_F(HidOnUsb, ASwitchTurnsTheSpindle) {
   usb_.command("plug switch");
   ASSERT_EQ(look_for_foot_pedals().found, std::vector<std::string>{"VEC Footpedal (foot pedal), /dev/hidraw0"});
+  EXPECT_TRUE(look_for_foot_pedals(true).found.empty());
   const auto pedal = make_foot_pedal({.switches = 2});
   ASSERT_EQ(why(pedal->open()), "");
   EXPECT_TRUE(pedal->info().pedals);
@@ -142,7 +143,8 @@ TEST_F(HidOnUsb, ASwitchTurnsTheSpindle) {
 
 TEST_F(HidOnUsb, AJoysticksAxisTurnsItAsFastAsItIsDown) {
   usb_.command("plug joystick");
-  ASSERT_EQ(look_for_foot_pedals().found, std::vector<std::string>{"Emulated Pedals (joystick, for pedal-axis), /dev/hidraw0"});
+  ASSERT_EQ(look_for_foot_pedals(true).found, std::vector<std::string>{"Emulated Pedals (joystick), /dev/hidraw0"});
+  EXPECT_TRUE(look_for_foot_pedals(false).found.empty());
   const auto pedal = make_foot_pedal({.proportional = true, .axis = {.play = 0.0}});
   ASSERT_EQ(why(pedal->open()), "");
   usb_.report("joystick", {0, 0, 0xff, 0x03});  // down already
