@@ -17,6 +17,8 @@ struct ArmControl {
   std::atomic<int> plugged{1};
   std::atomic<int> fast{0};               // cycles follow each other without sleep
   std::atomic<int> stalled{0};            // no cycles at all, as when the vendor's thread hangs
+  // No cycle begins once so many are done: time stands still. (Of libdhd's stand-in.)
+  std::atomic<std::uint64_t> until{~std::uint64_t{0}};
   std::atomic<int> next_error{0};         // raised once by the next cycle
   std::atomic<int> error_cycles{0};       // for so many cycles `lasting_error` is raised
   std::atomic<int> lasting_error{0};

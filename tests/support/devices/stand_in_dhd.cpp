@@ -122,6 +122,8 @@ bool dhdHasActiveWrist(char id) { return answers(id) && world().control->output_
 
 int dhdGetPosition(double* x, double* y, double* z, char id) {
   if (!answers(id)) return -1;
+  // The first call of each cycle.
+  while (world().control->cycles >= world().control->until) std::this_thread::sleep_for(std::chrono::microseconds(20));
   const auto& p = world().arm.position_mm();
   *x = 1e-3 * p[2];
   *y = 1e-3 * p[0];

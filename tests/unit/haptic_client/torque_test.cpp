@@ -1,0 +1,269 @@
+// Torque from the bone to the hand, the whole way: a drill whose shank leans on a wall, led by the handle of a device with
+// six degrees of freedom. What holds its turn back is known in closed form: the wall's push, times its arm from the tip.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "common/core/check.hpp"
+#include "haptic_client/control/free_hand.hpp"
+#include "haptic_client/control/patch_builder.hpp"
+#include "haptic_client/device/force_dimension.hpp"
+#include "tests/support/scenes/bones.hpp"
+#include "tests/unit/haptic_client/devices.hpp"
+
+namespace osteon::haptic::test {
+namespace {
+
+constexpr double kReach_mm = 80.0, kRadius_mm = 1.6;  // of drill-3.2 and its shank
+// The points of the shank lie a ring apart from each other along it.
+constexpr double kRing_mm = 1.2;
+
+double dense(const Vec3&) { return 1.9; }
+
+// Bone where x < 0.
+Case wall() {
+  return osteon::test::make_bone(
+      {Vec3(-8, -10, -95), Vec3(4, 10, 12)}, 0.5, [](const Vec3& p) { return p.x(); }, dense);
+}
+
+// The handle's rotation with which the tool stands up along the wall, +z out of its tip, its other end leaning towards
+// the wall by this angle. The user looks at the wall: device x, y, z are the bone's y, z, x.
+Eigen::Quaterniond leaning(double angle_rad) {
+  return Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad - 0.5 * std::numbers::pi, Vec3::UnitX()));
+}
+
+// A hand at a device before a bone, with the patches that its thread would build.
+class Before {
+ public:
+  Before(Case bone, const Vec3& at_mm, const Vec3& toward, HapticDevice& device)
+      : bone_(std::move(bone)), field_(bone_, BodyId{}) {
+    Result<ReadyPlan> plan = make_free_hand({.tool = "drill-3.2", .toward = toward, .at_mm = at_mm}, bone_);
+    OSTEON_CHECK(plan.has_value());
+    session_ = std::make_unique<FreeHandSession>(std::move(*plan), device, 0.0);
+  }
+  const LoopReport& tick() {
+    if (taken_ && ticks_++ % 12 == 0) builder_.build(field_, session_->loop().tool(0), last_.report.pose_bone_proxy, patch_);
+    last_ = session_->tick(patch_, true);
+    taken_ |= last_.order.take_up;
+    return last_.report;
+  }
+  void wait(int ticks) {
+    for (int i = 0; i < ticks; ++i) tick();
+  }
+  [[nodiscard]] const LoopReport& report() const { return last_.report; }
+  [[nodiscard]] double force_scale() const { return session_->loop().params().force_scale; }
+  [[nodiscard]] double workspace_scale() const { return session_->loop().mapping().scale(); }
+  [[nodiscard]] double coupling_n_per_mm() const { return session_->loop().coupling_n_per_mm(); }
+  // How far the hand has the tip past the place where the shank's end touches the wall.
+  [[nodiscard]] double beyond_mm() const {
+    const Pose& pose = report().pose_bone_device;
+    const double lean = std::asin(pose.direction(Vec3::UnitZ()).x());
+    return kReach_mm * std::sin(lean) + kRadius_mm * std::cos(lean) - pose.position_mm.x() - report().offset_mm.x();
+  }
+  // The wall's push times its arm from the tip: it acts on the rim of the shank's end, at right angles to the wall.
+  [[nodiscard]] Vec3 arm_times_force() const {
+    const Vec3 axis = report().pose_bone_proxy.direction(Vec3::UnitZ());
+    const Vec3 to_rim = (axis.x() * axis - Vec3::UnitX()).normalized();
+    return (kRadius_mm * to_rim - kReach_mm * axis).cross(report().force_physical_n);
+  }
+
+ private:
+  Case bone_;
+  CutField field_;
+  std::unique_ptr<FreeHandSession> session_;
+  PatchBuilder builder_;
+  Patch patch_;
+  SessionTick last_;
+  int ticks_ = 0;
+  bool taken_ = false;
+};
+
+// As the stand-in for an omega.7 or sigma.7 has them.
+const DeviceLimits kSixAxes{.peak_n = 12,
+                            .continuous_n = 4,
+                            .stiffness_n_per_mm = 4,
+                            .workspace_radius_mm = 90,
+                            .damping_n_s_per_mm = 0,
+                            .peak_nmm = 200,
+                            .continuous_nmm = 200};
+
+// A handle that the test moves.
+class Handle final : public HapticDevice {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "handle"; }
+  [[nodiscard]] DeviceLimits limits() const override { return limits_are; }
+  [[nodiscard]] DeviceReading read() noexcept override { return reading; }
+  void write(const DeviceOutput& output) noexcept override { written = output; }
+
+  DeviceLimits limits_are = kSixAxes;
+  DeviceReading reading;
+  DeviceOutput written;
+};
+
+// Leans towards the wall in the air, and is pressed on until its tip would be so far beyond where its end touches.
+void press(Before& wall, Handle& handle, double lean_rad, double beyond_mm) {
+  handle.reading.pose_device_tool = {Vec3::Zero(), leaning(lean_rad)};
+  wall.wait(400);  // all of the force is shown by then
+  const double way_mm = (beyond_mm - wall.beyond_mm()) / wall.workspace_scale();
+  constexpr int kTicks = 600;
+  for (int i = 1; i <= kTicks; ++i) {
+    handle.reading.pose_device_tool.position_mm.z() = -way_mm * i / kTicks;
+    wall.tick();
+  }
+  wall.wait(600);
+}
+
+// Two springs in a row bear the push at the end of the shank: the tip's, and the turn's on its arm.
+double push_n(const Before& wall) {
+  const double arm = kReach_mm / Proxy::kTurnArm_mm;
+  return wall.coupling_n_per_mm() * wall.beyond_mm() / (1.0 + arm * arm);
+}
+
+TEST(TorqueOnTheHand, IsTheWallsPushTimesItsArm) {
+  for (const double beyond_mm : {1.0, 3.0}) {
+    Handle handle;
+    Before side(wall(), {0, 0, 0}, {-1, 0, 0}, handle);
+    press(side, handle, 0.06, beyond_mm);
+    EXPECT_NEAR(side.beyond_mm(), beyond_mm, 1e-9);
+    const LoopReport& report = side.report();
+    const Vec3 &force_n = report.force_physical_n, &torque_nmm = report.torque_physical_nmm;
+    std::printf("  simulated: %.2f N (closed form %.2f) at the end of %.0f mm, torque %.1f N mm (%.1f), on the device %.1f\n",
+                force_n.norm(), push_n(side), kReach_mm, torque_nmm.norm(), side.arm_times_force().norm(),
+                handle.written.torque_nmm.norm());
+    EXPECT_GT(force_n.x(), 0.999 * force_n.norm());  // the wall is smooth
+    EXPECT_NEAR((torque_nmm - side.arm_times_force()).norm(), 0.0, kRing_mm * force_n.norm());
+    // Points lie within the tool by half a patch pitch and a quantum, a hundredth of a millimetre.
+    EXPECT_NEAR(force_n.norm(), push_n(side), push_n(side) * (0.02 + 0.07 / beyond_mm));
+    // On the device scaled as the force is, in its own frame.
+    EXPECT_NEAR(side.force_scale(), 4.0 / 30.0, 1e-12);
+    const Vec3 in_device_nmm(torque_nmm.y(), torque_nmm.z(), torque_nmm.x());
+    EXPECT_NEAR((handle.written.torque_nmm - 4.0 / 30.0 * in_device_nmm).norm(), 0.0, 1e-9);
+    EXPECT_LT(handle.written.torque_nmm.x(), 0.0);  // it leans about +x, and is turned back
+  }
+}
+
+TEST(TorqueOnTheHand, IsWithinTheDevicesLimit) {
+  Handle handle;
+  Before side(wall(), {0, 0, 0}, {-1, 0, 0}, handle);
+  press(side, handle, 0.1, 7.5);
+  EXPECT_GT(4.0 / 30.0 * side.report().torque_physical_nmm.norm(), 220.0);
+  EXPECT_NEAR(handle.written.torque_nmm.norm(), 200.0, 1e-9);
+  EXPECT_LT(handle.written.torque_nmm.x(), -199.0);
+}
+
+// A device of three axes shows the same force and no torque.
+TEST(TorqueOnTheHand, IsNoForceWhereItCannotBeShown) {
+  Handle six, three;
+  three.limits_are.peak_nmm = three.limits_are.continuous_nmm = 0.0;
+  Before of_six(wall(), {0, 0, 0}, {-1, 0, 0}, six), of_three(wall(), {0, 0, 0}, {-1, 0, 0}, three);
+  press(of_six, six, 0.06, 3.0);
+  press(of_three, three, 0.06, 3.0);
+  EXPECT_EQ(three.written.torque_nmm, Vec3::Zero().eval());
+  EXPECT_EQ(three.written.force_n, six.written.force_n);
+  EXPECT_GT(six.written.torque_nmm.norm(), 50.0);
+}
+
+// In a hole as wide as itself a drill cannot turn aside: beyond its play the torque rises with the turn's own spring,
+// K times the square of its arm, and ends when the hand turns back.
+TEST(TorqueOnTheHand, InAHoleIsThatOfTheTurn) {
+  constexpr double kDeep_mm = 30.0;
+  const Case bone = osteon::test::make_bone(
+      {Vec3(-10, -10, -3), Vec3(10, 10, 44)}, 0.5,
+      [](const Vec3& p) {
+        const double in_hole = std::max(std::hypot(p.x(), p.y()) - 1.7, p.z() - kDeep_mm - 10.0);
+        return std::max(-p.z(), -in_hole);
+      },
+      dense);
+  Handle handle;
+  handle.reading.pose_device_tool.rotation = pointing_away();
+  Before hole(bone, {0, 0, kDeep_mm + 10.0}, {0, 0, 1}, handle);  // taken up 10 mm over the ground of the hole
+  hole.wait(400);
+  EXPECT_NEAR(hole.report().pose_bone_proxy.position_mm.z(), kDeep_mm, 0.3);
+  EXPECT_EQ(handle.written.torque_nmm.norm(), 0.0);
+  double nmm[3];
+  const double turn[3] = {0.03, 0.05, 0.07};
+  for (int i = 0; i < 3; ++i) {
+    const double from = i > 0 ? turn[i - 1] : 0.0;
+    for (int t = 1; t <= 100; ++t) {
+      const Eigen::AngleAxisd turned(from + 0.01 * t * (turn[i] - from), Vec3::UnitX());
+      handle.reading.pose_device_tool.rotation = turned * pointing_away();
+      hole.tick();
+    }
+    hole.wait(300);
+    nmm[i] = handle.written.torque_nmm.x();
+    EXPECT_NEAR(handle.written.torque_nmm.norm(), -nmm[i], 0.02 * std::abs(nmm[i]) + 0.5);
+  }
+  const double per_rad = 4.0 / 30.0 * hole.coupling_n_per_mm() * Proxy::kTurnArm_mm * Proxy::kTurnArm_mm;
+  std::printf("  simulated: %.0f N mm/rad in a hole (closed form %.0f)\n", (nmm[0] - nmm[2]) / (turn[2] - turn[0]), per_rad);
+  EXPECT_NEAR((nmm[0] - nmm[1]) / (turn[1] - turn[0]), per_rad, 0.02 * per_rad);
+  EXPECT_NEAR((nmm[1] - nmm[2]) / (turn[2] - turn[1]), per_rad, 0.02 * per_rad);
+  // Its play of 0.1 mm, and as much again for points inset and a field between samples, at either end of 30 mm.
+  const double free_rad = turn[0] + nmm[0] / per_rad;
+  EXPECT_GT(free_rad, 0.0);
+  EXPECT_LT(free_rad, 2.0 * 0.25 / kDeep_mm);
+  handle.reading.pose_device_tool.rotation = pointing_away();
+  hole.wait(100);
+  EXPECT_NEAR(handle.written.torque_nmm.norm(), 0.0, 1e-6);
+}
+
+// The same wall through our stand-in for Force Dimension's library: a sigma.7 whose simulated hand holds the handle. What
+// reaches its motors is the closed form's torque, whole.
+TEST_F(WithArm, AWallsTorqueReachesTheMotors) {
+  constexpr int kSigma7 = 104;
+  arm()->type = kSigma7;
+  arm()->output_axes = 6;
+  const auto lean = [](double angle_rad) {
+    // Where the vendor's handle is level ours points away; its y is our x.
+    const double half = 0.5 * angle_rad + 0.25 * std::numbers::pi;
+    arm()->rotation[0] = std::cos(half);
+    arm()->rotation[2] = std::sin(half);
+  };
+  lean(0.06);
+  const auto device = make_force_dimension({.library = OSTEON_STAND_IN_DHD, .period = std::chrono::microseconds(0)});
+  ASSERT_TRUE(device->open());
+  EXPECT_EQ(device->limits().peak_nmm, 200.0);
+  Before side(wall(), {0, 0, 0}, {-1, 0, 0}, *device);
+  // Time is the test's: a tick, and the device's cycle with what the tick has written.
+  struct TimeGoesOn {
+    ~TimeGoesOn() { arm()->until = ~std::uint64_t{0}; }
+  } const goes_on;
+  arm()->until = arm()->cycles + 100;
+  ASSERT_TRUE(wait_until([] { return arm()->cycles == arm()->until; }, kPatience));
+  std::uint64_t sample = 0;
+  const auto tick = [&] {
+    ++arm()->until;
+    const auto began = std::chrono::steady_clock::now();
+    while (device->read().sample <= sample && std::chrono::steady_clock::now() - began < kPatience) std::this_thread::yield();
+    sample = device->read().sample;
+    side.tick();
+  };
+  // The hand moves its wish steadily, and stays there.
+  double at_mm = 0.0;
+  const auto lead = [&](double to_mm, int ticks) {
+    for (int i = 1; i <= ticks; ++i) {
+      arm().hand(0.0, 0.0, at_mm + (to_mm - at_mm) * i / ticks);
+      tick();
+    }
+    at_mm = to_mm;
+    for (int i = 0; i < ticks; ++i) tick();
+  };
+  const auto shown = [] { return Vec3(arm()->torque_nmm[0], arm()->torque_nmm[1], arm()->torque_nmm[2]); };
+  lead(0.0, 400);  // all of the force is shown by then
+  lead(-14.0, 600);
+  const LoopReport& report = side.report();
+  const double s = side.force_scale();
+  EXPECT_NEAR(s, 4.0 / 30.0, 1e-12);
+  const double expected_nmm = s * kReach_mm * push_n(side);
+  std::printf("  simulated sigma.7: %.1f N mm at its motors, closed form %.1f\n", shown().norm(), expected_nmm);
+  EXPECT_GT(shown().norm(), 50.0);
+  EXPECT_NEAR(shown().norm(), expected_nmm, expected_nmm * (0.02 + 0.07 / side.beyond_mm()));
+  EXPECT_LT(shown().x(), -0.99 * shown().norm());
+  const Vec3 arm_nmm = s * side.arm_times_force();
+  EXPECT_NEAR((shown() - Vec3(arm_nmm.y(), arm_nmm.z(), arm_nmm.x())).norm(), 0.0, s * kRing_mm * report.force_physical_n.norm());
+  EXPECT_EQ(arm()->unsafe_forces, 0u);
+  EXPECT_EQ(arm()->misuse, 0u);
+}
+
+}  // namespace
+}  // namespace osteon::haptic::test
