@@ -66,7 +66,9 @@ void SawBinding::step(const BindingParams& params, double pressure_n) noexcept {
 
 double BroachDrive::step(const BlowParams& params, double blows_per_minute, double engaged_area_mm2, double density_g_cm3,
                          double held_n, double gone_mm, double dt_s) noexcept {
-  left_mm_ = std::max(0.0, left_mm_ - std::max(0.0, gone_mm));
+  // The way of a step is known in the next one, so a blow lasts one more.
+  lasts_s_ -= dt_s;
+  left_mm_ = lasts_s_ > -1.5 * dt_s ? std::max(0.0, left_mm_ - std::max(0.0, gone_mm)) : 0.0;
   const bool struck = blows_per_minute > 0.0 && held_n > 0.0;
   until_blow_s_ -= dt_s;
   if (!struck || !striking_) until_blow_s_ = std::max(0.0, until_blow_s_);  // pauses are not made up for
@@ -78,6 +80,7 @@ double BroachDrive::step(const BlowParams& params, double blows_per_minute, doub
     seated_ = !(advance_mm > 0.0);
     left_mm_ = advance_mm * std::min(1.0, held_n / params.law.hold_n);
     speed_mm_per_s_ = left_mm_ / params.contact_s;
+    lasts_s_ = params.contact_s;
   }
   return std::min(left_mm_, speed_mm_per_s_ * dt_s);
 }
@@ -140,7 +143,9 @@ void CuttingEffects::step(const EffectMoment& moment, double dt_s) noexcept {
   if (saws_) binding_.step(binding_params, moment.kerf_pressure_n);
   if (broaches_) {
     const double held_n = moment.engaged > 0.0 ? moment.push_n : 0.0;  // in the air nobody strikes
-    const double may_go_mm = drive_.step(blow_params, moment.spindle_rpm, moment.engaged_area_mm2, moment.density_g_cm3,
+    BlowParams blow = blow_params;
+    blow.law.wear *= wear();
+    const double may_go_mm = drive_.step(blow, moment.spindle_rpm, moment.engaged_area_mm2, moment.density_g_cm3,
                                          held_n, moment.advance_mm, dt_s);
     may_go_mm_per_s_ = may_go_mm / dt_s;
   }

@@ -114,14 +114,14 @@ struct BlowParams {
 class BroachDrive {
  public:
   // `held_n`: push of the hand; a loosely held broach bounces and advances in proportion. `gone_mm`: its way since the last
-  // step; what the hand does not follow of a blow is lost with the next. Returns how far it may go until the next step, mm.
+  // step; what the hand does not follow of a blow while it lasts is lost. Returns how far it may go until the next step, mm.
   double step(const BlowParams& params, double blows_per_minute, double engaged_area_mm2, double density_g_cm3, double held_n,
               double gone_mm, double dt_s) noexcept;
   [[nodiscard]] bool seated() const noexcept { return seated_; }
   [[nodiscard]] int blows() const noexcept { return blows_; }
 
  private:
-  double until_blow_s_ = 0, left_mm_ = 0, speed_mm_per_s_ = 0;
+  double until_blow_s_ = 0, lasts_s_ = 0, left_mm_ = 0, speed_mm_per_s_ = 0;
   int blows_ = 0;
   bool seated_ = false, striking_ = false;
 };

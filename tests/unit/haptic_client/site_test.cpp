@@ -87,7 +87,7 @@ TEST(Plan, RefusesAToolWithALawThatDoesNotFit) {
     ASSERT_FALSE(by_hand);
     for (const Error& error : {planned.error(), by_hand.error()}) {
       EXPECT_EQ(error.code, ErrorCode::invalid_input);
-      for (const std::string part : {std::string("drill-3.2"), '"' + std::string(law) + '"', std::string("choose one of chi")})
+      for (const std::string& part : {std::string("drill-3.2"), '"' + std::string(law) + '"', std::string("choose one of chi")})
         EXPECT_NE(error.message.find(part), std::string::npos) << error.message;
     }
     step.law = "allotta";

@@ -242,6 +242,39 @@ TEST(BroachDrive, GoesNoFurtherThanTheHandFollows) {
   EXPECT_NEAR(way, 3 * 0.5, 1e-9);
 }
 
+// A hand that follows slowly has what it followed of a blow while that lasted, some 5 ms, and nothing more until the next.
+TEST(BroachDrive, ABlowIsOverWhenItsContactIs) {
+  BroachDrive drive;
+  double way = 0.0, gone = 0.0;
+  int moving = 0;
+  for (int i = 0; i < 3000; ++i) {
+    gone = std::min(drive.step({}, 60.0, 400.0, 0.3, 20.0, gone, kDt), 1e-3);  // 1 mm/s
+    way += gone;
+    moving += gone > 0.0 ? 1 : 0;
+  }
+  EXPECT_EQ(drive.blows(), 3);
+  EXPECT_GE(moving, 3 * 5);
+  EXPECT_LE(moving, 3 * 7);
+  EXPECT_NEAR(way, 1e-3 * moving, 1e-12);
+}
+
+// The drive of a blunt broach does half the way at a blow.
+TEST(BroachDrive, GoesHalfAsFarWhenTwiceBlunt) {
+  const auto way_mm = [](double wear) {
+    CuttingEffects effects(*find_tool("broach-2"), wear);
+    EffectMoment moment{.spindle_rpm = 60.0, .engaged = 1.0, .engaged_area_mm2 = 400.0, .density_g_cm3 = 0.6, .push_n = 20.0};
+    double way = 0.0;
+    for (int i = 0; i < 500; ++i) {
+      moment.advance_mm = kDt * effects.felt({}).max_feed_mm_per_s;
+      way += moment.advance_mm;
+      effects.step(moment, kDt);
+    }
+    return way;
+  };
+  EXPECT_NEAR(way_mm(1.0), 3920.0 / (130.0 * (0.6 / 1.9) * (0.6 / 1.9) * 400.0), 1e-6);
+  EXPECT_NEAR(way_mm(2.0), 0.5 * way_mm(1.0), 1e-6);
+}
+
 // Handpieces of one power: most torque times speed is one number, and so is the droop under a share of the most torque.
 TEST(Motor, KeepsItsPowerAtEverySpeed) {
   const SpindleParams drill = motor_of(*find_tool("drill-3.2")), burr = motor_of(*find_tool("burr-round-5"));
