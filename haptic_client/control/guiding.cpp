@@ -4,7 +4,8 @@
 
 namespace osteon::haptic {
 
-std::optional<GuidedPose> Guiding::step(std::span<const PlacedGuide> guides, const Tool& tool, const Pose& wanted_bone_tool) noexcept {
+std::optional<GuidedPose> Guiding::step(std::span<const PlacedGuide> guides, const Tool& tool, const Pose& wanted_bone_tool,
+                                        const Pose& pose_bone_proxy) noexcept {
   if (held_) {
     const auto guide = std::ranges::find(guides, id_, &PlacedGuide::id);
     if (guide != guides.end() && opening_ < opening_count(guide->shape))
@@ -13,7 +14,7 @@ std::optional<GuidedPose> Guiding::step(std::span<const PlacedGuide> guides, con
   }
   for (const PlacedGuide& guide : guides) {
     const auto opening = entered(guide.shape, guide.pose_bone_guide, tool, wanted_bone_tool);
-    if (!opening) continue;
+    if (!opening || entered(guide.shape, guide.pose_bone_guide, tool, pose_bone_proxy) != opening) continue;
     held_ = true;
     id_ = guide.id;
     opening_ = *opening;

@@ -29,9 +29,10 @@ class Guiding {
  public:
   // [haptic] Another tool is taken up.
   void release() noexcept { held_ = false; }
-  // [haptic] Where an opening lets the tool go that is wanted there; nothing while it is in none.
+  // [haptic] Where an opening lets the tool go that is wanted there; nothing while it is in none. It enters one when it is
+  // wanted there and has come there itself: a hand that presses through the wall of a guide does not take it in.
   [[nodiscard]] std::optional<GuidedPose> step(std::span<const PlacedGuide> guides, const Tool& tool,
-                                               const Pose& wanted_bone_tool) noexcept;
+                                               const Pose& wanted_bone_tool, const Pose& pose_bone_proxy) noexcept;
   [[nodiscard]] bool held() const noexcept { return held_; }
   // Of the guide that holds the tool, while one does.
   [[nodiscard]] std::uint32_t guide_id() const noexcept { return id_; }

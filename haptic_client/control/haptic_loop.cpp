@@ -75,7 +75,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   Pose pose_bone_wanted = pose_bone_device;
   pose_bone_wanted.position_mm += coupling_.offset_mm();
   bool held_back = false;
-  if (const auto guided = guiding_.step(guides, model.tool, pose_bone_wanted)) {
+  if (const auto guided = guiding_.step(guides, model.tool, pose_bone_wanted, proxy_.pose())) {
     pose_bone_wanted = guided->pose_bone_tool;
     held_back = guided->correction_mm > 0.0;
     report.guide_play_mm = guided->play_mm;

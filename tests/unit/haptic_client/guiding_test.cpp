@@ -143,6 +143,79 @@ TEST(GuidedDrilling, TheSleevePushesBackSideways) {
   EXPECT_FALSE(report.events & kGuided);
 }
 
+// A drill about a sleeve that stands on the bone, its top at z = -30: the hand leads it from place to place.
+class AtASleeve : public ::testing::Test {
+ protected:
+  AtASleeve() : bone_(block_case()), field_(bone_, BodyId{}), loop_(LoopParams{.ramp_s = 1e-9}, {ToolModel(*find_tool("drill-3.2"), 0.5)}) {}
+  void take_up(const Vec3& tip_mm) {
+    input_.pose_device_tool = {tip_mm, Eigen::Quaterniond::Identity()};
+    builder_.build(field_, loop_.tool(0), input_.pose_device_tool, patch_);
+    loop_.take_up(0, input_.pose_device_tool, WorkspaceMapping{});
+  }
+  void lead(const Vec3& to_mm, double mm_per_s) {
+    Vec3& hand_mm = input_.pose_device_tool.position_mm;
+    const double step_mm = 1e-3 * mm_per_s;
+    while ((to_mm - hand_mm).norm() > 1e-9) {
+      const Vec3 way = to_mm - hand_mm;
+      hand_mm += way.norm() > step_mm ? Vec3(way * (step_mm / way.norm())) : way;
+      builder_.build(field_, loop_.tool(0), input_.pose_device_tool, patch_);
+      const LoopReport now = loop_.tick(input_, patch_, std::span(&guide_, 1));
+      // What the hand's own step may do, and the slew limit: nothing may grow faster.
+      const double grown_n = now.force_device_n.norm() - report_.force_device_n.norm();
+      worst_n_ = std::max(worst_n_, grown_n - 2.0 * loop_.coupling_n_per_mm() * step_mm);
+      fastest_mm_ = std::max(fastest_mm_, now.moved_mm.norm() - step_mm);
+      guided_ |= (now.events & kGuided) != 0;
+      report_ = now;
+    }
+  }
+  [[nodiscard]] const Vec3& tip_mm() const { return report_.pose_bone_proxy.position_mm; }
+
+  const PlacedGuide guide_ = placed_guide(1, sleeve(), {Vec3(0, 0, 0), Eigen::Quaterniond::Identity()});
+  Case bone_;
+  CutField field_;
+  HapticLoop loop_;
+  PatchBuilder builder_;
+  Patch patch_;
+  LoopInput input_;
+  LoopReport report_;
+  double worst_n_ = 0, fastest_mm_ = 0;
+  bool guided_ = false;
+};
+
+// Pressed against the sleeve from outside, as far as its middle and beyond, the drill stays outside: it does not pop in.
+TEST_F(AtASleeve, IsNotPulledInThroughItsWall) {
+  take_up({-12, 0, -15});
+  lead({-6.5, 0, -15}, 20.0);
+  EXPECT_EQ(report_.force_physical_n.norm(), 0.0);
+  lead({0, 0, -15}, 20.0);
+  EXPECT_NEAR(tip_mm().x(), -4.0 - 1.6, 0.3);  // radius of the sleeve and of the drill
+  EXPECT_NEAR(report_.force_physical_n.norm(), 60.0, 1e-6);  // all that the device can show
+  EXPECT_LT(report_.force_physical_n.x(), -50.0);
+  lead({1, 0, -15}, 20.0);
+  EXPECT_LT(tip_mm().x(), -5.0);
+  EXPECT_FALSE(guided_);
+  lead({-12, 0, -15}, 20.0);
+  EXPECT_EQ(report_.force_physical_n.norm(), 0.0);
+  EXPECT_LE(worst_n_, LoopParams{}.slew_n_per_ms + 1e-6);
+  EXPECT_LT(fastest_mm_, 0.1);
+}
+
+// Pressed on the rim of its mouth and led over it, the drill goes in where the mouth is, no sooner, and the force that it was
+// pressed with is gone.
+TEST_F(AtASleeve, IsEnteredFromItsRimThroughTheMouth) {
+  take_up({2.8, 0, -33});
+  lead({2.8, 0, -29.6}, 10.0);
+  EXPECT_NEAR(tip_mm().z(), -30.0, 0.3);
+  EXPECT_LT(report_.force_physical_n.z(), -10.0);
+  EXPECT_FALSE(guided_);
+  lead({0, 0, -29.6}, 5.0);
+  EXPECT_TRUE(guided_);
+  lead({0, 0, -20}, 20.0);
+  EXPECT_NEAR((tip_mm() - Vec3(0, 0, -20)).norm(), 0.0, kPlay_mm);
+  EXPECT_LT(report_.force_physical_n.norm(), 1e-6);
+  EXPECT_LE(worst_n_, LoopParams{}.slew_n_per_ms + 1e-6);
+}
+
 TEST(GuidedPlan, NamesWhatIsWrong) {
   const Case bone = block_case();
   const auto message = [&](const std::vector<PlanStep>& plan) { return make_ready(plan, bone, find).error().message; };
