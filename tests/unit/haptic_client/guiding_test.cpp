@@ -98,8 +98,8 @@ TEST(GuidedDrilling, StaysWithinTheSleevesPlay) {
     EXPECT_FALSE(free.guided);
     EXPECT_GT(guided.knots, 500);
     EXPECT_LE(guided.worst_excess_mm, 0.01);
-    // Two points within the play and that hundredth, a sleeve's length apart.
-    EXPECT_LE(guided.tilt_rad, 2.0 * (kPlay_mm + 0.01) / kLength_mm);
+    // Two points within the play, a sleeve's length apart, and a little for the drill's play in its hole, which is short.
+    EXPECT_LE(guided.tilt_rad, 2.0 * kPlay_mm / kLength_mm + 2e-3);
     EXPECT_GT(free.worst_mm, kPlay_mm * (1.0 + 2.0));
     EXPECT_GT(free.worst_excess_mm, 0.1);
   }
@@ -143,10 +143,11 @@ TEST(GuidedDrilling, TheSleevePushesBackSideways) {
   EXPECT_FALSE(report.events & kGuided);
 }
 
-// A drill about a sleeve that stands on the bone, its top at z = -30: the hand leads it from place to place.
+// A drill about a sleeve that stands on the bone, its top at z = -30: the hand leads it from place to place, on a device so
+// strong that its slack does not keep the hand from reaching through the wall.
 class AtASleeve : public ::testing::Test {
  protected:
-  AtASleeve() : bone_(block_case()), field_(bone_, BodyId{}), loop_(LoopParams{.ramp_s = 1e-9}, {ToolModel(*find_tool("drill-3.2"), 0.5)}) {}
+  AtASleeve() : bone_(block_case()), field_(bone_, BodyId{}), loop_(LoopParams{.peak_n = 400.0, .ramp_s = 1e-9}, {ToolModel(*find_tool("drill-3.2"), 0.5)}) {}
   void take_up(const Vec3& tip_mm) {
     input_.pose_device_tool = {tip_mm, Eigen::Quaterniond::Identity()};
     builder_.build(field_, loop_.tool(0), input_.pose_device_tool, patch_);
@@ -189,8 +190,7 @@ TEST_F(AtASleeve, IsNotPulledInThroughItsWall) {
   EXPECT_EQ(report_.force_physical_n.norm(), 0.0);
   lead({0, 0, -15}, 20.0);
   EXPECT_NEAR(tip_mm().x(), -4.0 - 1.6, 0.3);  // radius of the sleeve and of the drill
-  EXPECT_NEAR(report_.force_physical_n.norm(), 60.0, 1e-6);  // all that the device can show
-  EXPECT_LT(report_.force_physical_n.x(), -50.0);
+  EXPECT_NEAR(report_.force_physical_n.x(), 50.0 * tip_mm().x(), 1e-6);
   lead({1, 0, -15}, 20.0);
   EXPECT_LT(tip_mm().x(), -5.0);
   EXPECT_FALSE(guided_);
