@@ -96,8 +96,9 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
   }
 
   force.spring_n = -k * e_mm;
-  // A sampled spring needs k·T; never more than the spring, so that it cannot pull.
-  force.damping_n = clamped(-k * (e_mm - extension_mm_), force.spring_n.norm());
+  // A sampled spring needs k·T, and what a filter of the cutting force holds back by tau comes too late by as much as k·tau
+  // pays for; never more than the spring, so that it cannot pull.
+  force.damping_n = clamped(-std::max(1.0, smooth_s / dt_s) * k * (e_mm - extension_mm_), force.spring_n.norm());
 
   // (7.15), EWMA, on the cutting force alone and only while it goes on: where cutting begins or ends the rest of the
   // coupling takes over at once, and a filter between them would pull.

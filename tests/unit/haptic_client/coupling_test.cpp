@@ -194,7 +194,7 @@ TEST_F(CouplingAtWall, ReturnedBoneStoresNothing) {
     const double moved = next - handle;
     const double offset = coupling_.offset_mm().norm();
     to({0, 0, next}, {0, 0, -0.3});
-    paid_mj += 50.0 * moved * moved;  // most that a damper of k·T can take of this motion
+    paid_mj += 2.0 * 50.0 * moved * moved;  // most that a damper of k · 2 ms can take of this motion
     const double released = offset - coupling_.offset_mm().norm();
     EXPECT_GE(released, -1e-12);
     if (released > 0.0) {
