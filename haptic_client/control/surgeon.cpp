@@ -313,7 +313,11 @@ void Surgeon::drill(const ReadyStep& step, const LoopReport& report, double dt_s
       }
       break;
     case SurgeonPhase::feed:
-      if (carry_to_depth(step, feed_end_mm(step), step.plan.feed_mm_per_s, dt_s) || (to_mm > 0.0 && depth >= to_mm)) finish_feed(step, report);
+      // At its end the rig stays and presses on until the tool is there or the time is up: a device that cannot show all the
+      // force lets the tool fall behind by any way (slack).
+      if (const bool at_end = carry_to_depth(step, feed_end_mm(step), step.plan.feed_mm_per_s, dt_s);
+          to_mm > 0.0 ? depth >= to_mm : at_end)
+        finish_feed(step, report);
       break;
     case SurgeonPhase::push:
       hand_.mode = HandMode::push;
