@@ -112,14 +112,19 @@ TEST(HandTools, EveryToolThatCutsTakesBone) {
     std::printf("  %-20s cut for %4d of 2700 ticks, %8.2f mm3, at most %6.1f N and %8.1f N mm, %.2f mm deep\n", tool.name.c_str(),
                 stage.cutting_, removed, stage.force_n_, stage.torque_nmm_,
                 pushed.pose_bone_proxy.position_mm.z() - held(tool).position_mm.z() - 0.4);
-    // A broach moves in its blows only.
-    EXPECT_GT(stage.cutting_, tool.kind == ToolKind::broach ? 2 : 50) << tool.name;
+    // A broach moves in its blows only: one a second, of some 5 ms.
+    if (tool.kind == ToolKind::broach) {
+      EXPECT_GE(stage.cutting_, 2 * 5) << tool.name;
+      EXPECT_LE(stage.cutting_, 3 * 7) << tool.name;
+    } else {
+      EXPECT_GT(stage.cutting_, 50) << tool.name;
+    }
     EXPECT_GT(removed, 0.05) << tool.name;
     EXPECT_GT(stage.force_n_, 0.05) << tool.name;
     EXPECT_GE(stage.work_min_, 0.0) << tool.name;
     EXPECT_EQ(stage.allocations_, 0) << tool.name;
     // Drawn back it is free: nothing jams in what it has made.
-    EXPECT_LT(back.force_physical_n.norm(), 1e-3) << tool.name;
+    EXPECT_EQ(back.force_physical_n.norm(), 0.0) << tool.name;
     EXPECT_NEAR((back.pose_bone_proxy.position_mm - stage.input_.pose_device_tool.position_mm).norm(), 0.0, 1e-5) << tool.name;
     ++tried;
   }
