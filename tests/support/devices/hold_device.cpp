@@ -13,6 +13,11 @@
 #include "haptic_client/device/force_dimension.hpp"
 #include "haptic_client/device/openhaptics.hpp"
 
+#ifdef __SANITIZE_ADDRESS__
+// Crashes are this program's purpose: the sanitizer shall leave their signal to the handler that is tested.
+extern "C" const char* __asan_default_options() { return "handle_segv=0"; }  // NOLINT(bugprone-reserved-identifier)
+#endif
+
 int main(int argc, char** argv) {
   using namespace osteon;
   using namespace osteon::haptic;
