@@ -8,6 +8,7 @@
 #include <array>
 #include <fstream>
 
+#include "common/tools/tool_file.hpp"
 #include "tests/integration/stage.hpp"
 #include "tests/support/scenes/bones.hpp"
 #include "tests/unit/room/members.hpp"
@@ -205,6 +206,16 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
   const RunResult broken = run(program("osteon-server"), {"--case", stage / "case", "--tools", tools / ""});
   EXPECT_GT(broken.exit_code, 0);
   EXPECT_NE(broken.err.find("broken.yaml"), std::string::npos) << broken.err;
+  // So is a folder with a tool that names a law which there is not, or not for it.
+  std::filesystem::remove(tools / "broken.yaml");
+  Tool lawless = *find_tool("drill-3.2");
+  lawless.name = "lawless";
+  lawless.law = "saw";
+  std::ofstream(tools / "lawless.yaml") << to_yaml(lawless);
+  const RunResult unlawful = run(program("osteon-server"), {"--case", stage / "case", "--tools", tools / ""});
+  EXPECT_GT(unlawful.exit_code, 0);
+  for (const char* part : {"lawless.yaml", "\"law\"", "\"saw\" is not for a drill", "choose one of chi"})
+    EXPECT_NE(unlawful.err.find(part), std::string::npos) << unlawful.err;
 }
 
 }  // namespace
