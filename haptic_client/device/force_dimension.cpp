@@ -162,7 +162,9 @@ class ForceDimension final : public HapticDevice {
     info_.torque_axes = limits_.peak_nmm > 0.0 && call_->has_active_wrist(id_) ? 3 : 0;
     if (info_.torque_axes == 0) limits_.peak_nmm = limits_.continuous_nmm = 0.0;
     start();
-    return tend();
+    Result<void> well = tend();
+    if (!well) close();
+    return well;
   }
 
   void close() noexcept override {
@@ -192,7 +194,11 @@ class ForceDimension final : public HapticDevice {
                          : "move the device's handle gently to all ends of its range until its light stops blinking, "
                            "or run the vendor's HapticInit";
     // Motors are on once the device knows where it is.
-    if (calibrated && !force_on_) force_on_ = call_->enable_force(1, id_) >= 0;
+    if (calibrated && !force_on_) {
+      if (call_->enable_force(1, id_) < 0)
+        return failure(ErrorCode::unavailable, "the Force Dimension device does not switch its motors on: " + last_error().message);
+      force_on_ = true;
+    }
     return {};
   }
 
@@ -266,7 +272,8 @@ class ForceDimension final : public HapticDevice {
       const unsigned buttons = call_->button_mask(id_);
       reading.buttons = (buttons & 1 ? kSpindlePedal : 0u) | (buttons & 2 ? kClutchButton : 0u);
     }
-    const bool calibrated = calibrated_;
+    // Ready once its motors are on, so that no force waits for them.
+    const bool calibrated = calibrated_ && force_on_;
     DeviceOutput output;
     if (good && calibrated) output = exchange_.demanded(std::chrono::steady_clock::now());
     if (!output.force_n.allFinite() || !output.torque_nmm.allFinite()) output = {};
@@ -291,7 +298,7 @@ class ForceDimension final : public HapticDevice {
   // Connection thread; its own thread only reads them.
   const dhd::Api* call_ = nullptr;
   char id_ = -1;
-  bool open_ = false, force_on_ = false;
+  bool open_ = false;
   DeviceLimits limits_;
   DeviceInfo info_;
   std::string advice_;
@@ -299,7 +306,7 @@ class ForceDimension final : public HapticDevice {
   std::optional<EmergencyStop> emergency_;
   std::thread thread_;
   // Both.
-  std::atomic<bool> stopping_{false}, lost_{false}, calibrated_{false};
+  std::atomic<bool> stopping_{false}, lost_{false}, calibrated_{false}, force_on_{false};
   std::atomic<int> error_{0};
   DeviceExchange exchange_;
   // Its own thread.
