@@ -1,7 +1,7 @@
 // What the tool's motor does to the hand: drag, kick and vibration. While the tool cuts, its drag is the force of its law
-// across the feed; while it rubs, friction. Of what turns it goes one way, of a saw to and fro with the stroke. These forces are active, unlike the coupling's: they
-// may put energy into the hand as a real motor does. So they go through a port of their own, whose force is bounded by
-// friction times the normal force and which is shut soon after the pedal.
+// across the feed; while it rubs, friction. Of what turns it goes one way, of a saw to and fro with the stroke. These forces
+// are active, unlike the coupling's: they may put energy into the hand as a real motor does. So they go through a port of
+// their own, whose force is bounded by friction times the normal force and which is shut soon after the pedal.
 #pragma once
 #include "common/geometry/pose.hpp"
 

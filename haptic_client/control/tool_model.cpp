@@ -54,7 +54,8 @@ void add_teeth(const ToolModel& model, std::vector<ContactPoint>& active) {
   const bool swings = tool.kind == ToolKind::oscillating_saw;
   // Half of the stroke and of the toothed edge, along the arc about the pivot or straight.
   const double a = 0.5 * model.law_tool.stroke_mm;
-  const double b = swings ? tool.pivot_mm * std::asin(std::min(1.0, 0.5 * tool.width_mm / tool.pivot_mm)) : 0.5 * tool.cutting_length_mm;
+  const double b = swings ? tool.pivot_mm * std::asin(std::min(1.0, 0.5 * tool.width_mm / tool.pivot_mm))
+                          : 0.5 * tool.cutting_length_mm;
   const int count = static_cast<int>(std::ceil(2.0 * (a + b) / kApart_mm));
   const double apart = 2.0 * (a + b) / count;
   for (int i = 0; i < count; ++i) {

@@ -77,7 +77,8 @@ TEST(EngagedEdge, ASawMeetsTheTeethOverTheBone) {
   // Its toothed edge along a bone 8 mm thick, from z = 0 on; fed with its edge, along x of the tool.
   const Case plate = cut_out(24.0, 0.5, [](const Vec3& p) { return std::max(p.z() - 8.0, 2.0 - p.x()); });
   const Pose along{{2.0 - 0.5 * saw.width_mm + 0.2, 0, 16.0}, Eigen::Quaterniond::Identity()};
-  EXPECT_NEAR(met(plate, model, along, Vec3::UnitX()).edge, 8.0 * saw.teeth / saw.cutting_length_mm, 0.5 * saw.teeth / saw.cutting_length_mm);
+  const double per_mm = saw.teeth / saw.cutting_length_mm;
+  EXPECT_NEAR(met(plate, model, along, Vec3::UnitX()).edge, 8.0 * per_mm, 0.5 * per_mm);
 }
 
 // Z edges from r to R are Z (R - r) long as seen along the feed, and half of that where half of it is in bone: over a hole
@@ -104,8 +105,8 @@ TEST(EngagedEdge, AReamersEdgesGoWithTheRadiusNotTheArea) {
   // A hollow mill has its edges on its ring only.
   const Tool ring = *find_tool("reamer-outside");
   const double wall = 0.5 * (ring.diameter_mm - ring.bore_mm);
-  const Met all = met(cut_out(30.0, 1.0, [](const Vec3&) { return -10.0; }), ToolModel(ring, 1.0), {{0, 0, 3}, Eigen::Quaterniond::Identity()},
-                      Vec3::UnitZ());
+  const Pose in_bone{{0, 0, 3}, Eigen::Quaterniond::Identity()};
+  const Met all = met(cut_out(30.0, 1.0, [](const Vec3&) { return -10.0; }), ToolModel(ring, 1.0), in_bone, Vec3::UnitZ());
   EXPECT_NEAR(all.edge, ring.teeth * wall, 0.01 * ring.teeth * wall);
 }
 

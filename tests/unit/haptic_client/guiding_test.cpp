@@ -147,7 +147,10 @@ TEST(GuidedDrilling, TheSleevePushesBackSideways) {
 // strong that its slack does not keep the hand from reaching through the wall.
 class AtASleeve : public ::testing::Test {
  protected:
-  AtASleeve() : bone_(block_case()), field_(bone_, BodyId{}), loop_(LoopParams{.peak_n = 400.0, .ramp_s = 1e-9}, {ToolModel(*find_tool("drill-3.2"), 0.5)}) {}
+  AtASleeve()
+      : bone_(block_case()),
+        field_(bone_, BodyId{}),
+        loop_(LoopParams{.peak_n = 400.0, .ramp_s = 1e-9}, {ToolModel(*find_tool("drill-3.2"), 0.5)}) {}
   void take_up(const Vec3& tip_mm) {
     input_.pose_device_tool = {tip_mm, Eigen::Quaterniond::Identity()};
     builder_.build(field_, loop_.tool(0), input_.pose_device_tool, patch_);

@@ -226,7 +226,8 @@ print("%.6f,%.6f,%.6f,%.6f,%.6f" % (f["high_frequency_poses/drill_pose/pose"][i,
 
 // Each law is told of once in a session, with what it was first outside of; all that follows is counted.
 TEST(RangeWatch, TellsOfEachLawOnce) {
-  const ToolModel drill(*find_tool("drill-3.2"), 0.5), other(*find_tool("drill-3.5"), 0.5), saw(*find_tool("saw-oscillating-1"), 0.5);
+  const ToolModel drill(*find_tool("drill-3.2"), 0.5), other(*find_tool("drill-3.5"), 0.5);
+  const ToolModel saw(*find_tool("saw-oscillating-1"), 0.5);
   const auto outside = [](OutOfRange what) {
     LoopReport report;
     report.out_of_range = static_cast<unsigned>(what);

@@ -159,7 +159,8 @@ TEST(ToolEffects, ASawsForceIsOfTheTeethOverTheBar) {
       [](const Vec3& p) { return std::max({-p.z(), p.z() - 12.0, std::abs(p.x()) - 5.0, std::abs(p.y()) - 7.0}); },
       [](const Vec3&) { return 1.9; });
   Rig rig(bar, saw);
-  const Mean mean = between(rig.move({0, 0, 4.0}, 4.0), 1.5, 3.0);
+  const auto reports = rig.move({0, 0, 4.0}, 4.0);
+  const Mean mean = between(reports, 1.5, 3.0);
   ASSERT_GT(mean.ticks, 1000);
   const double pitch = 19.0 / 14.0, stroke = 80.0 * 5.0 * std::numbers::pi / 180.0, bearing = 0.15 * 10.0 / pitch;
   const double depth_um = 1e3 * 1.0 * pitch / (0.15 * 2.0 * stroke * 200.0);
@@ -169,6 +170,21 @@ TEST(ToolEffects, ASawsForceIsOfTheTeethOverTheBar) {
   // Contact points are half a millimetre apart.
   EXPECT_NEAR(mean.force_n, thrust_n, 0.06 * thrust_n);
   EXPECT_NEAR(mean.torque_nmm, bearing * 4.0 * stroke / std::numbers::pi, 0.06 * mean.torque_nmm);
+  // The hand has of it what the motor's port lets through, 0.6 of friction's 0.3, along the stroke and 200 times a second.
+  double sum_n = 0.0, square = 0.0, aside = 0.0;
+  int ticks = 0;
+  for (const LoopReport& r : reports) {
+    const double z = r.pose_bone_proxy.position_mm.z();
+    if (r.phase != CuttingPhase::cutting || z < 1.5 || z > 3.0) continue;
+    sum_n += r.motor_device_n.x();
+    square += r.motor_device_n.x() * r.motor_device_n.x();
+    aside = std::max(aside, r.motor_device_n.tail<2>().norm());
+    ++ticks;
+  }
+  const double most_n = std::min(bearing * 4.0, 0.6 * 0.3 * thrust_n);
+  EXPECT_NEAR(std::sqrt(square / ticks), most_n / std::numbers::sqrt2, 0.08 * most_n);
+  EXPECT_NEAR(sum_n / ticks, 0.0, 0.01 * most_n);
+  EXPECT_NEAR(aside, 0.0, 1e-6);
 }
 
 // A reamer over a hole of half its radius meets half of its edges, though three quarters of its face: half the thrust.
@@ -323,8 +339,8 @@ TEST(ToolEffects, ABroachStopsWhenSeated) {
   }
   EXPECT_EQ(way, 0.0);
   const double deep_mm = last.pose_bone_proxy.position_mm.z(), seat_mm2 = 39200.0 / (6.0 * 130.0 / (1.9 * 1.9));
-  std::printf("  seated %.2f mm deep after %zu blows, its section %.1f mm2, by hand %.1f mm2; %.1f N of push\n", deep_mm, runs.size(),
-              section_mm2(deep_mm), seat_mm2, last.force_physical_n.norm());
+  std::printf("  seated %.2f mm deep after %zu blows, its section %.1f mm2, by hand %.1f mm2; %.1f N of push\n", deep_mm,
+              runs.size(), section_mm2(deep_mm), seat_mm2, last.force_physical_n.norm());
   EXPECT_NEAR(section_mm2(deep_mm), seat_mm2, 0.08 * seat_mm2);  // as above
   EXPECT_GT(last.force_physical_n.norm(), 20.0);
 }
