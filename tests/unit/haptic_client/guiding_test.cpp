@@ -98,7 +98,8 @@ TEST(GuidedDrilling, StaysWithinTheSleevesPlay) {
     EXPECT_FALSE(free.guided);
     EXPECT_GT(guided.knots, 500);
     EXPECT_LE(guided.worst_excess_mm, 0.01);
-    // Two points within the play, a sleeve's length apart, and a little for the drill's play in its hole, which is short.
+    // Two points within the play, a sleeve's length apart. The hand is kept to that; the drill, which its own hole holds too,
+    // may lean a little more, by less than 0.03 mm at either end of the sleeve.
     EXPECT_LE(guided.tilt_rad, 2.0 * kPlay_mm / kLength_mm + 2e-3);
     EXPECT_GT(free.worst_mm, kPlay_mm * (1.0 + 2.0));
     EXPECT_GT(free.worst_excess_mm, 0.1);
