@@ -33,7 +33,8 @@ bool each_in_parallel(int count, const std::function<void(int)>& work, const Kee
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   for (std::thread& helper : helpers) helper.join();
-  return !stopped;
+  // Also where all was done before the first question.
+  return !stopped && keep_going(1.0);
 }
 
 tl::unexpected<Error> stopped_smoothing() { return failure(ErrorCode::cancelled, "stopped while smoothing the labels"); }
