@@ -19,6 +19,7 @@ void Coupling::reset(const Vec3& handle_mm, const Vec3& proxy_mm) noexcept {
   returned_mm_.setZero();
   smooth_.reset(Vec3::Zero());
   extension_mm_ = handle_mm - proxy_mm;
+  turn_rad_.setZero();
   handle_mm_ = handle_mm;
   cutting_ = false;
 }
@@ -55,12 +56,19 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
   CouplingForce force;
   const double k = moment.stiffness_n_per_mm;
   const auto stored_mj = [&](double extension_mm) { return 0.5 * k * moment.energy_scale * extension_mm * extension_mm; };
+  // Of the turn's spring: what the device cannot show is not stored either.
+  const auto turned_mj = [&](const Vec3& turn_rad) {
+    const double size_rad = turn_rad.norm(), k_turn = moment.stiffness_nmm_per_rad;
+    const double shown_rad = k_turn > 0.0 ? std::min(size_rad, moment.limit_nmm / k_turn) : 0.0;
+    return moment.energy_scale * k_turn * shown_rad * (size_rad - 0.5 * shown_rad);
+  };
   const double cutting_mj = moment.energy_scale * proxy.cutting_work_mj;
   Vec3 e_mm = moment.handle_mm + offset_mm() - moment.proxy_mm;
 
   if (!moment.touching) {
     ledger.settle(cutting_mj, 0.0);
     extension_mm_ = e_mm;
+    turn_rad_ = moment.turn_rad;
     bleed(moment);
     handle_mm_ = moment.handle_mm;
     smooth_.reset(Vec3::Zero());
@@ -68,8 +76,11 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
     return force;
   }
 
-  // Only bone that came back moves the proxy away from the handle.
-  const double before_mm = (moment.handle_mm + offset_mm() - moment.proxy_before_mm).norm();
+  // Only bone that came back moves the proxy away from the handle, but for what that lets its turn come nearer.
+  const double now_turned_mj = turned_mj(moment.turn_rad);
+  const double relaxed_mj = turned_mj(moment.turn_before_rad) - now_turned_mj;
+  const double before_mm = std::sqrt(std::max(0.0, (moment.handle_mm + offset_mm() - moment.proxy_before_mm).squaredNorm() +
+                                                       2.0 * relaxed_mj / (k * moment.energy_scale)));
   if (e_mm.norm() > before_mm + kNothing_mm) {
     let_go(returned_mm_, e_mm, e_mm * (before_mm / e_mm.norm()));
     force.returned = true;
@@ -84,7 +95,7 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
     let_go(slack_mm_, e_mm, Vec3::Zero());
     force.breakthrough = true;
   }
-  ledger.settle(cutting_mj, stored_mj(e_mm.norm()));
+  ledger.settle(cutting_mj, stored_mj(e_mm.norm()) + now_turned_mj, now_turned_mj);
 
   // Returned bone is let press again as the damping pays for it.
   const double returned_mm = returned_mm_.norm();
@@ -100,6 +111,11 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
   // pays for; never more than the spring, so that it cannot pull.
   force.damping_n = clamped(-std::max(1.0, smooth_s / dt_s) * k * (e_mm - extension_mm_), force.spring_n.norm());
 
+  force.turn_spring_nmm = clamped(-moment.stiffness_nmm_per_rad * moment.turn_rad, moment.limit_nmm);
+  force.turn_damping_nmm =
+      clamped(-std::max(1.0, smooth_s / dt_s) * moment.stiffness_nmm_per_rad * (moment.turn_rad - turn_rad_),
+              force.turn_spring_nmm.norm());
+
   // (7.15), EWMA, on the cutting force alone and only while it goes on: where cutting begins or ends the rest of the
   // coupling takes over at once, and a filter between them would pull.
   const Vec3& cutting_n = proxy.cutting_force_n;
@@ -109,6 +125,7 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
   cutting_ = proxy.cutting;
 
   extension_mm_ = e_mm;
+  turn_rad_ = moment.turn_rad;
   handle_mm_ = moment.handle_mm;
   return force;
 }

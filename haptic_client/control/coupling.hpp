@@ -3,6 +3,10 @@
 //
 // The spring's extension is e = handle + offset - proxy. The proxy moves only where that shortens e; where bone that came
 // back pushes it out, the offset takes the difference, so that the stored energy does not rise.
+//
+// A device of six axes has a second spring, of the turn from the proxy to the handle. Both are one store: a proxy that leans
+// away from a wall may lengthen e by what that relaxes in the turn. On a device of three axes turning costs the hand
+// nothing, so there it may lengthen nothing.
 #pragma once
 #include "common/mechanics/force_filter.hpp"
 #include "haptic_client/control/energy_ledger.hpp"
@@ -16,12 +20,19 @@ struct CouplingMoment {
   double limit_n = 0;                         // physical: the device's over s
   double energy_scale = 1;                    // mJ at the handle for each physical mJ: s over the workspace's scale
   bool touching = false;
+  // Of a device that shows torque; bone frame, axis times angle, from the proxy's orientation to the handle's.
+  double stiffness_nmm_per_rad = 0;           // of the turn, physical; 0: no torque is shown
+  double limit_nmm = 0;                       // physical: the device's over energy_scale
+  Vec3 turn_before_rad = Vec3::Zero();        // from the proxy as it was at the end of the last tick
+  Vec3 turn_rad = Vec3::Zero();
 };
 
 struct CouplingForce {
   Vec3 spring_n = Vec3::Zero();      // of the bone on the tool, within the limit: the physical force
   Vec3 damping_n = Vec3::Zero();     // the sampled spring's k_c·T, never more than the spring
   Vec3 cutting_lag_n = Vec3::Zero(); // what smoothing holds back of the cutting force, of the bone on the tool
+  Vec3 turn_spring_nmm = Vec3::Zero();   // of the bone on the tool about its tip, within the limit, physical
+  Vec3 turn_damping_nmm = Vec3::Zero();  // as the move's, never more than the turn's spring
   bool limited = false, breakthrough = false, returned = false;
 };
 
@@ -43,6 +54,7 @@ class Coupling {
 
   Vec3 slack_mm_ = Vec3::Zero(), returned_mm_ = Vec3::Zero();
   Vec3 extension_mm_ = Vec3::Zero();  // at the end of the last tick
+  Vec3 turn_rad_ = Vec3::Zero();      // likewise
   Vec3 handle_mm_ = Vec3::Zero();
   ForceFilter<Vec3> smooth_{Vec3(Vec3::Zero())};  // the cutting force
   bool cutting_ = false;              // in the last tick

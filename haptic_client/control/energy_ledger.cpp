@@ -5,31 +5,44 @@
 
 namespace osteon::haptic {
 
+// Who has held still surprises little: else a slow, light feed would be held back for good.
+void EnergyLedger::Going::see(const Vec3& now_mm, const EnergyParams& params) noexcept {
+  const double seen = params.wary * (now_mm - moved_mm).norm() / (params.dt_s * params.dt_s);
+  const double fading = surprise_mm_per_s2 * std::exp(-params.dt_s / params.lately_s);
+  surprise_mm_per_s2 = std::min(params.surprise_mm_per_s2, std::max({seen, fading, params.calm_mm_per_s2}));
+  moved_mm = now_mm;
+}
+
+// The handle goes on as it did, give or take what it can accelerate.
+double EnergyLedger::Going::most_mj(const Vec3& force_n, double dt_s) const noexcept {
+  const double size_n = force_n.norm();
+  return size_n > 0.0 ? size_n * (moved_mm.dot(force_n) / size_n + surprise_mm_per_s2 * dt_s * dt_s) : 0.0;
+}
+
 void EnergyLedger::reset() noexcept {
-  force_n_.setZero();
-  damping_n_.setZero();
-  moved_mm_.setZero();
-  account_mj_ = filled_mj_ = 0.0;
+  shown_ = damping_ = {};
+  moves_ = turns_ = {.surprise_mm_per_s2 = params_.surprise_mm_per_s2};
+  account_mj_ = filled_mj_ = turned_mj_ = 0.0;
   report_.episode_mj = report_.stored_mj = report_.tank_mj = report_.ended_mj = 0.0;
   report_.ended = report_.held_back = open_ = false;
-  surprise_mm_per_s2_ = params_.surprise_mm_per_s2;
 }
 
-void EnergyLedger::observe(const Vec3& handle_moved_mm) noexcept {
+void EnergyLedger::observe(const Vec3& handle_moved_mm, const Vec3& handle_turned_rad) noexcept {
   report_.ended = report_.held_back = false;
   report_.ended_mj = 0.0;
-  const double given_mj = force_n_.dot(handle_moved_mm);
+  const auto work_mj = [&](const Wrench& held) {
+    return held.force_n.dot(handle_moved_mm) + held.torque_nmm.dot(handle_turned_rad);
+  };
+  const double given_mj = work_mj(shown_);
   account_mj_ -= given_mj;
   report_.episode_mj += given_mj;
-  filled_mj_ = std::max(0.0, -damping_n_.dot(handle_moved_mm));
-  // Who has held still surprises little: else a slow, light feed would be held back for good.
-  const double seen = params_.wary * (handle_moved_mm - moved_mm_).norm() / (params_.dt_s * params_.dt_s);
-  const double fading = surprise_mm_per_s2_ * std::exp(-params_.dt_s / params_.lately_s);
-  surprise_mm_per_s2_ = std::min(params_.surprise_mm_per_s2, std::max({seen, fading, params_.calm_mm_per_s2}));
-  moved_mm_ = handle_moved_mm;
+  filled_mj_ = std::max(0.0, -work_mj(damping_));
+  moves_.see(handle_moved_mm, params_);
+  turns_.see(params_.turn_arm_mm * handle_turned_rad, params_);
 }
 
-void EnergyLedger::settle(double cutting_mj, double stored_mj) noexcept {
+void EnergyLedger::settle(double cutting_mj, double stored_mj, double turned_mj) noexcept {
+  turned_mj_ = turned_mj;
   account_mj_ -= cutting_mj;
   report_.episode_mj += cutting_mj;
   report_.stored_mj = stored_mj;
@@ -40,7 +53,7 @@ void EnergyLedger::settle(double cutting_mj, double stored_mj) noexcept {
 }
 
 double EnergyLedger::paid_n_per_mm(double stiffness_n_per_mm, double extension_mm) const noexcept {
-  const double paid_mj = std::max(0.0, account_mj_ + params_.allowance_mj);
+  const double paid_mj = std::max(0.0, account_mj_ - turned_mj_ + params_.allowance_mj);
   const double square = extension_mm * extension_mm;
   return 2.0 * paid_mj >= stiffness_n_per_mm * square ? stiffness_n_per_mm : 2.0 * paid_mj / square;
 }
@@ -52,12 +65,10 @@ double EnergyLedger::draw(double wanted_mj) noexcept {
   return drawn_mj;
 }
 
-Vec3 EnergyLedger::limited(const Vec3& wanted_n, const Vec3& damping_n, bool touching) noexcept {
-  const double wanted = wanted_n.norm();
-  force_n_.setZero();
-  damping_n_.setZero();
+Wrench EnergyLedger::limited(const Wrench& wanted, const Wrench& damping, bool touching) noexcept {
+  shown_ = damping_ = {};
   if (!touching) {
-    if (!open_) return force_n_;
+    if (!open_) return shown_;
     open_ = false;
     report_.ended = true;
     report_.ended_mj = report_.episode_mj;
@@ -66,22 +77,21 @@ Vec3 EnergyLedger::limited(const Vec3& wanted_n, const Vec3& damping_n, bool tou
     report_.worst_mj = std::max(report_.worst_mj, report_.episode_mj);
     // A contact that gave a little goes on paying in the next one, so that a thousand of them do not add up.
     account_mj_ = std::clamp(0.5 * account_mj_, -0.5 * params_.allowance_mj, 0.0);
-    report_.episode_mj = report_.tank_mj = report_.stored_mj = 0.0;
-    return force_n_;
+    report_.episode_mj = report_.tank_mj = report_.stored_mj = turned_mj_ = 0.0;
+    return shown_;
   }
   open_ = true;
-  if (!(wanted > 0.0)) return force_n_;
-  // Held for a tick while the handle goes on as it did, give or take what it can accelerate.
-  const double out_mm = moved_mm_.dot(wanted_n) / wanted + surprise_mm_per_s2_ * params_.dt_s * params_.dt_s;
-  const double given_mj = wanted * out_mm, most_mj = std::max(0.0, account_mj_ + params_.allowance_mj);
+  const double given_mj =
+      moves_.most_mj(wanted.force_n, params_.dt_s) + turns_.most_mj(wanted.torque_nmm / params_.turn_arm_mm, params_.dt_s);
+  const double most_mj = std::max(0.0, account_mj_ + params_.allowance_mj);
   double share = 1.0;
   if (given_mj > most_mj) {
     share = most_mj / given_mj;
     report_.held_back = true;
   }
-  force_n_ = share * wanted_n;
-  damping_n_ = share * damping_n;
-  return force_n_;
+  shown_ = {share * wanted.force_n, share * wanted.torque_nmm};
+  damping_ = {share * damping.force_n, share * damping.torque_nmm};
+  return shown_;
 }
 
 }  // namespace osteon::haptic

@@ -20,7 +20,10 @@ LoopParams loop_params(double peak_n, double continuous_n, double stiffness_n_pe
 }
 
 HapticLoop::HapticLoop(const LoopParams& params, std::vector<ToolModel> tools)
-    : params_(params), tools_(std::move(tools)), ledger_(EnergyParams{.dt_s = params.dt_s}) {
+    : params_(params),
+      tools_(std::move(tools)),
+      ledger_(EnergyParams{.dt_s = params.dt_s, .turn_arm_mm = Proxy::kTurnArm_mm}),
+      turn_arm_mm_(params.peak_nmm > 0.0 ? Proxy::kTurnArm_mm : 0.0) {
   effects_.reserve(tools_.size());
   for (const ToolModel& model : tools_) effects_.emplace_back(model.tool, model.wear);
 }
@@ -38,9 +41,9 @@ void HapticLoop::take_up(int tool, const Pose& pose_bone_tool, const WorkspaceMa
   ledger_.reset();
   motor_.reset();
   if (!effects_.empty()) effects_[static_cast<std::size_t>(tool)].take_up();
-  force_bone_n_.setZero();
-  torque_bone_nmm_.setZero();
-  device_mm_ = pose_bone_tool.position_mm;
+  shown_ = {};
+  motor_nmm_.setZero();
+  device_ = pose_bone_tool;
   placed_ = true;
 }
 
@@ -60,16 +63,17 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
     pose_bone_device = proxy_.pose();
     coupling_.reset(pose_bone_device.position_mm, pose_bone_device.position_mm);
     ledger_.reset();
-    device_mm_ = pose_bone_device.position_mm;
+    device_ = pose_bone_device;
   }
   if (input.device_ok && !device_was_ok_) {
     coupling_.let_go_all(pose_bone_device.position_mm, proxy_.pose().position_mm);
     ledger_.reset();
-    device_mm_ = pose_bone_device.position_mm;
+    device_ = pose_bone_device;
     ramp_ = 0.0;
   }
   device_was_ok_ = input.device_ok;
-  ledger_.observe((pose_bone_device.position_mm - device_mm_) / mapping_.scale());
+  const Motion hand = between(device_, pose_bone_device);
+  ledger_.observe(hand.move_mm / mapping_.scale(), hand.turn_rad);
 
   // A guide lets the tool go only where its opening does; the hand feels the guide as the way that it is kept from.
   Pose pose_bone_wanted = pose_bone_device;
@@ -85,7 +89,8 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   spindle_.step(model.spindle, input.link_ok && placed_ ? input.spindle_rpm : 0.0, torque_nmm_, params_.dt_s);
   if (spindle_.stalled) report.events |= kStalled;
 
-  const Vec3 proxy_before_mm = proxy_.pose().position_mm;
+  const Pose proxy_before = proxy_.pose();
+  double paid_n_per_mm = coupling_n_per_mm_;
   ProxyStep step;
   if (!placed_ || patch.version == 0) step.covered = false;
   else {
@@ -93,8 +98,8 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
     if (cuts_waiting) report.events |= kCutsWaiting;
     // Cutting spends no more than the hand has put in.
     const double at_handle = params_.force_scale / mapping_.scale();
-    const double stretch_mm = (pose_bone_wanted.position_mm - proxy_before_mm).norm();
-    const double paid_n_per_mm = ledger_.paid_n_per_mm(at_handle * coupling_n_per_mm_, stretch_mm) / at_handle;
+    const double stretch_mm = (pose_bone_wanted.position_mm - proxy_before.position_mm).norm();
+    paid_n_per_mm = ledger_.paid_n_per_mm(at_handle * coupling_n_per_mm_, stretch_mm) / at_handle;
     step = proxy_.step(model, patch, pose_bone_wanted, spindle_.rpm, paid_n_per_mm,
                        input.link_ok && !input.clutch && !cuts_waiting, params_.dt_s,
                        {guides, guiding_.held() ? guiding_.guide_id() : 0u,
@@ -133,12 +138,20 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   const double limit_n = input.device_warm ? params_.continuous_n : params_.peak_n;
   CouplingMoment moment;
   moment.handle_mm = pose_bone_device.position_mm;
-  moment.proxy_before_mm = proxy_before_mm;
+  moment.proxy_before_mm = proxy_before.position_mm;
   moment.proxy_mm = proxy_.pose().position_mm;
   moment.stiffness_n_per_mm = coupling_n_per_mm_;
   moment.limit_n = limit_n / s;
   moment.energy_scale = s / mapping_.scale();
   moment.touching = (step.contact || step.breakthrough || held_back) && step.covered && !input.clutch;
+  // A torque goes to the handle as the work of a force does, so that one store holds both: where the workspace is larger than
+  // the bone, levers seem longer.
+  moment.stiffness_nmm_per_rad = turn_arm_mm_ * turn_arm_mm_ * coupling_n_per_mm_;
+  moment.limit_nmm = params_.peak_nmm / moment.energy_scale;
+  if (step.contact) {
+    moment.turn_before_rad = between(proxy_before, pose_bone_wanted).turn_rad;
+    moment.turn_rad = step.turn_rad;
+  }
   const CouplingForce coupling = coupling_.step(moment, step, ledger_, params_.dt_s, params_.smooth_s);
   if (coupling.limited) report.events |= kForceLimited;
   if (coupling.breakthrough) report.events |= kBreakthrough;
@@ -149,8 +162,13 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   wear_and_clog(model, step, moment.touching ? coupling.spring_n : Vec3(Vec3::Zero()));
   if (moment.touching) report.torque_physical_nmm = step.contact_torque_nmm;
 
-  show(input, model, coupling, moment, report);
-  device_mm_ = pose_bone_device.position_mm;
+  // The spring of the turn is the coupling's. The moment of the cut is not: the bone turns back a spindle, and presses on
+  // faces beside the tip; whoever gives way to it gets the motor's work, not what the hand has put in.
+  Vec3 cut_nmm = Vec3::Zero();
+  if (step.cutting && moment.touching)
+    cut_nmm = step.contact_torque_nmm + paid_n_per_mm * Proxy::kTurnArm_mm * Proxy::kTurnArm_mm * step.turn_rad;
+  show(input, model, coupling, moment, cut_nmm, report);
+  device_ = pose_bone_device;
   return report;
 }
 
@@ -180,31 +198,42 @@ double HapticLoop::load_nmm(const ProxyStep& step, double pressed_n) noexcept {
 }
 
 void HapticLoop::show(const LoopInput& input, const ToolModel& model, const CouplingForce& coupling, const CouplingMoment& moment,
-                      LoopReport& report) noexcept {
-  const double s = params_.force_scale, limit_n = s * moment.limit_n;
+                      const Vec3& cut_nmm, LoopReport& report) noexcept {
+  const double s = params_.force_scale, limit_n = s * moment.limit_n, limit_nmm = params_.peak_nmm;
   const bool safe = input.device_ok && input.link_ok && input.periods <= 3;
   ramp_ = std::min(1.0, ramp_ + params_.dt_s / params_.ramp_s);
   if (ramp_ < 1.0) report.events |= kRamping;
 
+  // The hand's own movement may raise the force as fast as it moves, spring and damping; everything else only slowly. Of a
+  // turn, as much at its arm.
+  const double hand_mm = norm_mm(between(device_, report.pose_bone_device), turn_arm_mm_);
+  const double by_hand_n = 2.0 * s * coupling_n_per_mm_ * hand_mm;
+  const double slow_n = params_.slew_n_per_ms * 1e3 * params_.dt_s * input.periods;
   // Safety zeros and free air come at once.
-  Vec3 force_n = Vec3::Zero();
+  const Vec3 turn_nmm = moment.energy_scale * (coupling.turn_spring_nmm + coupling.turn_damping_nmm);
+  Wrench wanted;
   if (moment.touching && safe) {
-    force_n = s * (coupling.spring_n + coupling.damping_n + coupling.cutting_lag_n);
-    force_n = slewed(ramp_ * clamped(force_n, limit_n), (moment.handle_mm - device_mm_).norm(), input.periods, report);
+    wanted.force_n = s * (coupling.spring_n + coupling.damping_n + coupling.cutting_lag_n);
+    wanted.force_n = slewed(ramp_ * clamped(wanted.force_n, limit_n), shown_.force_n, by_hand_n + slow_n, report);
+    wanted.torque_nmm = slewed(ramp_ * clamped(turn_nmm, limit_nmm), shown_.torque_nmm,
+                               turn_arm_mm_ * (by_hand_n / mapping_.scale() + slow_n), report);
   }
-  const double whole_n = s * (coupling.spring_n + coupling.damping_n).norm();
-  const double share = whole_n > 0.0 ? std::min(1.0, force_n.norm() / whole_n) : 0.0;
-  force_bone_n_ = ledger_.limited(force_n, share * s * coupling.damping_n, moment.touching);
+  const auto share = [](const Vec3& shown, double whole) { return whole > 0.0 ? std::min(1.0, shown.norm() / whole) : 0.0; };
+  const Wrench damping{
+      share(wanted.force_n, s * (coupling.spring_n + coupling.damping_n).norm()) * s * coupling.damping_n,
+      share(wanted.torque_nmm, turn_nmm.norm()) * moment.energy_scale * coupling.turn_damping_nmm};
+  shown_ = ledger_.limited(wanted, damping, moment.touching);
   report.energy = ledger_.report();
   if (report.energy.held_back) report.events |= kEnergyLimited;
-  report.coupling_device_n = mapping_.to_device(force_bone_n_);
+  report.coupling_device_n = mapping_.to_device(shown_.force_n);
+  report.coupling_device_nmm = mapping_.to_device(shown_.torque_nmm);
 
   // The motor's port, beside the ledger, in what the limit leaves.
   MotorMoment motor;
   motor.pedal = input.spindle_rpm > 0.0 && safe;
   motor.spindle_rpm = spindle_.rpm;
   motor.teeth = model.tool.teeth;
-  motor.normal_n = force_bone_n_ / s;
+  motor.normal_n = shown_.force_n / s;
   motor.axis = report.pose_bone_proxy.direction(Vec3::UnitZ());
   motor.cutting = report.phase == CuttingPhase::cutting;
   motor.across_n = report.across_n;
@@ -212,30 +241,29 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   if (params_.tool_effects) motor.pull_n = effects_[static_cast<std::size_t>(tool_)].pull_n();
   Vec3 motor_n = s * motor_.step(motor, params_.dt_s);
   if (!params_.motor_effects || !safe) motor_n.setZero();
-  motor_n = clamped(motor_n, std::max(0.0, limit_n - force_bone_n_.norm()));
+  motor_n = clamped(motor_n, std::max(0.0, limit_n - shown_.force_n.norm()));
   report.motor_device_n = mapping_.to_device(motor_n);
   report.force_device_n = report.coupling_device_n + report.motor_device_n;
 
-  // Torque, for a device that shows it; never a force. What the hand did not turn grows slowly, as force does.
-  const Vec3 wanted_nmm =
-      moment.touching && safe ? clamped(ramp_ * s * report.torque_physical_nmm, params_.peak_nmm) : Vec3(Vec3::Zero());
-  const double most_nmm =
-      torque_bone_nmm_.norm() + Proxy::kTurnArm_mm * params_.slew_n_per_ms * 1e3 * params_.dt_s * input.periods;
-  torque_bone_nmm_ = clamped(wanted_nmm, most_nmm);
-  report.torque_device_nmm = mapping_.to_device(torque_bone_nmm_);
+  // So too the moment of the cut, never a force: no more than the force shown would be at the arm of a turn, and no faster
+  // than force grows that the hand did not cause.
+  const double most_nmm = std::min(turn_arm_mm_ * shown_.force_n.norm() / mapping_.scale(),
+                                   std::max(0.0, limit_nmm - shown_.torque_nmm.norm()));
+  Vec3 motor_nmm = Vec3::Zero();
+  if (params_.motor_effects && safe) motor_nmm = ramp_ * motor_.open() * moment.energy_scale * cut_nmm;
+  motor_nmm_ = clamped(clamped(motor_nmm, motor_nmm_.norm() + turn_arm_mm_ * slow_n), most_nmm);
+  report.motor_device_nmm = mapping_.to_device(motor_nmm_);
+  report.torque_device_nmm = report.coupling_device_nmm + report.motor_device_nmm;
 }
 
-Vec3 HapticLoop::slewed(const Vec3& wanted_n, double hand_mm, int periods, LoopReport& report) const noexcept {
-  // The hand's own movement may raise the force as fast as it moves, spring and damping; everything else only slowly.
-  // Lessening what there is comes at once: what counts is the way from the nearest part of the present force.
-  const double square = force_bone_n_.squaredNorm();
-  const double kept = square > 0.0 ? std::clamp(wanted_n.dot(force_bone_n_) / square, 0.0, 1.0) : 0.0;
-  const Vec3 from_n = kept * force_bone_n_, step_n = wanted_n - from_n;
-  const double most_n =
-      2.0 * params_.force_scale * coupling_n_per_mm_ * hand_mm + params_.slew_n_per_ms * 1e3 * params_.dt_s * periods;
-  if (step_n.norm() <= most_n) return wanted_n;
+Vec3 HapticLoop::slewed(const Vec3& wanted, const Vec3& now, double most, LoopReport& report) noexcept {
+  // Lessening what there is comes at once: what counts is the way from the nearest part of what is shown now.
+  const double square = now.squaredNorm();
+  const double kept = square > 0.0 ? std::clamp(wanted.dot(now) / square, 0.0, 1.0) : 0.0;
+  const Vec3 from = kept * now, step = wanted - from;
+  if (step.norm() <= most) return wanted;
   report.events |= kSlewLimited;
-  return from_n + step_n * (most_n / step_n.norm());
+  return from + step * (most / step.norm());
 }
 
 void HapticLoop::record(const ToolModel& model, const ProxyStep& step, LoopReport& report) noexcept {

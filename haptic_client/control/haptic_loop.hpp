@@ -72,7 +72,9 @@ struct LoopReport {
   Vec3 coupling_device_n = Vec3::Zero(); // what of force_device_n is the coupling's: passive
   Vec3 motor_device_n = Vec3::Zero();    // the rest, the motor's: active, within s · mu · normal force
   Vec3 torque_physical_nmm = Vec3::Zero();  // of the bone on the tool about its tip, bone frame; not scaled
-  Vec3 torque_device_nmm = Vec3::Zero();    // to write to a device that shows torque, device frame
+  Vec3 torque_device_nmm = Vec3::Zero();    // to write to a device that shows torque, device frame: the sum of these
+  Vec3 coupling_device_nmm = Vec3::Zero();  // of the turn's spring: passive, in the ledger
+  Vec3 motor_device_nmm = Vec3::Zero();     // moment of the cut: active, within the coupling's force at the arm of a turn
   Vec3 moved_mm = Vec3::Zero();          // of the proxy in this tick
   Pose pose_bone_proxy, pose_bone_device;
   Vec3 offset_mm = Vec3::Zero();         // of the handle's place, bone frame: slack, and what returned bone would have stretched
@@ -112,10 +114,12 @@ class HapticLoop {
   void record(const ToolModel& model, const ProxyStep& step, LoopReport& report) noexcept;
   void wear_and_clog(const ToolModel& model, const ProxyStep& step, const Vec3& spring_n) noexcept;
   [[nodiscard]] double load_nmm(const ProxyStep& step, double pressed_n) noexcept;
-  // The force on the handle: the coupling's within ramp, slew limit and energy, and the motor's.
+  // Force and torque on the handle: the coupling's within ramp, slew limit and energy, and the motor's. `cut_nmm`: moment of
+  // the cut, physical.
   void show(const LoopInput& input, const ToolModel& model, const CouplingForce& coupling, const CouplingMoment& moment,
-            LoopReport& report) noexcept;
-  [[nodiscard]] Vec3 slewed(const Vec3& wanted_n, double hand_mm, int periods, LoopReport& report) const noexcept;
+            const Vec3& cut_nmm, LoopReport& report) noexcept;
+  // A force or torque, `now` what is shown, that rises by no more than `most`.
+  [[nodiscard]] static Vec3 slewed(const Vec3& wanted, const Vec3& now, double most, LoopReport& report) noexcept;
 
   static constexpr int kQuietTicks = 20;  // a path ends when the tool has been off the bone for so long
 
@@ -138,9 +142,10 @@ class HapticLoop {
   Coupling coupling_;
   EnergyLedger ledger_;
   MotorPort motor_;
-  Vec3 torque_bone_nmm_ = Vec3::Zero();   // rendered in the last tick
-  Vec3 force_bone_n_ = Vec3::Zero();      // of the coupling, rendered in the last tick
-  Vec3 device_mm_ = Vec3::Zero();         // device in the last tick, bone frame
+  Wrench shown_;                          // of the coupling, rendered in the last tick, bone frame
+  Vec3 motor_nmm_ = Vec3::Zero();         // of the motor, likewise
+  double turn_arm_mm_ = 0;                // of a turn that does work at the handle; zero where no torque is shown
+  Pose device_;                           // device in the last tick, bone frame
   bool device_was_ok_ = true;
   double ramp_ = 0;                       // 0 … 1
 };

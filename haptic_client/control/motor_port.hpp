@@ -36,6 +36,8 @@ class MotorPort {
   // [haptic] Force on the tool, physical, N, in the frame of the moment's vectors. Its size is at most friction times that
   // of the normal force, and zero from off_s after the pedal on.
   [[nodiscard]] Vec3 step(const MotorMoment& moment, double dt_s) noexcept;
+  // [haptic] 0 … 1: how much of what the motor does comes through now; zero from off_s after the pedal on.
+  [[nodiscard]] double open() const noexcept { return open_; }
   [[nodiscard]] const MotorPortParams& params() const noexcept { return params_; }
 
  private:

@@ -23,6 +23,7 @@ constexpr double kRound_s = 10.0;      // then a new hand, new bone
 constexpr double kPatch_s = 0.008;     // between two patches
 constexpr double kThinWall_mm = 1.0;
 constexpr double kCavity_mm = 5.0;     // radius of a hollow 4 mm deep
+constexpr double kTorqueArm_mm = 50.0; // of a device that shows torque: its largest torque over its continuous force
 
 // A block 16 mm wide, entered along +z through z = 0.
 Case scene_bone(StabilityScene scene) {
@@ -65,41 +66,95 @@ struct Gesture {
   }
 };
 
+// How a hand that turns means to tilt: about two axes by up to 15 degrees together, and a little about a third. It gives way
+// to torque as a wrist does, with some inertia, damping and stiffness [A].
+class Wrist {
+ public:
+  Wrist(Random& random, double strength) : strength_(strength) {
+    for (double& hz : hz_) hz = random.between(0.2, 1.5);
+    for (double& p : phase_) p = random.between(0.0, 6.28);
+    most_rad_ = random.between(0.03, 0.26);
+  }
+  // Turned from upright, bone frame, after a tick under this torque; a rig does not give way.
+  Eigen::Quaterniond step(double walked_s, double in, bool rig, const Vec3& torque_nmm, double dt_s) {
+    constexpr double kInertia_nmm_s2 = 3.0, kDamping_nmm_s = 150.0, kStiffness_nmm = 3000.0;
+    const auto wave = [&](int i) { return std::sin(2.0 * std::numbers::pi * hz_[i] * walked_s + phase_[i]); };
+    const Vec3 wish_rad = in * most_rad_ * Vec3(0.7 * wave(0), 0.7 * wave(1), 0.14 * wave(2));  // no longer than 1
+    if (!rig) {
+      speed_ += dt_s / kInertia_nmm_s2 * (torque_nmm / strength_ - kDamping_nmm_s * speed_ - kStiffness_nmm * off_rad_);
+      off_rad_ += dt_s * speed_;
+    }
+    return turned(wish_rad) * turned(off_rad_);
+  }
+
+ private:
+  static Eigen::Quaterniond turned(const Vec3& by_rad) { return moved({}, {.turn_rad = by_rad}).rotation; }
+  double strength_, hz_[3], phase_[3], most_rad_;
+  Vec3 off_rad_ = Vec3::Zero(), speed_ = Vec3::Zero();
+};
+
 // Energy and steps, from what crosses the handle alone.
 class Observer {
  public:
   Observer(StabilityResult& result, const LoopParams& params, double scale, double coupling_n_per_mm)
       : result_(result), params_(params), scale_(scale), coupling_n_per_mm_(coupling_n_per_mm) {}
 
-  void see(const LoopReport& report, const Vec3& handle_mm, bool pedal) {
+  void see(const LoopReport& report, const Pose& handle, bool pedal) {
+    const Vec3& handle_mm = handle.position_mm;
     const Vec3 moved_mm = first_ ? Vec3(Vec3::Zero()) : Vec3(handle_mm - handle_mm_);
+    // A device that shows no torque takes no work from a turn.
+    Vec3 turned_rad = Vec3::Zero();
+    if (!first_ && params_.peak_nmm > 0.0) {
+      const Eigen::AngleAxisd turn(handle.rotation * rotation_.conjugate());
+      turned_rad = turn.angle() * turn.axis();
+    }
+    const double turned_mj = torque_nmm_.dot(turned_rad);
+    result_.turned_mj -= turned_mj;
     const double s = params_.force_scale;
     const double cut_mj = s / scale_ * report.cutting_work_mj;
-    episode_mj_ += force_n_.dot(moved_mm) + cut_mj;
+    episode_mj_ += force_n_.dot(moved_mm) + turned_mj + cut_mj;
     result_.cutting_mj += cut_mj;
     result_.least_cutting_n_mm = std::min(result_.least_cutting_n_mm, report.cutting_force_n.dot(report.moved_mm));
 
     const Vec3& force_n = report.coupling_device_n;
+    const Vec3& torque_nmm = report.coupling_device_nmm;
     const bool touching = report.phase == CuttingPhase::rubbing || report.phase == CuttingPhase::cutting;
-    if (!touching && force_n.isZero()) finish();
+    if (!touching && force_n.isZero() && torque_nmm.isZero()) finish();
     else open_ = true;
 
     // The hand's motion raises spring and damping: k for each millimetre of this tick, b/T for what it went faster than in
     // the last.
     const double k = s * coupling_n_per_mm_ * scale_;
-    const double by_hand_n = k * (2.0 * moved_mm.norm() + moved_before_mm_.norm());
-    const double square = force_n_.squaredNorm();
-    const double kept = square > 0.0 ? std::clamp(force_n.dot(force_n_) / square, 0.0, 1.0) : 0.0;
-    const double step_n = (force_n - kept * force_n_).norm();
+    const double at_arm_mm = Proxy::kTurnArm_mm / scale_;  // of a turn, at the handle
+    const double moved_by_mm = std::hypot(moved_mm.norm(), at_arm_mm * turned_rad.norm());
+    const double by_hand_n = k * (2.0 * moved_by_mm + moved_before_mm_);
+    const auto grown = [](const Vec3& now, const Vec3& before) {
+      const double square = before.squaredNorm();
+      return (now - (square > 0.0 ? std::clamp(now.dot(before) / square, 0.0, 1.0) : 0.0) * before).norm();
+    };
+    const double step_n = grown(force_n, force_n_);
     const double slew_n = params_.slew_n_per_ms * 1e3 * params_.dt_s;
     result_.step_over_n = std::max(result_.step_over_n, step_n - slew_n - by_hand_n);
-    if (moved_mm.norm() < 1e-12 && moved_before_mm_.norm() < 1e-12) result_.still_step_n = std::max(result_.still_step_n, step_n);
+    if (moved_by_mm < 1e-12 && moved_before_mm_ < 1e-12) result_.still_step_n = std::max(result_.still_step_n, step_n);
+    // A turn's spring at its arm is the move's at the handle; the slew limit is at the tool's arm.
+    const double turn_step_nmm = grown(torque_nmm, torque_nmm_);
+    result_.turn_step_over_n =
+        std::max(result_.turn_step_over_n, (turn_step_nmm - at_arm_mm * by_hand_n) / Proxy::kTurnArm_mm - slew_n);
+    const double cut_nmm = report.motor_device_nmm.norm();
+    result_.cut_step_over_n = std::max(result_.cut_step_over_n, (cut_nmm - cut_nmm_) / Proxy::kTurnArm_mm - slew_n);
+    result_.cut_over_nmm = std::max(result_.cut_over_nmm, cut_nmm - at_arm_mm * force_n.norm());
+    result_.cut_most_nmm = std::max(result_.cut_most_nmm, cut_nmm);
+    result_.torque_most_nmm = std::max(result_.torque_most_nmm, report.torque_device_nmm.norm());
+    result_.torque_over_nmm = std::max(result_.torque_over_nmm, report.torque_device_nmm.norm() - params_.peak_nmm);
 
     const double motor_n = report.motor_device_n.norm();
     result_.motor_over_n = std::max(result_.motor_over_n, motor_n - MotorPortParams{}.friction * force_n.norm());
     result_.motor_most_n = std::max(result_.motor_most_n, motor_n);
     off_s_ = pedal ? 0.0 : off_s_ + params_.dt_s;
-    if (off_s_ > 0.010 + 0.5 * params_.dt_s) result_.motor_late_n = std::max(result_.motor_late_n, motor_n);
+    if (off_s_ > 0.010 + 0.5 * params_.dt_s) {
+      result_.motor_late_n = std::max(result_.motor_late_n, motor_n);
+      result_.cut_late_nmm = std::max(result_.cut_late_nmm, cut_nmm);
+    }
     result_.force_most_n = std::max(result_.force_most_n, report.force_device_n.norm());
 
     ++result_.ticks;
@@ -111,8 +166,11 @@ class Observer {
     result_.slew_limited += (report.events & kSlewLimited) != 0;
 
     force_n_ = force_n;
+    torque_nmm_ = torque_nmm;
+    cut_nmm_ = cut_nmm;
     handle_mm_ = handle_mm;
-    moved_before_mm_ = moved_mm;
+    rotation_ = handle.rotation;
+    moved_before_mm_ = moved_by_mm;
     first_ = false;
   }
   void finish() {
@@ -132,8 +190,9 @@ class Observer {
   StabilityResult& result_;
   LoopParams params_;
   double scale_, coupling_n_per_mm_;
-  Vec3 force_n_ = Vec3::Zero(), handle_mm_ = Vec3::Zero(), moved_before_mm_ = Vec3::Zero();
-  double episode_mj_ = 0, off_s_ = 0;
+  Vec3 force_n_ = Vec3::Zero(), torque_nmm_ = Vec3::Zero(), handle_mm_ = Vec3::Zero();
+  Eigen::Quaterniond rotation_ = Eigen::Quaterniond::Identity();
+  double moved_before_mm_ = 0, cut_nmm_ = 0, episode_mj_ = 0, off_s_ = 0;
   bool open_ = false, first_ = true;
 };
 
@@ -151,6 +210,8 @@ class Round {
     const SimulatedDeviceParams device = number / 2 % 2 ? *find_simulated_device("simulated-3.3N") : SimulatedDeviceParams{};
     LoopParams params = loop_params(device.limits.peak_n, device.limits.continuous_n, device.limits.stiffness_n_per_mm, 0.0);
     params.dt_s = run.dt_s;
+    // Fifty millimetres for each newton that it can hold, as sigma.7 and omega.7 have it.
+    if (run.six_axes) params.peak_nmm = kTorqueArm_mm * device.limits.continuous_n;
     const char* const tool = run.scene == StabilityScene::drill       ? "drill-3.2"
                              : run.scene == StabilityScene::thin_wall ? "burr-round-3.2"
                                                                       : "burr-round-5";
@@ -159,7 +220,7 @@ class Round {
 
     const Pose start{{0, 0, -3},
                      Eigen::Quaterniond(Eigen::AngleAxisd(run.scene == StabilityScene::drill ? 0.0 : 0.5, Vec3::UnitX()))};
-    rotation_ = start.rotation;
+    upright_ = rotation_ = start.rotation;
     WorkspaceMapping mapping;
     mapping.align(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized())),
                   device.limits.stiffness_n_per_mm < 10.0 ? 0.5 : 1.0, Vec3::Zero(), start.position_mm);
@@ -169,6 +230,7 @@ class Round {
     device_->take(scaled(hand, params.force_scale, mapping.scale()), mapping.pose_device_tool(start).position_mm);
     gesture_ = std::make_unique<Gesture>(run.scene, rig_, loop_->coupling_n_per_mm(), random_);
     observer_ = std::make_unique<Observer>(result, params, mapping.scale(), loop_->coupling_n_per_mm());
+    if (run.six_axes) wrist_ = std::make_unique<Wrist>(random_, params.force_scale / mapping.scale());
     builder_.build(replica_.bodies(), loop_->tool(0), start, patch_);
   }
 
@@ -190,6 +252,7 @@ class Round {
 
     // From where it was taken up into the gesture within half a second.
     const double in = std::min(1.0, 2.0 * t);
+    if (wrist_) rotation_ = wrist_->step(walked_s_, in, rig_, loop_->mapping().to_bone(torque_nmm_), run_.dt_s) * upright_;
     const Vec3 target_mm = in * gesture_->at(walked_s_, 2.5 * (rotation_ * Vec3::UnitZ()), run_.scene == StabilityScene::cavity) +
                            (1.0 - in) * Vec3(0, 0, -3);
     const WorkspaceMapping& mapping = loop_->mapping();
@@ -208,7 +271,8 @@ class Round {
     const LoopReport report = loop_->tick(input, patch_);
     result_.allocations += heap.count();
     device_->write(DeviceOutput(report.force_device_n));
-    observer_->see(report, reading.pose_device_tool.position_mm, pedal);
+    torque_nmm_ = report.torque_device_nmm;
+    observer_->see(report, reading.pose_device_tool, pedal);
     const double below_mm = report.pose_bone_proxy.position_mm.z();
     if (run_.scene == StabilityScene::thin_wall &&
         std::hypot(report.pose_bone_proxy.position_mm.x(), report.pose_bone_proxy.position_mm.y()) < 6.0)
@@ -259,7 +323,9 @@ class Round {
   std::unique_ptr<SimulatedDevice> device_;
   std::unique_ptr<Gesture> gesture_;
   std::unique_ptr<Observer> observer_;
-  Eigen::Quaterniond rotation_;
+  std::unique_ptr<Wrist> wrist_;  // of a hand that turns
+  Eigen::Quaterniond upright_, rotation_;
+  Vec3 torque_nmm_ = Vec3::Zero();
   double full_rpm_ = 0, walked_s_ = 0;
 };
 
@@ -274,13 +340,15 @@ void StabilityResult::add(const StabilityResult& other) {
   ticks += other.ticks, touching += other.touching, cutting += other.cutting, uncovered += other.uncovered;
   held_back += other.held_back, returned += other.returned, slew_limited += other.slew_limited;
   episodes += other.episodes, others_cuts += other.others_cuts, undone += other.undone, allocations += other.allocations;
-  generated_mj += other.generated_mj, net_mj += other.net_mj, cutting_mj += other.cutting_mj;
+  generated_mj += other.generated_mj, net_mj += other.net_mj, cutting_mj += other.cutting_mj, turned_mj += other.turned_mj;
   worst_mj = std::max(worst_mj, other.worst_mj);
   least_cutting_n_mm = std::min(least_cutting_n_mm, other.least_cutting_n_mm);
   for (double StabilityResult::*most :
        {&StabilityResult::step_over_n, &StabilityResult::still_step_n, &StabilityResult::motor_over_n,
         &StabilityResult::motor_late_n, &StabilityResult::motor_most_n, &StabilityResult::force_most_n,
-        &StabilityResult::deepest_mm})
+        &StabilityResult::deepest_mm, &StabilityResult::turn_step_over_n, &StabilityResult::cut_step_over_n,
+        &StabilityResult::cut_over_nmm, &StabilityResult::cut_late_nmm, &StabilityResult::cut_most_nmm,
+        &StabilityResult::torque_most_nmm, &StabilityResult::torque_over_nmm})
     this->*most = std::max(this->*most, other.*most);
 }
 

@@ -1,6 +1,6 @@
 // A hand at the haptic loop for as many ticks as one likes, in pure virtual time: it strokes, presses and cuts while a room
 // behind a slow network lets others cut under it and takes bone back. What the loop gives the hand is accounted for from
-// outside, from nothing but forces written and places read.
+// outside, from nothing but forces and torques written and poses read.
 #pragma once
 #include <cstdint>
 
@@ -18,6 +18,8 @@ struct StabilityRun {
   int delay_ms = 0;            // one way
   double dt_s = 1e-3;
   bool others = true;          // cut near the tool, and undo under it
+  // The device shows torque too, and the hand tilts its handle by up to 15 degrees and gives way to that torque.
+  bool six_axes = false;
   std::uint64_t seed = 1;
 };
 
@@ -31,6 +33,15 @@ struct StabilityResult {
   double least_cutting_n_mm = 0;  // of all ticks' F_cut · dx
   double step_over_n = 0;      // growth of force in a tick that neither the hand's motion nor the slew limit explains; 0: none
   double still_step_n = 0;     // growth of force in a tick while the handle stood still
+  // The same of torque, over the arm of a turn; of the cut's moment without the hand, as it is not the hand's.
+  double turn_step_over_n = 0;
+  double cut_step_over_n = 0;
+  double cut_over_nmm = 0;     // of the cut's moment over the force shown at the arm of a turn
+  double cut_late_nmm = 0;     // of the cut's moment later than 10 ms after the pedal
+  double cut_most_nmm = 0;
+  double torque_most_nmm = 0;
+  double turned_mj = 0;        // that the hand put in by turning, over all
+  double torque_over_nmm = 0;  // beyond the device's limit
   double motor_over_n = 0;     // of the motor's force over s · mu · normal force
   double motor_late_n = 0;     // of the motor's force later than 10 ms after the pedal
   double motor_most_n = 0;

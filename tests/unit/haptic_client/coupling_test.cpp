@@ -17,13 +17,19 @@ using osteon::test::Random;
 
 constexpr double kT = 1e-3;
 
+constexpr double kArm_mm = 20.0;  // of a turn
+
 // A sampled wall, spring and damper, whose force is held for a tick: what it gives a handle that is thrown about at random
-// with no more than `most_mm_per_s2`. Most of one contact, mJ.
+// with no more than `most_mm_per_s2`. Most of one contact, mJ. `turned`: the same about an axis, at the arm of a turn.
 struct Wall {
   double worst_mj = -1e9;
   int contacts = 0;
 };
-Wall bounce(double stiffness_n_per_mm, double damping_share, double most_mm_per_s2, bool monitored) {
+Wall bounce(double stiffness_n_per_mm, double damping_share, double most_mm_per_s2, bool monitored, bool turned = false) {
+  const auto wrench = [turned](double n) {
+    const Vec3 of(n, 0, 0);
+    return turned ? Wrench{.torque_nmm = kArm_mm * of} : Wrench{.force_n = of};
+  };
   Random random(7);
   EnergyLedger ledger;
   double x = -0.05, v = 0.0, e_before = 0.0, force = 0.0, given = 0.0;
@@ -35,14 +41,15 @@ Wall bounce(double stiffness_n_per_mm, double damping_share, double most_mm_per_
     v += a * kT;
     x += v * kT;
     given += -force * v * kT;  // force is outward, -x
-    ledger.observe({v * kT, 0, 0});
+    const Vec3 way_mm(v * kT, 0, 0), nothing = Vec3::Zero();
+    ledger.observe(turned ? nothing : way_mm, turned ? Vec3(way_mm / kArm_mm) : nothing);
     const double e = std::max(0.0, x);
     const bool touching = e > 0.0;
     const double spring = stiffness_n_per_mm * e;
     const double damping = std::clamp(damping_share * stiffness_n_per_mm * (e - e_before), -spring, spring);
     ledger.settle(0.0, 0.5 * stiffness_n_per_mm * e * e);
-    const Vec3 shown = ledger.limited({-(spring + damping), 0, 0}, {-damping, 0, 0}, touching);
-    force = monitored ? -shown.x() : touching ? spring + damping : 0.0;
+    const Wrench shown = ledger.limited(wrench(-(spring + damping)), wrench(-damping), touching);
+    force = monitored ? -(turned ? shown.torque_nmm.x() / kArm_mm : shown.force_n.x()) : touching ? spring + damping : 0.0;
     e_before = e;
     if (inside && !touching) {
       wall.worst_mj = std::max(wall.worst_mj, given);
@@ -62,9 +69,30 @@ TEST(EnergyLedger, NoContactGivesMoreThanItsAllowance) {
       const Wall wall = bounce(stiffness, damping, params.surprise_mm_per_s2, true);
       EXPECT_GT(wall.contacts, 1000);
       EXPECT_LE(wall.worst_mj, params.allowance_mj + 1e-12) << stiffness << ' ' << damping;
+      // A turn is accounted for as the move at its arm.
+      EXPECT_NEAR(bounce(stiffness, damping, params.surprise_mm_per_s2, true, true).worst_mj, wall.worst_mj, 1e-6);
     }
   // The same without the monitor: a spring that is sampled gives energy away.
   EXPECT_GT(bounce(50.0, 0.0, params.surprise_mm_per_s2, false).worst_mj, 0.01);
+}
+
+// Nobody has put anything in: force and torque together may give the allowance over the way and the turn that a handle at
+// rest can make in a tick, 0.01 mm each, of a turn at its arm. Both are held back by one share.
+TEST(EnergyLedger, ForceAndTorqueAreHeldBackTogether) {
+  EnergyLedger ledger(EnergyParams{.allowance_mj = 0.006, .surprise_mm_per_s2 = 1e4, .calm_mm_per_s2 = 1e4});
+  ledger.observe(Vec3::Zero());
+  ledger.settle(0.0, 0.0);
+  const Wrench wanted{{0.0, 3.0, 4.0}, {0.0, 0.0, 140.0}};  // 5 N, and 7 N at the arm
+  const Wrench shown = ledger.limited(wanted, {}, true);
+  const double share = 0.006 / (0.01 * (5.0 + 7.0));
+  EXPECT_NEAR((shown.force_n - share * wanted.force_n).norm(), 0.0, 1e-12);
+  EXPECT_NEAR((shown.torque_nmm - share * wanted.torque_nmm).norm(), 0.0, 1e-12);
+  EXPECT_TRUE(ledger.report().held_back);
+  // The hand gives in to both as far as was foreseen: that is the allowance, and no more is shown.
+  ledger.observe(0.01 * wanted.force_n.normalized(), 0.01 / kArm_mm * Vec3::UnitZ());
+  EXPECT_NEAR(ledger.report().episode_mj, 0.006, 1e-12);
+  ledger.settle(0.0, 0.0);
+  EXPECT_NEAR(ledger.limited(wanted, {}, true).torque_nmm.norm(), 0.0, 1e-9);
 }
 
 // Pressing in and out at constant speed costs the hand what a damper of k·T costs, twice k·T·v·way, and a tick's worth.
@@ -79,7 +107,7 @@ TEST(EnergyLedger, CountsWhatTheDamperTook) {
     ledger.observe({moved, 0, 0});
     const double spring = k * e, damping = std::clamp(k * (e - e_before), -spring, spring);
     ledger.settle(0.0, 0.5 * k * e * e);
-    static_cast<void>(ledger.limited({-(spring + damping), 0, 0}, {-damping, 0, 0}, e > 0.0));
+    static_cast<void>(ledger.limited({{-(spring + damping), 0, 0}}, {{-damping, 0, 0}}, e > 0.0));
     e_before = e;
   }
   given_mj = ledger.report().ended_mj;
@@ -104,7 +132,7 @@ TEST(EnergyLedger, CuttingIsPaidByTheHand) {
     ledger.observe({feed, 0, 0});
     if (pressing) e += feed;
     ledger.settle(pressing ? 0.0 : k * e * feed, 0.5 * k * e * e);
-    static_cast<void>(ledger.limited({-k * e, 0, 0}, Vec3::Zero(), true));
+    static_cast<void>(ledger.limited({{-k * e, 0, 0}}, {}, true));
     if (i == 200) at_rest = ledger.report().episode_mj;
   }
   EXPECT_NEAR(ledger.report().episode_mj, at_rest, 1e-9);
@@ -127,7 +155,8 @@ class CouplingAtWall : public ::testing::Test {
     ledger_.observe(handle_mm - handle_mm_);
     handle_mm_ = handle_mm;
     const CouplingForce force = coupling_.step(moment_, step_, ledger_, kT, 2e-3);
-    static_cast<void>(ledger_.limited(force.spring_n + force.damping_n, force.damping_n, moment_.touching));
+    static_cast<void>(ledger_.limited({force.spring_n + force.damping_n, force.turn_spring_nmm + force.turn_damping_nmm},
+                                       {force.damping_n, force.turn_damping_nmm}, moment_.touching));
     return force;
   }
   Coupling coupling_;
@@ -206,6 +235,56 @@ TEST_F(CouplingAtWall, ReturnedBoneStoresNothing) {
   }
   EXPECT_LT(coupling_.offset_mm().norm(), 0.3);
   EXPECT_GT(coupling_.offset_mm().norm(), 0.0);
+}
+
+// The end of a shank 80 mm from the tip meets a wall while the hand turns and does not move. With both springs in a row the
+// move bears 1/17 of the way that the end is kept from, and the turn's arm 4/17. Where torque is shown the turn pays for both;
+// where it is not nothing may be stored that nobody paid for.
+TEST_F(CouplingAtWall, ATurnPaysForTheMoveItCauses) {
+  for (const bool six_axes : {true, false}) {
+    coupling_.reset(Vec3::Zero(), Vec3::Zero());
+    ledger_.reset();
+    moment_.stiffness_nmm_per_rad = six_axes ? 50.0 * kArm_mm * kArm_mm : 0.0;
+    moment_.limit_nmm = six_axes ? 1e4 : 0.0;
+    moment_.proxy_mm.setZero();
+    moment_.turn_rad.setZero();
+    const double step_rad = 1e-4;
+    bool returned = false;
+    CouplingForce force;
+    for (int i = 1; i <= 400; ++i) {
+      const double kept_mm = 80.0 * step_rad * i;
+      moment_.turn_before_rad = moment_.turn_rad + Vec3(0, step_rad, 0);
+      moment_.turn_rad = {0, 4.0 / 17.0 * kept_mm / kArm_mm, 0};
+      force = to(Vec3::Zero(), {kept_mm / 17.0, 0, 0});
+      returned |= force.returned;
+      const double expected_n = six_axes ? 50.0 * kept_mm / 17.0 : 0.0;
+      EXPECT_NEAR(force.spring_n.x(), expected_n, 1e-9) << i;
+      EXPECT_NEAR(force.turn_spring_nmm.y(), -80.0 * expected_n, 1e-6) << i;
+      EXPECT_NEAR(ledger_.report().stored_mj, 0.5 * expected_n * kept_mm, 1e-9) << i;
+    }
+    EXPECT_EQ(returned, !six_axes);
+    // Of the turn too k·2 ms, of what it turned in this tick.
+    const double damping_nmm = six_axes ? 2.0 * 50.0 * kArm_mm * kArm_mm * step_rad * 16.0 / 17.0 : 0.0;
+    EXPECT_NEAR(force.turn_damping_nmm.y(), -damping_nmm, 1e-9);
+  }
+}
+
+// A torque that has come to its limit stores its work, the limit times the way on: what turns back gets no more.
+TEST_F(CouplingAtWall, ATurnStoresNoMoreThanIsShown) {
+  moment_.stiffness_nmm_per_rad = 20'000.0;
+  moment_.limit_nmm = 600.0;
+  double work_mj = 0.0;
+  constexpr int kTicks = 2000;
+  for (int i = 1; i <= kTicks; ++i) {
+    moment_.turn_before_rad = moment_.turn_rad = {0, 0.1 * i / kTicks, 0};
+    const CouplingForce force = to(Vec3::Zero(), Vec3::Zero());
+    EXPECT_NEAR(force.turn_spring_nmm.y(), -std::min(600.0, 20'000.0 * 0.1 * i / kTicks), 1e-9);
+    EXPECT_LE(force.turn_damping_nmm.norm(), force.turn_spring_nmm.norm() + 1e-9);
+    work_mj -= force.turn_spring_nmm.y() * 0.1 / kTicks;
+  }
+  // 0.03 rad to the limit, 0.07 at it.
+  EXPECT_NEAR(ledger_.report().stored_mj, 0.5 * 600.0 * 0.03 + 600.0 * 0.07, 1e-9);
+  EXPECT_NEAR(work_mj, ledger_.report().stored_mj, 0.05);
 }
 
 // (7.15): a step of the cutting force comes through as 1 - exp(-t / 2 ms); what is no cutting comes at once.

@@ -1,4 +1,5 @@
-// A short run of what tests/perf measures over a million ticks: the coupling gives the hand nothing that it did not get.
+// A short run of what tests/perf measures over a million ticks: the coupling gives the hand nothing that it did not get, on
+// devices of three axes and of six.
 #include "tests/support/stability/stability.hpp"
 
 #include <gtest/gtest.h>
@@ -8,12 +9,13 @@
 namespace osteon::test {
 namespace {
 
-class Stability : public ::testing::TestWithParam<std::tuple<int, int>> {};
+class Stability : public ::testing::TestWithParam<std::tuple<int, int, bool>> {};
 
 TEST_P(Stability, TheCouplingGivesNothingAway) {
   StabilityRun run;
   run.scene = static_cast<StabilityScene>(std::get<0>(GetParam()));
   run.delay_ms = std::get<1>(GetParam());
+  run.six_axes = std::get<2>(GetParam());
   run.ticks = 40'000;  // rig and hand on a strong device and on a weak one
   const StabilityResult r = run_stability(run);
   std::printf(
@@ -22,6 +24,9 @@ TEST_P(Stability, TheCouplingGivesNothingAway) {
       name(run.scene), run.delay_ms, static_cast<unsigned long long>(r.episodes), r.generated_mj, r.worst_mj, r.net_mj,
       r.cutting_mj, r.step_over_n, r.still_step_n, r.motor_most_n, static_cast<long long>(r.uncovered),
       static_cast<long long>(r.held_back), static_cast<long long>(r.returned));
+  if (run.six_axes)
+    std::printf("    and torque: %.1f mJ put in by turning, %.0f N mm at most, of the cut %.1f; slew limited %lld\n", r.turned_mj,
+                r.torque_most_nmm, r.cut_most_nmm, static_cast<long long>(r.slew_limited));
   EXPECT_LE(r.worst_mj, 0.01);
   EXPECT_LE(r.generated_mj, 1.0);
   EXPECT_GE(r.least_cutting_n_mm, 0.0);
@@ -29,6 +34,11 @@ TEST_P(Stability, TheCouplingGivesNothingAway) {
   EXPECT_LE(r.still_step_n, 0.5 + 1e-9);
   EXPECT_LE(r.motor_over_n, 1e-9);
   EXPECT_EQ(r.motor_late_n, 0.0);
+  EXPECT_LE(r.turn_step_over_n, 1e-9);
+  EXPECT_LE(r.cut_step_over_n, 1e-9);
+  EXPECT_LE(r.cut_over_nmm, 1e-9);
+  EXPECT_EQ(r.cut_late_nmm, 0.0);
+  EXPECT_LE(r.torque_over_nmm, 1e-9);
   EXPECT_EQ(r.allocations, 0);
   // Else it would prove nothing.
   EXPECT_GT(r.touching, 2'000);
@@ -38,6 +48,15 @@ TEST_P(Stability, TheCouplingGivesNothingAway) {
     EXPECT_GT(r.cutting, 1'000);
     EXPECT_GT(r.motor_most_n, 0.05);
   }
+  if (run.six_axes) {
+    EXPECT_GT(r.torque_most_nmm, 20.0);
+    if (run.scene == StabilityScene::drill) {  // its shank is in its hole
+      EXPECT_GT(r.turned_mj, 20.0);
+      EXPECT_GT(r.cut_most_nmm, 10.0);
+    }
+  } else {
+    EXPECT_EQ(r.torque_most_nmm, 0.0);
+  }
   if (run.scene == StabilityScene::thin_wall) {
     EXPECT_LT(r.deepest_mm, 0.3);
   } else {
@@ -45,7 +64,8 @@ TEST_P(Stability, TheCouplingGivesNothingAway) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, Stability, ::testing::Combine(::testing::Range(0, kStabilityScenes), ::testing::Values(0, 100)));
+INSTANTIATE_TEST_SUITE_P(Scenes, Stability,
+                         ::testing::Combine(::testing::Range(0, kStabilityScenes), ::testing::Values(0, 100), ::testing::Bool()));
 
 }  // namespace
 }  // namespace osteon::test

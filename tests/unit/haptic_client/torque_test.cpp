@@ -101,6 +101,9 @@ class Handle final : public HapticDevice {
   DeviceOutput written;
 };
 
+// Of a torque as of a force's work: s over the workspace's scale, 0.6 at which 4 N/mm are K_c of 50 N/mm at s = 4/30.
+constexpr double kShown = 4.0 / 30.0 / 0.6;
+
 // Leans towards the wall in the air, and is pressed on until its tip would be so far beyond where its end touches.
 void press(Before& wall, Handle& handle, double lean_rad, double beyond_mm) {
   handle.reading.pose_device_tool = {Vec3::Zero(), leaning(lean_rad)};
@@ -135,11 +138,61 @@ TEST(TorqueOnTheHand, IsTheWallsPushTimesItsArm) {
     EXPECT_NEAR((torque_nmm - side.arm_times_force()).norm(), 0.0, kRing_mm * force_n.norm());
     // Points lie within the tool by half a patch pitch and a quantum, a hundredth of a millimetre.
     EXPECT_NEAR(force_n.norm(), push_n(side), push_n(side) * (0.02 + 0.07 / beyond_mm));
-    // On the device scaled as the force is, in its own frame.
+    // On the device scaled as the work of the force is, in its own frame.
     EXPECT_NEAR(side.force_scale(), 4.0 / 30.0, 1e-12);
+    EXPECT_NEAR(side.workspace_scale(), 0.6, 1e-12);
     const Vec3 in_device_nmm(torque_nmm.y(), torque_nmm.z(), torque_nmm.x());
-    EXPECT_NEAR((handle.written.torque_nmm - 4.0 / 30.0 * in_device_nmm).norm(), 0.0, 1e-9);
+    EXPECT_NEAR((handle.written.torque_nmm - kShown * in_device_nmm).norm(), 0.0, 1e-9);
     EXPECT_LT(handle.written.torque_nmm.x(), 0.0);  // it leans about +x, and is turned back
+  }
+}
+
+// The hand turns on by 40 mrad and does not move: the end of the shank would go 3.18 mm further into the wall, 80 (sin 0.10 -
+// sin 0.06) less what its rim turns away. Force and torque rise as if it had been pressed there, and go down again as it turns
+// back. On a device of three axes, where turning costs the hand nothing, the force may not rise.
+TEST(TorqueOnTheHand, ATurnAgainstAWallIsFeltAsForceAndTorque) {
+  constexpr double kFrom_rad = 0.06, kTo_rad = 0.10, kBeyond_mm = 0.5;
+  const double to_mm = kBeyond_mm + kReach_mm * (std::sin(kTo_rad) - std::sin(kFrom_rad)) +
+                       kRadius_mm * (std::cos(kTo_rad) - std::cos(kFrom_rad));
+  for (const bool six_axes : {true, false}) {
+    Handle handle;
+    if (!six_axes) handle.limits_are.peak_nmm = handle.limits_are.continuous_nmm = 0.0;
+    Before side(wall(), {0, 0, 0}, {-1, 0, 0}, handle);
+    press(side, handle, kFrom_rad, kBeyond_mm);
+    const double before_n = side.report().force_physical_n.norm(), before_nmm = handle.written.torque_nmm.norm();
+    const auto turn = [&](double from_rad, double to_rad) {
+      constexpr int kTicks = 600;
+      for (int i = 1; i <= kTicks; ++i) {
+        handle.reading.pose_device_tool.rotation = leaning(from_rad + (to_rad - from_rad) * i / kTicks);
+        side.tick();
+      }
+      side.wait(600);
+    };
+    turn(kFrom_rad, kTo_rad);
+    const LoopReport& report = side.report();
+    const double force_n = report.force_physical_n.norm(), torque_nmm = handle.written.torque_nmm.norm();
+    if (!six_axes) {
+      EXPECT_LE(force_n, before_n + 0.05);
+      continue;
+    }
+    // As push_n(), of what the handle did alone, whatever the loop let go.
+    const double arm = kReach_mm / Proxy::kTurnArm_mm, expected_n = side.coupling_n_per_mm() * to_mm / (1.0 + arm * arm);
+    std::printf("  simulated: turned on by 40 mrad, %.2f N (closed form %.2f, before %.2f), %.1f N mm on the device (%.1f, %.1f)\n",
+                force_n, expected_n, before_n, torque_nmm, kShown * kReach_mm * expected_n, before_nmm);
+    EXPECT_NEAR(force_n, expected_n, expected_n * (0.02 + 0.07 / to_mm));
+    EXPECT_NEAR(torque_nmm, kShown * kReach_mm * expected_n, kShown * kReach_mm * expected_n * (0.02 + 0.07 / to_mm));
+    EXPECT_NEAR((report.torque_physical_nmm - side.arm_times_force()).norm(), 0.0, kRing_mm * force_n);
+    EXPECT_GT(force_n, 5.0 * before_n);
+
+    Handle other;
+    Before pressed(wall(), {0, 0, 0}, {-1, 0, 0}, other);
+    press(pressed, other, kTo_rad, to_mm);
+    EXPECT_NEAR(pressed.report().force_physical_n.norm(), force_n, 0.02 * force_n);
+    EXPECT_NEAR(other.written.torque_nmm.norm(), torque_nmm, 0.02 * torque_nmm);
+
+    turn(kTo_rad, kFrom_rad);
+    EXPECT_NEAR(side.report().force_physical_n.norm(), before_n, 0.02 * force_n);
+    EXPECT_NEAR(handle.written.torque_nmm.norm(), before_nmm, 0.02 * torque_nmm);
   }
 }
 
@@ -147,7 +200,7 @@ TEST(TorqueOnTheHand, IsWithinTheDevicesLimit) {
   Handle handle;
   Before side(wall(), {0, 0, 0}, {-1, 0, 0}, handle);
   press(side, handle, 0.1, 7.5);
-  EXPECT_GT(4.0 / 30.0 * side.report().torque_physical_nmm.norm(), 220.0);
+  EXPECT_GT(kShown * side.report().torque_physical_nmm.norm(), 220.0);
   EXPECT_NEAR(handle.written.torque_nmm.norm(), 200.0, 1e-9);
   EXPECT_LT(handle.written.torque_nmm.x(), -199.0);
 }
@@ -182,7 +235,7 @@ TEST(TorqueOnTheHand, InAHoleIsThatOfTheTurn) {
   EXPECT_NEAR(hole.report().pose_bone_proxy.position_mm.z(), kDeep_mm, 0.3);
   EXPECT_EQ(handle.written.torque_nmm.norm(), 0.0);
   double nmm[3];
-  const double turn[3] = {0.03, 0.05, 0.07};
+  const double turn[3] = {0.025, 0.035, 0.045};  // within the device's limit
   for (int i = 0; i < 3; ++i) {
     const double from = i > 0 ? turn[i - 1] : 0.0;
     for (int t = 1; t <= 100; ++t) {
@@ -194,7 +247,7 @@ TEST(TorqueOnTheHand, InAHoleIsThatOfTheTurn) {
     nmm[i] = handle.written.torque_nmm.x();
     EXPECT_NEAR(handle.written.torque_nmm.norm(), -nmm[i], 0.02 * std::abs(nmm[i]) + 0.5);
   }
-  const double per_rad = 4.0 / 30.0 * hole.coupling_n_per_mm() * Proxy::kTurnArm_mm * Proxy::kTurnArm_mm;
+  const double per_rad = kShown * hole.coupling_n_per_mm() * Proxy::kTurnArm_mm * Proxy::kTurnArm_mm;
   std::printf("  simulated: %.0f N mm/rad in a hole (closed form %.0f)\n", (nmm[0] - nmm[2]) / (turn[2] - turn[0]), per_rad);
   EXPECT_NEAR((nmm[0] - nmm[1]) / (turn[1] - turn[0]), per_rad, 0.02 * per_rad);
   EXPECT_NEAR((nmm[1] - nmm[2]) / (turn[2] - turn[1]), per_rad, 0.02 * per_rad);
@@ -276,15 +329,16 @@ TEST_F(Sigma, AWallsTorqueReachesItsMotors) {
     pressed = press(*side);
   }
   ASSERT_TRUE(pressed);
-  const double s = side->force_scale(), expected_nmm = s * kReach_mm * push_n(*side);
-  EXPECT_NEAR(s, 4.0 / 30.0, 1e-12);
+  const double shown_by = side->force_scale() / side->workspace_scale();
+  const double expected_nmm = shown_by * kReach_mm * push_n(*side);
+  EXPECT_NEAR(shown_by, kShown, 1e-12);
   std::printf("  simulated sigma.7: %.1f N mm at its motors, closed form %.1f\n", shown().norm(), expected_nmm);
   EXPECT_GT(shown().norm(), 80.0);
   EXPECT_NEAR(shown().norm(), expected_nmm, expected_nmm * (0.02 + 0.07 / side->beyond_mm()));
   EXPECT_LT(shown().x(), -0.99 * shown().norm());
-  const Vec3 arm_nmm = s * side->arm_times_force();
+  const Vec3 arm_nmm = shown_by * side->arm_times_force();
   EXPECT_NEAR((shown() - Vec3(arm_nmm.y(), arm_nmm.z(), arm_nmm.x())).norm(), 0.0,
-              s * kRing_mm * side->report().force_physical_n.norm());
+              shown_by * kRing_mm * side->report().force_physical_n.norm());
   EXPECT_EQ(arm()->unsafe_forces, 0u);
   EXPECT_EQ(arm()->misuse, 0u);
 }
