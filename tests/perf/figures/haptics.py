@@ -8,28 +8,40 @@ TICK_BUDGET_US = 60.0
 
 
 def stability(run):
-    """A million ticks on virtual time; the same numbers on every machine."""
-    run.say("stability: a million ticks of stroking, pressing and cutting")
+    """A million ticks on virtual time, and a million with torque and turns; the same numbers on every machine."""
+    run.say("stability: two million ticks of stroking, pressing and cutting")
     out = json.loads(run.output("osteon-stability", 10_000_000 if run.soak else 1_000_000, progress=True))
-    names = ("scene", "delay_ms", "episodes", "touching", "generated_mj", "worst_mj", "net_mj", "cutting_mj", "held_back",
-             "returned", "undone")
-    run.tables.append((f"stability on a simulated device, {out['ticks']} ticks, {out['touching']} in contact, {out['cutting']} "
-                       "cutting", [names] + [tuple(r[n] for n in names) for r in out["runs"]]))
-    return {
-        "stability_ticks": Measured(out["ticks"]),
-        "stability_contacts": Measured(out["episodes"]),
-        "stability_undone": Measured(out["undone"]),
-        "stability_worst_contact": Measured(out["worst_mj"]),
-        "stability_generated": Measured(out["generated_mj"]),
-        "stability_net": Measured(out["net_mj"], -out["cutting_mj"]),
-        "stability_cutting_power": Measured(out["least_cutting_n_mm"]),
-        "stability_step": Measured(max(0.0, out["step_over_n"])),
-        "stability_step_still": Measured(out["still_step_n"]),
-        "stability_motor_excess": Measured(max(0.0, out["motor_over_n"])),
-        "stability_motor_late": Measured(out["motor_late_n"]),
-        "stability_motor_largest": Measured(out["motor_most_n"]),
-        "stability_thin_wall": Measured(out["thin_wall_deepest_mm"]),
-        "stability_allocations": Measured(out["allocations"]),
+    names = ("axes", "scene", "delay_ms", "episodes", "touching", "generated_mj", "worst_mj", "net_mj", "cutting_mj", "turned_mj",
+             "held_back", "returned", "undone")
+    three, six = out["three_axes"], out["six_axes"]
+    for axes, all_ in ((3, three), (6, six)):
+        run.tables.append((f"stability on a simulated device of {axes} axes, {all_['ticks']} ticks, "
+                           f"{all_['touching']} in contact, {all_['cutting']} cutting",
+                           [names] + [tuple(r[n] for n in names) for r in out["runs"] if r["axes"] == axes]))
+    values = {}
+    for prefix, all_ in (("stability", three), ("stability_six", six)):
+        values |= {
+            f"{prefix}_ticks": Measured(all_["ticks"]),
+            f"{prefix}_contacts": Measured(all_["episodes"]),
+            f"{prefix}_undone": Measured(all_["undone"]),
+            f"{prefix}_worst_contact": Measured(all_["worst_mj"]),
+            f"{prefix}_generated": Measured(all_["generated_mj"]),
+            f"{prefix}_net": Measured(all_["net_mj"], -all_["cutting_mj"]),
+            f"{prefix}_cutting_power": Measured(all_["least_cutting_n_mm"]),
+            f"{prefix}_step": Measured(max(0.0, all_["step_over_n"])),
+            f"{prefix}_step_still": Measured(all_["still_step_n"]),
+            f"{prefix}_motor_excess": Measured(max(0.0, all_["motor_over_n"])),
+            f"{prefix}_motor_late": Measured(all_["motor_late_n"]),
+            f"{prefix}_motor_largest": Measured(all_["motor_most_n"]),
+            f"{prefix}_thin_wall": Measured(all_["thin_wall_deepest_mm"]),
+            f"{prefix}_allocations": Measured(all_["allocations"]),
+        }
+    return values | {
+        "stability_six_turned": Measured(six["turned_mj"]),
+        "stability_six_torque_step": Measured(max(0.0, six["turn_step_over_n"], six["cut_step_over_n"])),
+        "stability_six_torque_excess": Measured(max(0.0, six["torque_over_nmm"], six["cut_over_nmm"])),
+        "stability_six_torque_late": Measured(six["cut_late_nmm"]),
+        "stability_six_torque_largest": Measured(six["torque_most_nmm"]),
     }
 
 
