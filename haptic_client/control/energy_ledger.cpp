@@ -58,6 +58,11 @@ double EnergyLedger::paid_n_per_mm(double stiffness_n_per_mm, double extension_m
   return 2.0 * paid_mj >= stiffness_n_per_mm * square ? stiffness_n_per_mm : 2.0 * paid_mj / square;
 }
 
+double EnergyLedger::paid_mm(double stiffness_n_per_mm, double cutting_mj) const noexcept {
+  const double paid_mj = account_mj_ - turned_mj_ - cutting_mj + params_.allowance_mj;
+  return std::sqrt(2.0 * std::max(0.0, paid_mj) / stiffness_n_per_mm);
+}
+
 double EnergyLedger::draw(double wanted_mj) noexcept {
   const double drawn_mj = std::clamp(wanted_mj, 0.0, report_.tank_mj);
   report_.tank_mj -= drawn_mj;

@@ -53,6 +53,8 @@ class EnergyLedger {
   // Cutting too must be paid for: the spring, at most this stiff and this long, as stiff as what the hand has put into it.
   // It falls short of the real one in the first millisecond of a contact, before the hand has felt any of it.
   [[nodiscard]] double paid_n_per_mm(double stiffness_n_per_mm, double extension_mm) const noexcept;
+  // How long a spring of that stiffness would be that the hand had paid for, when this much more has gone into cutting.
+  [[nodiscard]] double paid_mm(double stiffness_n_per_mm, double cutting_mj) const noexcept;
   // What the proxy did then: the law's force times the way cut, and the springs' energy as it is now. `turned_mj`: what of
   // it is in the spring of the turn, which cuts nothing.
   void settle(double cutting_mj, double stored_mj, double turned_mj = 0.0) noexcept;

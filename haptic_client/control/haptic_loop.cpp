@@ -143,6 +143,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   moment.stiffness_n_per_mm = coupling_n_per_mm_;
   moment.limit_n = limit_n / s;
   moment.energy_scale = s / mapping_.scale();
+  moment.fell_short = fell_short_;
   moment.touching = (step.contact || step.breakthrough || held_back) && step.covered && !input.clutch;
   // A torque goes to the handle as the work of a force does, so that one store holds both: where the workspace is larger than
   // the bone, levers seem longer.
@@ -223,6 +224,8 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
       share(wanted.force_n, s * (coupling.spring_n + coupling.damping_n).norm()) * s * coupling.damping_n,
       share(wanted.torque_nmm, turn_nmm.norm()) * moment.energy_scale * coupling.turn_damping_nmm};
   shown_ = ledger_.limited(wanted, damping, moment.touching);
+  constexpr double kClearly = 0.9;  // the filter's lag is less
+  fell_short_ = moment.touching && shown_.force_n.norm() < kClearly * s * coupling.spring_n.norm();
   report.energy = ledger_.report();
   if (report.energy.held_back) report.events |= kEnergyLimited;
   report.coupling_device_n = mapping_.to_device(shown_.force_n);

@@ -44,14 +44,14 @@ void print(const char* key, const StabilityResult& all) {
   std::printf(
       ", \"%s\": {\"ticks\": %lld, \"touching\": %lld, \"cutting\": %lld, \"uncovered\": %lld, \"episodes\": %llu, \"undone\": "
       "%llu, \"others_cuts\": %llu, \"generated_mj\": %.6f, \"worst_mj\": %.6f, \"net_mj\": %.3f, \"cutting_mj\": %.3f, "
-      "\"least_cutting_n_mm\": %.9f, \"step_over_n\": %.6f, \"still_step_n\": %.6f, \"motor_over_n\": %.9f, \"motor_late_n\": "
+      "\"least_cutting_n_mm\": %.9f, \"step_over_n\": %.6f, \"still_step_n\": %.6f, \"fall_n\": %.6f, \"late\": %lld, \"motor_over_n\": %.9f, \"motor_late_n\": "
       "%.9f, \"motor_most_n\": %.4f, \"force_most_n\": %.3f, \"thin_wall_deepest_mm\": %.4f, \"allocations\": %lld, "
       "\"turned_mj\": %.3f, \"torque_most_nmm\": %.3f, \"torque_over_nmm\": %.9f, \"turn_step_over_n\": %.6f, "
       "\"cut_step_over_n\": %.6f, \"cut_over_nmm\": %.9f, \"cut_late_nmm\": %.9f, \"cut_most_nmm\": %.3f}",
       key, static_cast<long long>(all.ticks), static_cast<long long>(all.touching), static_cast<long long>(all.cutting),
       static_cast<long long>(all.uncovered), static_cast<unsigned long long>(all.episodes),
       static_cast<unsigned long long>(all.undone), static_cast<unsigned long long>(all.others_cuts), all.generated_mj,
-      all.worst_mj, all.net_mj, all.cutting_mj, all.least_cutting_n_mm, all.step_over_n, all.still_step_n, all.motor_over_n,
+      all.worst_mj, all.net_mj, all.cutting_mj, all.least_cutting_n_mm, all.step_over_n, all.still_step_n, all.fall_n, static_cast<long long>(all.late), all.motor_over_n,
       all.motor_late_n, all.motor_most_n, all.force_most_n, all.deepest_mm, static_cast<long long>(all.allocations),
       all.turned_mj, all.torque_most_nmm, all.torque_over_nmm, all.turn_step_over_n, all.cut_step_over_n, all.cut_over_nmm,
       all.cut_late_nmm, all.cut_most_nmm);

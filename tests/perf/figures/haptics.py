@@ -30,6 +30,8 @@ def stability(run):
             f"{prefix}_cutting_power": Measured(all_["least_cutting_n_mm"]),
             f"{prefix}_step": Measured(max(0.0, all_["step_over_n"])),
             f"{prefix}_step_still": Measured(all_["still_step_n"]),
+            f"{prefix}_fall": Measured(max(0.0, all_["fall_n"])),
+            f"{prefix}_late": Measured(all_["late"]),
             f"{prefix}_motor_excess": Measured(max(0.0, all_["motor_over_n"])),
             f"{prefix}_motor_late": Measured(all_["motor_late_n"]),
             f"{prefix}_motor_largest": Measured(all_["motor_most_n"]),

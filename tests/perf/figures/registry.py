@@ -273,6 +273,10 @@ FIGURES = [
                "haptic_stability", ("<=", 1e-9), full=True),
         Figure(f"{prefix}_step_still", "n", f"{on}growth of force in a tick while the hand stood still", "haptic_stability",
                ("<=", 0.5000001), full=True),
+        Figure(f"{prefix}_fall", "n", f"{on}fall of force in a tick beyond the same, but for breakthroughs and safety zeros: the "
+               "monitor's doing", "haptic_stability", full=True),
+        Figure(f"{prefix}_late", "count", f"{on}ticks that came so late that no force was shown", "haptic_stability",
+               (">=", 1000), full=True),
         Figure(f"{prefix}_motor_excess", "n", f"{on}the motor's force beyond s mu F_n, orbiting in a cavity and elsewhere",
                "haptic_stability", ("<=", 1e-9), full=True),
         Figure(f"{prefix}_motor_late", "n", f"{on}the motor's force later than 10 ms after the pedal", "haptic_stability",

@@ -21,6 +21,7 @@ using namespace haptic;
 constexpr double kPitch_mm = 0.5;
 constexpr double kRound_s = 10.0;      // then a new hand, new bone
 constexpr double kPatch_s = 0.008;     // between two patches
+constexpr double kStallEvery_s = 1.7, kStall_s = 0.006;
 constexpr double kThinWall_mm = 1.0;
 constexpr double kCavity_mm = 5.0;     // radius of a hollow 4 mm deep
 constexpr double kTorqueArm_mm = 50.0; // of a device that shows torque: its largest torque over its continuous force
@@ -135,6 +136,11 @@ class Observer {
     const double step_n = grown(force_n, force_n_);
     const double slew_n = params_.slew_n_per_ms * 1e3 * params_.dt_s;
     result_.step_over_n = std::max(result_.step_over_n, step_n - slew_n - by_hand_n);
+    constexpr std::uint32_t kLetGo = kBreakthrough | kUncovered | kMissedTicks | kReturned;
+    if (touching && !(report.events & kLetGo)) {
+      const double explained_n = slew_n + by_hand_n + 2.0 * s * coupling_n_per_mm_ * report.moved_mm.norm();
+      result_.fall_n = std::max(result_.fall_n, force_n_.norm() - force_n.norm() - explained_n);
+    }
     if (moved_by_mm < 1e-12 && moved_before_mm_ < 1e-12) result_.still_step_n = std::max(result_.still_step_n, step_n);
     // A turn's spring at its arm is the move's at the handle; the slew limit is at the tool's arm.
     const double turn_step_nmm = grown(torque_nmm, torque_nmm_);
@@ -158,6 +164,7 @@ class Observer {
     result_.force_most_n = std::max(result_.force_most_n, report.force_device_n.norm());
 
     ++result_.ticks;
+    result_.late += (report.events & kMissedTicks) != 0;
     result_.touching += touching;
     result_.cutting += report.phase == CuttingPhase::cutting;
     result_.uncovered += (report.events & kUncovered) != 0;
@@ -267,6 +274,8 @@ class Round {
     LoopInput input;
     input.pose_device_tool = reading.pose_device_tool;
     input.spindle_rpm = pedal ? full_rpm_ : 0.0;
+    // Now and then the machine stops the loop for some milliseconds.
+    if (std::fmod(t, kStallEvery_s) < kStall_s) input.periods = 4;
     const AllocationCounter heap;
     const LoopReport report = loop_->tick(input, patch_);
     result_.allocations += heap.count();
@@ -337,14 +346,14 @@ const char* name(StabilityScene scene) {
 }
 
 void StabilityResult::add(const StabilityResult& other) {
-  ticks += other.ticks, touching += other.touching, cutting += other.cutting, uncovered += other.uncovered;
+  ticks += other.ticks, late += other.late, touching += other.touching, cutting += other.cutting, uncovered += other.uncovered;
   held_back += other.held_back, returned += other.returned, slew_limited += other.slew_limited;
   episodes += other.episodes, others_cuts += other.others_cuts, undone += other.undone, allocations += other.allocations;
   generated_mj += other.generated_mj, net_mj += other.net_mj, cutting_mj += other.cutting_mj, turned_mj += other.turned_mj;
   worst_mj = std::max(worst_mj, other.worst_mj);
   least_cutting_n_mm = std::min(least_cutting_n_mm, other.least_cutting_n_mm);
   for (double StabilityResult::*most :
-       {&StabilityResult::step_over_n, &StabilityResult::still_step_n, &StabilityResult::motor_over_n,
+       {&StabilityResult::step_over_n, &StabilityResult::still_step_n, &StabilityResult::fall_n, &StabilityResult::motor_over_n,
         &StabilityResult::motor_late_n, &StabilityResult::motor_most_n, &StabilityResult::force_most_n,
         &StabilityResult::deepest_mm, &StabilityResult::turn_step_over_n, &StabilityResult::cut_step_over_n,
         &StabilityResult::cut_over_nmm, &StabilityResult::cut_late_nmm, &StabilityResult::cut_most_nmm,

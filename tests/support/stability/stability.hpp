@@ -24,7 +24,7 @@ struct StabilityRun {
 };
 
 struct StabilityResult {
-  std::int64_t ticks = 0, touching = 0, cutting = 0, uncovered = 0, held_back = 0, returned = 0, slew_limited = 0;
+  std::int64_t ticks = 0, late = 0, touching = 0, cutting = 0, uncovered = 0, held_back = 0, returned = 0, slew_limited = 0;
   std::uint64_t episodes = 0, others_cuts = 0, undone = 0;
   double generated_mj = 0;     // over all contacts that gave more than they got
   double worst_mj = 0;         // most of one contact
@@ -32,6 +32,9 @@ struct StabilityResult {
   double cutting_mj = 0;       // work of the cutting forces, at the handle
   double least_cutting_n_mm = 0;  // of all ticks' F_cut · dx
   double step_over_n = 0;      // growth of force in a tick that neither the hand's motion nor the slew limit explains; 0: none
+  // Fall of force in a tick beyond the slew limit and what the hand's and the tool's motion explain, breakthroughs and
+  // safety zeros left out: the monitor's doing.
+  double fall_n = 0;
   double still_step_n = 0;     // growth of force in a tick while the handle stood still
   // The same of torque, over the arm of a turn; of the cut's moment without the hand, as it is not the hand's.
   double turn_step_over_n = 0;

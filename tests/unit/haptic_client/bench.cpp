@@ -45,8 +45,8 @@ Bench::Bench(const Case& bone, const std::vector<PlanStep>& plan, const Simulate
 Bench::Bench(const Case& bone, ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale, const BenchDelays& delays, double dt_s)
     : delays_(delays), session_(std::move(plan), device, force_scale, dt_s), replica_(bone, BodyId{}) {}
 
-SessionTick Bench::tick() {
-  last_ = session_.tick(patch_, true);
+SessionTick Bench::tick(int periods) {
+  last_ = session_.tick(patch_, true, periods);
   ++ticks_;
   return last_;
 }

@@ -26,8 +26,8 @@ class Bench {
   Bench(const Case& bone, ReadyPlan plan, const SimulatedDeviceParams& device = {}, double force_scale = 0.0,
         const BenchDelays& delays = {}, double dt_s = 1e-3);
 
-  // One tick of `dt_s`; `after_tick` sees it before replica and patches follow.
-  SessionTick tick();
+  // One tick of `dt_s`, `periods` of them after the last; `after_tick` sees it before replica and patches follow.
+  SessionTick tick(int periods = 1);
   // Until the plan is done and every cut confirmed.
   void run(const std::function<void(const SessionTick&)>& after_tick = {});
   void follow();  // replica and patch, as their thread would

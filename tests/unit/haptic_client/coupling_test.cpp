@@ -289,6 +289,7 @@ TEST_F(CouplingAtWall, ATurnStoresNoMoreThanIsShown) {
 
 // (7.15): a step of the cutting force comes through as 1 - exp(-t / 2 ms); what is no cutting comes at once.
 TEST_F(CouplingAtWall, OnlyTheCuttingForceIsSmoothed) {
+  for (int i = 1; i < 80; ++i) to({0, 0, 0.005 * i}, Vec3::Zero());  // pressed by a hand, which pays for the spring
   step_.cutting = true;
   step_.cutting_force_n = {0, 0, 10};
   to({0, 0, 0.4}, Vec3::Zero());

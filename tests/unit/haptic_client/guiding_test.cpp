@@ -111,7 +111,7 @@ TEST(GuidedDrilling, TheSleevePushesBackSideways) {
   const PlacedGuide guide = placed_guide(1, sleeve(), {Vec3(0, 0, 0), Eigen::Quaterniond::Identity()});
   const Case bone = block_case();
   const CutField field(bone, BodyId{});
-  HapticLoop loop(LoopParams{}, {ToolModel(*find_tool("drill-3.2"), bone.pitch_mm())});
+  HapticLoop loop(LoopParams{.ramp_s = 1e-9}, {ToolModel(*find_tool("drill-3.2"), bone.pitch_mm())});
   Patch patch;
   PatchBuilder builder;
   const Pose start{{0, 0, -5}, Eigen::Quaterniond::Identity()};  // 25 mm in the sleeve, over the bone

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -131,8 +132,16 @@ TEST_F(LoopOnBlock, ADeviceThatComesBackIsTakenUpWithoutForce) {
     // Spring and damping, of 2 ms, of what was pressed since, by the ramp's share.
     EXPECT_LE(report.force_device_n.norm(), 50.0 * (1e-3 * i + 2e-3) * std::min(1.0, (i + 1) / 200.0) + 1e-9) << i;
   }
-  EXPECT_NEAR(report.force_device_n.norm(), 50.0 * 0.301, 0.1);
   EXPECT_FALSE(report.events & kRamping);
+  // What the hand went on for while less was shown it has not paid for: that stretch was let go.
+  const double ramped_n = report.force_device_n.norm();
+  EXPECT_GT(ramped_n, 5.0);
+  EXPECT_LT(ramped_n, 50.0 * 0.301);
+  for (int i = 1; i <= 100; ++i) {
+    input_.pose_device_tool.position_mm.z() = 20.3 + 1e-3 * i;
+    report = tick();
+  }
+  EXPECT_NEAR(report.force_device_n.norm(), ramped_n + 50.0 * 0.1, 0.1);  // from then on the whole spring
 }
 
 // What the hand did not cause may only grow by 0.5 N a millisecond.
@@ -256,7 +265,7 @@ TEST(DrillInItsHole, IsHeldSidewaysAndFreeAlongTheAxis) {
   EXPECT_EQ(force_on_the_way_out, 0.0);
 
   // Put back into the hole by hand, spindle off.
-  HapticLoop loop(LoopParams{}, {ToolModel(*find_tool("drill-3.2"), 0.5)});
+  HapticLoop loop(LoopParams{.ramp_s = 1e-9}, {ToolModel(*find_tool("drill-3.2"), 0.5)});
   Patch patch;
   PatchBuilder builder;
   const Pose inside{{0, 0, 6}, Eigen::Quaterniond::Identity()};
@@ -289,9 +298,12 @@ class HandOnBlock {
     builder_.build(replica_.bodies(), loop_.tool(0), input_.pose_device_tool, patch_);
   }
   void lead(const Vec3& to) { input_.pose_device_tool.position_mm = to; }
-  // One tick with the handle this far ahead of the tool along z.
+  // One tick in which the handle stretches the coupling a little on towards so far ahead of the tool along z, and to x.
   LoopReport push(double ahead_mm, double x_mm = 0.0) {
-    lead({x_mm, 0, tip_mm().z() + ahead_mm});
+    constexpr double kStep_mm = 0.005;
+    ahead_mm_ += std::clamp(ahead_mm - ahead_mm_, -kStep_mm, kStep_mm);
+    x_mm_ += std::clamp(x_mm - x_mm_, -kStep_mm, kStep_mm);
+    lead(Vec3(x_mm_, 0, tip_mm().z() + ahead_mm_) - (ticks_ ? report_.offset_mm : Vec3(Vec3::Zero())));
     return tick();
   }
   LoopReport tick() {
@@ -319,6 +331,7 @@ class HandOnBlock {
   Patch patch_;
   LoopInput input_;
   LoopReport report_;
+  double ahead_mm_ = 0, x_mm_ = 0;
   std::int64_t ticks_ = 0;
 };
 

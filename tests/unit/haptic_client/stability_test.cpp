@@ -19,10 +19,11 @@ TEST_P(Stability, TheCouplingGivesNothingAway) {
   run.ticks = 40'000;  // rig and hand on a strong device and on a weak one
   const StabilityResult r = run_stability(run);
   std::printf(
-      "  %s, %d ms: %llu contacts, generated %.4f mJ, worst %.5f, net %.1f, cutting %.1f; steps over %.3f N, still %.3f N; "
+      "  %s, %d ms: %llu contacts, generated %.4f mJ, worst %.5f, net %.1f, cutting %.1f; steps over %.3f N, still %.3f N, "
+      "falls %.2f N; "
       "motor %.2f N; uncovered %lld, held back %lld, returned %lld\n",
       name(run.scene), run.delay_ms, static_cast<unsigned long long>(r.episodes), r.generated_mj, r.worst_mj, r.net_mj,
-      r.cutting_mj, r.step_over_n, r.still_step_n, r.motor_most_n, static_cast<long long>(r.uncovered),
+      r.cutting_mj, r.step_over_n, r.still_step_n, r.fall_n, r.motor_most_n, static_cast<long long>(r.uncovered),
       static_cast<long long>(r.held_back), static_cast<long long>(r.returned));
   if (run.six_axes)
     std::printf("    and torque: %.1f mJ put in by turning, %.0f N mm at most, of the cut %.1f; slew limited %lld\n", r.turned_mj,
@@ -32,6 +33,7 @@ TEST_P(Stability, TheCouplingGivesNothingAway) {
   EXPECT_GE(r.least_cutting_n_mm, 0.0);
   EXPECT_LE(r.step_over_n, 1e-9);
   EXPECT_LE(r.still_step_n, 0.5 + 1e-9);
+  EXPECT_GT(r.late, 50);
   EXPECT_LE(r.motor_over_n, 1e-9);
   EXPECT_EQ(r.motor_late_n, 0.0);
   EXPECT_LE(r.turn_step_over_n, 1e-9);

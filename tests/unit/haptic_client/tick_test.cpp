@@ -46,6 +46,32 @@ TEST(Ticks, NeitherTheirRateNorThePitchIsFelt) {
   }
 }
 
+// A loop that comes late shows no force for some milliseconds, and the hand goes on. When it is over the coupling is what the
+// hand pays for again: drilling goes on as fast as before, and the force is the hand's.
+TEST(Ticks, AStallIsOverWhenItIsOver) {
+  Bench bench(block_case(), {expert_drilling()});
+  int ticks = 0, stalls = 0;
+  while (!bench.session().done() && ticks < 60'000) {
+    const bool stalled = ticks > 2000 && ticks % 500 < 8;
+    stalls += stalled && ticks % 500 == 0;
+    EXPECT_TRUE(!stalled || bench.tick(4).report.force_device_n.isZero());
+    if (!stalled) bench.tick();
+    bench.follow();
+    ++ticks;
+  }
+  ASSERT_TRUE(bench.session().done());
+  EXPECT_GT(stalls, 5);
+  const StepResult& result = bench.session().surgeon().results()[0];
+  std::printf("  %d stalls: %.2f and %.2f N, %.3f and %.2f mm/s, plunge %.2f mm\n", stalls, result.near_cortex.force_n,
+              result.medulla.force_n, result.near_cortex.feed_mm_per_s, result.medulla.feed_mm_per_s, result.plunge_mm);
+  // Of the hand's reference: 27/11 N, 0.89 and 10.7 mm/s, 6.0 mm. A stall costs or gives a little.
+  EXPECT_NEAR(result.near_cortex.force_n, 27.0, 0.1 * 27.0);
+  EXPECT_NEAR(result.near_cortex.feed_mm_per_s, 0.89, 0.15 * 0.89);
+  EXPECT_NEAR(result.far_cortex.feed_mm_per_s, 0.89, 0.15 * 0.89);
+  EXPECT_TRUE(result.broke_through);
+  EXPECT_NEAR(result.plunge_mm, 6.0, 0.15 * 6.0);
+}
+
 // A motor of 5 N mm under a hand that pushes for 27: it stands in the bone, nothing advances; drawn back it turns again.
 TEST(Ticks, ASpindleStallsInBoneAndTurnsAgain) {
   const Case bone = block_case();
