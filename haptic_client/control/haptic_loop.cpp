@@ -156,7 +156,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   const CouplingForce coupling = coupling_.step(moment, step, ledger_, params_.dt_s, params_.smooth_s);
   if (coupling.limited) report.events |= kForceLimited;
   if (coupling.breakthrough) report.events |= kBreakthrough;
-  if (coupling.returned) report.events |= kReturned;
+  if (coupling.returned) report.events |= kPushedAway;
   report.force_physical_n = coupling.spring_n;
   report.offset_mm = coupling_.offset_mm();
   torque_nmm_ = load_nmm(step, moment.touching ? coupling.spring_n.norm() : 0.0);

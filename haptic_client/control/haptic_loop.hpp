@@ -59,7 +59,7 @@ enum LoopEvent : std::uint32_t {
   kGuided = 64,          // a guide holds the tool
   kStalled = 128,        // the spindle stands under its load
   kBreakthrough = 256,   // what was cut has ended: the coupling's stretch was let go
-  kReturned = 512,       // bone came back: what it would have added to the coupling became offset
+  kPushedAway = 512,     // bone that came back, or what turned it, moved the tool from the handle: that became offset
   kEnergyLimited = 1024, // the passivity monitor cut the force
   kRamping = 2048,       // after connecting
 };

@@ -136,7 +136,7 @@ class Observer {
     const double step_n = grown(force_n, force_n_);
     const double slew_n = params_.slew_n_per_ms * 1e3 * params_.dt_s;
     result_.step_over_n = std::max(result_.step_over_n, step_n - slew_n - by_hand_n);
-    constexpr std::uint32_t kLetGo = kBreakthrough | kUncovered | kMissedTicks | kReturned;
+    constexpr std::uint32_t kLetGo = kBreakthrough | kUncovered | kMissedTicks | kPushedAway;
     if (touching && !(report.events & kLetGo)) {
       const double explained_n = slew_n + by_hand_n + 2.0 * s * coupling_n_per_mm_ * report.moved_mm.norm();
       result_.fall_n = std::max(result_.fall_n, force_n_.norm() - force_n.norm() - explained_n);
@@ -169,7 +169,7 @@ class Observer {
     result_.cutting += report.phase == CuttingPhase::cutting;
     result_.uncovered += (report.events & kUncovered) != 0;
     result_.held_back += (report.events & kEnergyLimited) != 0;
-    result_.returned += (report.events & kReturned) != 0;
+    result_.returned += (report.events & kPushedAway) != 0;
     result_.slew_limited += (report.events & kSlewLimited) != 0;
 
     force_n_ = force_n;
