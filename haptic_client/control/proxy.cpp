@@ -670,6 +670,18 @@ bool Proxy::near_bone(const Tick& tick) noexcept {
   return false;
 }
 
+void Proxy::note_pushed_back(ProxyStep& report) noexcept {
+  const double work_mj = report.cutting_force_n.dot(report.moved_mm);
+  if (work_mj >= 0.0) return;
+  // The coupling's spring has paid for no cutting in this tick: it rubbed.
+  report.pushed_back_mj = -work_mj;
+  report.cutting = report.heel_contact = false;
+  report.feed_mm_per_s = report.torque_nmm = report.across_n = report.cutting_work_mj = 0.0;
+  report.out_of_range = 0;
+  report.cutting_force_n.setZero();
+  cut_moment_nmm_.setZero();
+}
+
 ProxyStep Proxy::step(const ToolModel& model, const Patch& patch, const Pose& pose_bone_device, double spindle_rpm,
                       double stiffness_n_per_mm, bool may_cut, double dt_s, const Surroundings& around) noexcept {
   ProxyStep report;
@@ -697,8 +709,7 @@ ProxyStep Proxy::step(const ToolModel& model, const Patch& patch, const Pose& po
   if (tick.may_cut) update_sweep(model);  // else it would creep on through bone by what its points are inset, without turning
   cut_before_ = report.cutting && !report.breakthrough;
 
-  // What turned the tool may have pushed it back by more than it cut.
-  if (report.cutting_force_n.dot(report.moved_mm) < 0.0) report.cutting_force_n.setZero();
+  note_pushed_back(report);
   report.turn_rad = between(pose_, pose_bone_device).turn_rad;
   report.contact_torque_nmm = cut_moment_nmm_;
   if (report.contact) report.contact_torque_nmm -= stiffness_n_per_mm * kTurnArm_mm * kTurnArm_mm * report.turn_rad;

@@ -40,6 +40,9 @@ struct ProxyStep {
   unsigned out_of_range = 0;   // bits: outside of which of its limits the law was used
   Vec3 cutting_force_n = Vec3::Zero();  // of the tool on the bone
   double cutting_work_mj = 0;  // of the law's force over the way cut in this tick, its parts added; never negative
+  // What turned the tool pushed it back by more than it then cut, and the force of that cut would have done this work: such a
+  // tick counts as rubbing, without force, torque, feed and work. Zero in every other.
+  double pushed_back_mj = 0;
   // What was being cut ended in this tick or with the one before: the tool has stopped there, its coupling still
   // stretched; where it goes on is the loop's to say.
   bool breakthrough = false;
@@ -143,6 +146,7 @@ class Proxy {
   [[nodiscard]] bool bone_returned(const Tick& tick, const Pose& wanted, ProxyStep& report) noexcept;
   void note_forces(const Tick& tick, const Engagement& now, const Vec3& direction, double thrust_n, ProxyStep& report) noexcept;
   [[nodiscard]] bool near_bone(const Tick& tick) noexcept;
+  void note_pushed_back(ProxyStep& report) noexcept;
   void update_sweep(const ToolModel& model) noexcept;
   void forget_contained(const Patch& patch) noexcept;
 
