@@ -1,5 +1,6 @@
 #include "common/runtime/files.hpp"
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -42,11 +43,14 @@ Result<std::string> read_file(const std::filesystem::path& file) {
 Result<void> check_writable(const std::filesystem::path& file, const std::string& what, const std::string& option) {
   if (file.empty()) return {};
   std::error_code ignored;
-  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
   int reason = 0;
   if (std::filesystem::is_directory(file, ignored))
     reason = EISDIR;
-  else if (std::filesystem::exists(file, ignored) ? ::access(file.c_str(), W_OK) != 0 : ::access(folder.c_str(), W_OK | X_OK) != 0)
+  else if (std::filesystem::exists(file, ignored) || std::filesystem::is_symlink(file, ignored))
+    reason = ::access(file.c_str(), W_OK) != 0 ? errno : 0;
+  else if (const int made = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600); made < 0)
+    reason = errno;  // also where a folder may be written, but no file be made in it, as in /proc
+  else if (::close(made); ::unlink(file.c_str()) != 0)
     reason = errno;
   if (reason == 0) return {};
   return failure(ErrorCode::internal, "cannot write " + what + " " + file.string() + ": " +

@@ -1,5 +1,7 @@
 #include "common/tools/tool_box.hpp"
 
+#include <set>
+
 namespace osteon {
 
 const ToolBox::Entry& ToolBox::add(const Tool& tool) {
@@ -14,6 +16,21 @@ const ToolBox::Entry* ToolBox::find(const Digest& hash) const {
   const std::lock_guard lock(mutex_);
   const auto found = entries_.find(hash);
   return found == entries_.end() ? nullptr : found->second.get();
+}
+
+Result<Tool> ToolBox::find(std::string_view name) const {
+  const Entry* found = nullptr;
+  std::set<std::string> known;
+  for (const Entry* entry : entries()) {
+    known.insert(entry->tool.name);
+    if (entry->tool.name != name) continue;
+    if (found) return failure(ErrorCode::invalid_input, "two tools of the room have the name \"" + std::string(name) + '"');
+    found = entry;
+  }
+  if (found) return found->tool;
+  std::string list;
+  for (const std::string& one : known) list += (list.empty() ? "" : ", ") + one;
+  return failure(ErrorCode::not_found, "the room has no tool \"" + std::string(name) + "\"; choose one of " + list);
 }
 
 std::vector<const ToolBox::Entry*> ToolBox::entries() const {

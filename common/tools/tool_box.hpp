@@ -21,6 +21,8 @@ class ToolBox {
   // The entry of this definition, new or already there.
   const Entry& add(const Tool& tool);
   [[nodiscard]] const Entry* find(const Digest& hash) const;  // null when unknown
+  // The tool of this name. Errors: not_found (names those that there are), invalid_input (two bear it).
+  [[nodiscard]] Result<Tool> find(std::string_view name) const;
   [[nodiscard]] std::vector<const Entry*> entries() const;    // in the order of their hashes
 
  private:

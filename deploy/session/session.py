@@ -124,6 +124,9 @@ class Session:
         """The surgeon's work: a status line every second, the camera follows the tool."""
         cache = ROOT / "build" / "case-cache"
         cache.mkdir(parents=True, exist_ok=True)
+        # osteon-haptic writes over no recording; this one is of the session before, unless it is what is played now.
+        if str(self.out / "session.h5") not in self.device:
+            (self.out / "session.h5").unlink(missing_ok=True)
         haptic = self.household.start("osteon-haptic", [
             self.programs / "osteon-haptic", "--server", address, "--plan", plan_file, "--device", self.device,
             "--session-log", self.out / "session.csv", "--record", self.out / "session.h5", "--cut-log", self.out / "cuts.csv",

@@ -98,17 +98,19 @@ class Client {
     all_over_ = true;
     reporter.join();
     room_.close();
-    outcome_.recording = recorder_.finish({to_hex(replica_.hash()), replica_.room_seq().value, outcome_.rows_dropped});
-    if (Result<void> written = log_.finish(); !written) return tl::unexpected(written.error());
     {
       const std::lock_guard lock(mutex_);
-      if (lost_why_) return tl::unexpected(*lost_why_);
+      outcome_.lost = lost_why_;
     }
     outcome_.stopped = stop_.requested() && !session_.done() && !session_.endless();
-    if (!outcome_.stopped && replica_.unconfirmed() > 0)
-      return failure(ErrorCode::unavailable, "the server has not confirmed the last " + std::to_string(replica_.unconfirmed()) +
-                                                 " cuts within " + std::to_string(kConfirmPatience.count()) +
-                                                 " s; look at the server's log");
+    if (!outcome_.lost && !outcome_.stopped && replica_.unconfirmed() > 0)
+      outcome_.lost = Error{ErrorCode::unavailable, "the server has not confirmed the last " +
+                                                        std::to_string(replica_.unconfirmed()) + " cuts within " +
+                                                        std::to_string(kConfirmPatience.count()) +
+                                                        " s; look at the server's log"};
+    outcome_.recording = recorder_.finish(
+        {to_hex(replica_.hash()), replica_.room_seq().value, outcome_.rows_dropped, outcome_.lost.has_value()});
+    if (const Result<void> written = log_.finish(); !written && !outcome_.lost) outcome_.lost = written.error();
     outcome_.coupling_n_per_mm = session_.loop().coupling_n_per_mm();
     outcome_.workspace_scale = session_.loop().mapping().scale();
     outcome_.steps = session_.results();
@@ -135,6 +137,7 @@ class Client {
     info.case_title = room_.bone().info().title;
     info.pitch_mm = room_.bone().pitch_mm();
     info.author = room_.room().author.value;
+    info.plan_digest = to_hex(plan_digest(session_.plan()));
     for (const ToolModel& model : session_.plan().tools)
       info.tools.push_back({model.tool.name, law_name(model), model.tool.diameter_mm});
     return info;

@@ -3,6 +3,7 @@
 #pragma once
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,6 @@
 namespace osteon::haptic {
 
 struct ClientOptions {
-  double force_scale = 0;  // 0: from the device
   std::filesystem::path session_log;
   std::filesystem::path record;  // HDF5
   bool status = false;     // a line each second on standard output
@@ -23,6 +23,7 @@ struct ClientOptions {
 
 struct ClientOutcome {
   bool stopped = false;                  // by a signal, before the plan was done
+  std::optional<Error> lost;             // why it ended before its time: the room, or a log on a full disk
   std::vector<StepResult> steps;
   std::vector<double> removed_mm3;       // of each step, by the cut field
   std::vector<CutRow> cuts;
@@ -43,8 +44,9 @@ struct ClientOutcome {
   double coupling_n_per_mm = 0, workspace_scale = 0;  // of the last step: K_c, and bone mm for each mm of the handle
 };
 
-// Runs a session to its end and waits until the room has confirmed every cut. Errors: unavailable (the server went away;
-// force and spindle are down by then, or it stopped confirming), internal (the log cannot be written).
+// Runs a session to its end and waits until the room has confirmed every cut. Where the server goes away, force and spindle
+// are down by then, or it stops confirming, the outcome says so (`lost`) and tells what was done until then. Error internal:
+// a log or recording cannot be made; nothing was begun.
 [[nodiscard]] Result<ClientOutcome> run_client(RoomSession& room, Session& session, const ClientOptions& options,
                                                const StopSignal& stop);
 

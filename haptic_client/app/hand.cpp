@@ -29,8 +29,17 @@ Result<HandChoice> HandChoice::make(const HandOptions& options, DeviceNotice not
                    options.plan.empty()
                        ? "--tool is missing; name the tool for your hand, e.g. drill-3.2, or give a --plan"
                        : "--tool is for a hand without a plan; leave out --tool or --plan");
-  if (!options.plan.empty() && !options.law.empty())
-    return failure(ErrorCode::invalid_input, "--law is for a hand without a plan; write \"law\" into the plan's steps");
+  // A plan's steps say all this themselves.
+  const std::pair<const char*, bool> said[] = {{"--law", options.law.has_value()},
+                                               {"--wear", options.wear.has_value()},
+                                               {"--view", options.view.has_value()},
+                                               {"--at", options.at.has_value()},
+                                               {"--rpm", options.spindle_rpm.has_value()}};
+  for (const auto& [option, given] : said)
+    if (given && !options.plan.empty())
+      return failure(ErrorCode::invalid_input,
+                     std::string(option) + " is for a hand without a plan; leave it out, or write \"law\", \"wear\", \"entry\" "
+                                           "and \"spindle_rpm\" into the plan's steps");
   if (options.plan.empty()) {
     if (Result<void> taken = choice.take_tool(); !taken) return tl::unexpected(taken.error());
     if (Result<void> connected = choice.connect(notice); !connected) return tl::unexpected(connected.error());
@@ -48,26 +57,27 @@ Result<HandChoice> HandChoice::make(const HandOptions& options, DeviceNotice not
 }
 
 Result<void> HandChoice::take_tool() {
-  const Result<Vec3> toward = read_view(options_.view);
+  const Result<Vec3> toward = read_view(options_.view.value_or("front"));
   if (!toward) return tl::unexpected(toward.error());
   free_ = {.tool = options_.tool,
-           .spindle_rpm = options_.spindle_rpm,
-           .wear = options_.wear,
-           .law = options_.law,
+           .spindle_rpm = options_.spindle_rpm.value_or(0.0),
+           .wear = options_.wear.value_or(1.0),
+           .law = options_.law.value_or(""),
            .toward = *toward,
            .at_mm = std::nullopt};
-  if (!options_.at.empty()) {
-    const Result<Vec3> at = read_point(options_.at, "--at");
+  if (options_.at) {
+    const Result<Vec3> at = read_point(*options_.at, "--at");
     if (!at) return tl::unexpected(at.error());
     free_.at_mm = *at;
   }
-  if (!(options_.spindle_rpm >= 0.0 && options_.spindle_rpm <= 200000.0))
+  if (!(free_.spindle_rpm >= 0.0 && free_.spindle_rpm <= 200000.0))
     return failure(ErrorCode::invalid_input, "--rpm must be from 0 to 200000");
-  const Result<Tool> tool = find_tool(options_.tool);
-  if (!tool) return tl::unexpected(tool.error());
-  if (const auto law = choose_law(*tool, options_.law); !law)
+  // One that is not of the box may be the room's own.
+  if (const Result<Tool> tool = find_tool(free_.tool))
+    if (const Result<void> held = check_held(*tool); !held) return failure(held.error().code, "--tool: " + held.error().message);
+  if (const Result<void> law = check_law(free_.tool, free_.law); !law)
     return failure(law.error().code, "--law: " + law.error().message);
-  if (!(options_.wear >= 1.0 && options_.wear <= 5.0))
+  if (!(free_.wear >= 1.0 && free_.wear <= 5.0))
     return failure(ErrorCode::invalid_input, "--wear must be from 1, sharp, to 5");
   return {};
 }
@@ -82,17 +92,34 @@ Result<void> HandChoice::connect(const DeviceNotice& notice) {
   return {};
 }
 
-Result<std::unique_ptr<Session>> HandChoice::on(const Case& bone, double force_scale) {
-  // What a hand did against one force it would not have done against another.
-  if (recorded_ && force_scale == 0.0) force_scale = recorded_->session().force_scale;
+Result<ReadyPlan> HandChoice::ready_on(const Case& bone, const ToolFinder& find) const {
   if (options_.plan.empty()) {
-    Result<ReadyPlan> ready = make_free_hand(free_, bone);
-    if (!ready) return tl::unexpected(ready.error());
+    Result<ReadyPlan> ready = make_free_hand(free_, bone, find);
+    if (!ready) return failure(ready.error().code, "--tool " + options_.tool + ": " + ready.error().message);
+    return ready;
+  }
+  Result<ReadyPlan> ready = make_ready(plan_, bone, find);
+  if (!ready) return failure(ready.error().code, "the plan " + options_.plan.string() + ", " + ready.error().message);
+  return ready;
+}
+
+Result<std::unique_ptr<Session>> HandChoice::on(const Case& bone, const ToolBox& tools, double force_scale) {
+  Result<ReadyPlan> ready = ready_on(bone, [&](std::string_view name) { return tools.find(name); });
+  if (!ready) return tl::unexpected(ready.error());
+  if (recorded_) {
+    std::vector<std::string> names;
+    for (const ToolModel& model : ready->tools) names.push_back(model.tool.name);
+    if (Result<void> played =
+            check_played(recorded_->session(), "--device " + options_.device, to_hex(bone.hash()), names, to_hex(plan_digest(*ready)));
+        !played)
+      return tl::unexpected(played.error());
+    // What a hand did against one force it would not have done against another.
+    if (force_scale == 0.0) force_scale = recorded_->session().force_scale;
+  }
+  if (options_.plan.empty()) {
     HapticDevice& device = person_ ? static_cast<HapticDevice&>(*person_) : *recorded_;
     return std::make_unique<FreeHandSession>(std::move(*ready), device, force_scale);
   }
-  Result<ReadyPlan> ready = make_ready(plan_, bone);
-  if (!ready) return failure(ready.error().code, "the plan " + options_.plan.string() + ", " + ready.error().message);
   auto session = std::make_unique<SimulatedSession>(std::move(*ready), simulated_, force_scale);
   if (recorded_) session->play(*recorded_);
   return session;

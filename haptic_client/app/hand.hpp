@@ -1,9 +1,11 @@
 // Who holds the tool: the simulated hand with a plan, a recording of one, or a person at a device, as the command line says.
 #pragma once
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "common/tools/tool_box.hpp"
 #include "haptic_client/control/free_hand.hpp"
 #include "haptic_client/device/connection.hpp"
 #include "haptic_client/device/device_list.hpp"
@@ -15,10 +17,11 @@ struct HandOptions {
   std::string device = "simulated";
   std::filesystem::path plan;     // a simulated hand's, or a recording's
   std::string tool;               // a person's, or of a person's recording
-  std::string view = "front", at; // read_view(), read_point(); `at` empty: the bone's middle
-  double spindle_rpm = 0;         // 0: the tool's own
-  std::string law;                // a person's: force law of the tool; empty: the tool's own
-  double wear = 1;                // a person's
+  // A person's; where nothing was said: from the front, over the bone's middle, the tool's own speed and law, sharp.
+  std::optional<std::string> view, at;  // read_view(), read_point()
+  std::optional<double> spindle_rpm;
+  std::optional<std::string> law;
+  std::optional<double> wear;
   DeviceOptions devices;
 };
 
@@ -28,9 +31,10 @@ class HandChoice {
   // are sentences with the remedy.
   [[nodiscard]] static Result<HandChoice> make(const HandOptions& options, DeviceNotice notice);
 
-  // The session on a bone; `force_scale` 0: from the device, or as it was recorded. Lives no longer than this choice.
-  // Error: the plan or the tool does not suit the bone.
-  [[nodiscard]] Result<std::unique_ptr<Session>> on(const Case& bone, double force_scale);
+  // The session on a bone, with tools of `tools`, all that the room has; `force_scale` 0: from the device, or as it was
+  // recorded. Lives no longer than this choice. Errors: there is no such tool, its law does not suit it, plan or tool does
+  // not suit the bone, the recording is of another bone, tool or plan.
+  [[nodiscard]] Result<std::unique_ptr<Session>> on(const Case& bone, const ToolBox& tools, double force_scale);
 
   [[nodiscard]] std::string_view device_name() const;
   // How often devices were lost.
@@ -42,6 +46,8 @@ class HandChoice {
   HandChoice() = default;
   // Checks what a hand without a plan was told.
   Result<void> take_tool();
+  // What the plan does, or the person's hand.
+  Result<ReadyPlan> ready_on(const Case& bone, const ToolFinder& find) const;
   // Opens a person's devices.
   Result<void> connect(const DeviceNotice& notice);
 

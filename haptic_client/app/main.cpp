@@ -2,9 +2,11 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -27,15 +29,11 @@ constexpr const char* kProgram = "osteon-haptic";
 struct Options {
   RoomSessionOptions room;
   double patience_s = 5.0;
+  std::optional<double> force_scale;
   std::filesystem::path cut_log, summary;
   HandOptions hand;
   ClientOptions client;
 };
-
-json durations(const DurationHistogram& histogram) {
-  return {{"p50_us", histogram.percentile_us(50)}, {"p99_us", histogram.percentile_us(99)},
-          {"p999_us", histogram.percentile_us(99.9)}, {"max_us", histogram.max_us()}};
-}
 
 json vector(const Vec3& v) { return json::array({v.x(), v.y(), v.z()}); }
 
@@ -44,8 +42,9 @@ json means(const LayerMeans& m) {
           {"seconds", 1e-3 * static_cast<double>(m.ticks)}};
 }
 
-json step_summary(const ReadyStep& step, const StepResult& result, double removed_mm3) {
+json step_summary(const ReadyStep& step, const std::vector<ToolModel>& tools, const StepResult& result, double removed_mm3) {
   json out{{"completed", result.completed}, {"duration_s", result.duration_s}};
+  if (result.gave_up) out["gave_up_in"] = name(*result.gave_up);
   out["action"] = name(step.plan.action);
   if (step.plan.action == Action::wait) return out;
   if (step.plan.action == Action::place) {
@@ -54,6 +53,7 @@ json step_summary(const ReadyStep& step, const StepResult& result, double remove
     out["axis"] = vector(step.site.axis);
     return out;
   }
+  out["law"] = law_name(tools[static_cast<std::size_t>(step.tool)]);
   if (step.plan.action == Action::free_hand) {
     out["tool"] = step.plan.tool;
     out["spindle_rpm"] = step.spindle_rpm;
@@ -73,8 +73,10 @@ json step_summary(const ReadyStep& step, const StepResult& result, double remove
   out["flatness_mm"] = step.site.flatness_mm;
   out["removed_mm3"] = removed_mm3;
   out["peak_force_n"] = result.peak_force_n;
+  out["asked_mm"] = step.asked_mm();  // of the tip, like what was reached
   out["deepest_mm"] = result.deepest_mm;
-  out["while_cutting"] = means(result.all);
+  // A broach cuts in the ticks of its blows only: there is no force and no feed of cutting to give a mean of.
+  if (step.item.kind != ToolKind::broach) out["while_cutting"] = means(result.all);
   if (drill) {
     out["near_cortex"] = means(result.near_cortex);
     out["medulla"] = means(result.medulla);
@@ -93,7 +95,7 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string
     outside[std::string(use.law->name)] = {{"ticks", use.ticks}, {"what", out_of_range_words(use.bits)}};
   json steps = json::array();
   for (std::size_t i = 0; i < plan.steps.size(); ++i)
-    steps.push_back(step_summary(plan.steps[i], outcome.steps[i], outcome.removed_mm3[i]));
+    steps.push_back(step_summary(plan.steps[i], plan.tools, outcome.steps[i], outcome.removed_mm3[i]));
   return {{"device", device},
           {"device_losses", losses},
           {"device_limits",
@@ -118,8 +120,6 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string
             {"work_p99_us", ticks.work.percentile_us(99)},
             {"work_p999_us", ticks.work.percentile_us(99.9)},
             {"work_max_us", ticks.work.max_us()}}},
-          {"lateness", durations(ticks.lateness)},
-          {"work", durations(ticks.work)},
           {"patches",
            {{"built", outcome.patches},
             {"p50_us", outcome.patch_p50_us},
@@ -137,7 +137,8 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string
           {"removed_mm3", outcome.removed_total_mm3},
           {"field_hash", to_hex(outcome.field_hash)},
           {"room_seq", outcome.room_seq.value},
-          {"stopped", outcome.stopped}};
+          {"stopped", outcome.stopped},
+          {"lost", outcome.lost ? json(outcome.lost->message) : json(nullptr)}};
 }
 
 // What a person should know of the devices, as it happens.
@@ -152,13 +153,46 @@ void tell(DeviceEvent event, std::string_view device, const std::string& sentenc
   }
 }
 
+Result<void> check_outputs(const Options& options) {
+  // What was recorded cannot be made again, and might be what is being played.
+  std::error_code ignored;
+  if (!options.client.record.empty() && std::filesystem::is_regular_file(options.client.record, ignored))
+    return failure(ErrorCode::exists, "there is a file " + options.client.record.string() +
+                                          " already; give --record another name, or move that one away");
+  if (Result<void> usable = check_writable(options.client.record, "the recording", "--record"); !usable) return usable;
+  if (Result<void> usable = check_writable(options.client.session_log, "the session log", "--session-log"); !usable) return usable;
+  if (Result<void> usable = check_writable(options.cut_log, "the cut log", "--cut-log"); !usable) return usable;
+  return check_writable(options.summary, "the summary", "--summary");
+}
+
+// A line for each step whose tool stayed well above where it was sent: hand and device are springs, bone pushes back.
+void tell_depths(const ReadyPlan& plan, const ClientOutcome& outcome) {
+  for (std::size_t i = 0; i < plan.steps.size(); ++i) {
+    const ReadyStep& step = plan.steps[i];
+    if (!outcome.steps[i].completed || step.plan.action != Action::burr) continue;
+    const double asked_mm = step.asked_mm(), reached_mm = outcome.steps[i].deepest_mm;
+    if (reached_mm < 0.9 * asked_mm)
+      std::printf("%s: step %zu (%s) reached %.2f mm of the %.2f mm asked: bone pushes hand and handle back\n", kProgram, i + 1,
+                  name(step.plan.action), reached_mm, asked_mm);
+  }
+}
+
+// Error unavailable: the first step whose time ran out. One that a signal stopped is as it should be.
+Result<void> all_finished(const ReadyPlan& plan, const ClientOutcome& outcome) {
+  for (std::size_t i = 0; i < plan.steps.size(); ++i)
+    if (const auto gave_up = outcome.steps[i].gave_up)
+      return failure(ErrorCode::unavailable, "step " + std::to_string(i + 1) + " (" + name(plan.steps[i].plan.action) +
+                                                 ") did not finish: " + given_up_words(*gave_up));
+  return {};
+}
+
 Result<void> run(Options& options, const StopSignal& stop) {
   // Everything that can be wrong without a server is said before one is looked for.
-  if (options.client.force_scale < 0.0 || options.client.force_scale > 1.0)
+  if (options.force_scale && !(*options.force_scale > 0.0 && *options.force_scale <= 1.0))
     return failure(ErrorCode::invalid_input, "--scale must be a number above 0 and at most 1");
   if (!(options.patience_s >= 0.0 && options.patience_s <= 3600.0))
     return failure(ErrorCode::invalid_input, "--patience must be from 0 to 3600 seconds");
-  if (Result<void> usable = check_writable(options.client.record, "the recording", "--record"); !usable) return usable;
+  if (Result<void> usable = check_outputs(options); !usable) return usable;
   Result<HandChoice> hand = HandChoice::make(options.hand, tell);
   if (!hand) return tl::unexpected(hand.error());
 
@@ -166,24 +200,30 @@ Result<void> run(Options& options, const StopSignal& stop) {
   Result<RoomSession> room = RoomSession::join(options.room, [&] { return stop.requested(); });
   if (!room) return tl::unexpected(room.error());
   log::info("joined", {{"case", room->bone().info().title}, {"author", room->room().author.value}});
-  Result<std::unique_ptr<Session>> session = hand->on(room->bone(), options.client.force_scale);
+  Result<std::unique_ptr<Session>> session = hand->on(room->bone(), *room->tools(), options.force_scale.value_or(0.0));
   if (!session) return tl::unexpected(session.error());
 
   const Result<ClientOutcome> outcome = run_client(*room, **session, options.client, stop);
   const int losses = hand->losses();
   hand->disconnect();
   if (!outcome) return tl::unexpected(outcome.error());
-  if (Result<void> written = write_cut_log(options.cut_log, outcome->cuts); !written) return written;
-  if (!options.summary.empty())
-    if (Result<void> written =
-            write_file(options.summary, summary_of(*outcome, (*session)->plan(), hand->device_name(), losses).dump(2) + "\n");
-        !written)
-      return written;
-  std::printf("%s: %s %zu steps, %zu cuts, %.1f mm3 removed, field %.12s at %llu\n", kProgram,
-              outcome->stopped ? "stopped in" : "done", (*session)->plan().steps.size(), outcome->cuts.size(),
-              outcome->removed_total_mm3, to_hex(outcome->field_hash).c_str(),
+  const ReadyPlan& plan = (*session)->plan();
+  // Both are written, whatever comes of the other, and of the session.
+  const Result<void> cut_log = write_cut_log(options.cut_log, outcome->cuts);
+  const Result<void> summary =
+      options.summary.empty()
+          ? Result<void>()
+          : write_file(options.summary, summary_of(*outcome, plan, hand->device_name(), losses).dump(2) + "\n");
+  tell_depths(plan, *outcome);
+  const auto finished = std::ranges::count_if(outcome->steps, &StepResult::completed);
+  std::printf("%s: %s, %lld of %zu steps done, %zu cuts of its own, %.1f mm3 gone from the bone in all, field %.12s at %llu\n",
+              kProgram, outcome->lost ? "broken off" : outcome->stopped ? "stopped" : "ended", static_cast<long long>(finished),
+              plan.steps.size(), outcome->cuts.size(), outcome->removed_total_mm3, to_hex(outcome->field_hash).c_str(),
               static_cast<unsigned long long>(outcome->room_seq.value));
-  return {};
+  if (outcome->lost) return tl::unexpected(*outcome->lost);
+  if (!cut_log) return cut_log;
+  if (!summary) return summary;
+  return all_finished(plan, *outcome);
 }
 
 }  // namespace
@@ -201,28 +241,29 @@ int main(int argc, char** argv) {
       kProgram);
   app.add_option("--server", options.room.address, "HOST:PORT of osteon-server")->required();
   app.add_option("--plan", options.hand.plan, "JSON file with the steps of a simulated surgeon");
-  app.add_option("--tool", options.hand.tool, "The tool for your own hand, e.g. drill-3.2; no --plan then");
+  app.add_option("--tool", options.hand.tool,
+                 "The tool for your own hand, of the box or of the server's --tools, e.g. drill-3.2; no --plan then");
   app.add_option("--device", options.hand.device,
                  "simulated or simulated-3.3N (a simulated hand, with a --plan), recorded:FILE (a recording, with its --plan or "
                  "--tool), or for your hand "
                  "one of osteon-haptic devices, others added by \"+\": phantom, falcon+spacemouse+pedal")
       ->capture_default_str();
   app.add_option("--view", options.hand.view,
-                 "Your hand: from where you look, front, back, left, right, top or bottom of the patient, or the direction x,y,z")
-      ->capture_default_str();
+                 "Your hand: from where you look, front (unless said otherwise), back, left, right, top or bottom of the "
+                 "patient, or the direction x,y,z");
   app.add_option("--at", options.hand.at,
                  "Your hand: the place x,y,z in mm over which the tool begins; by default the bone's middle");
   app.add_option("--rpm", options.hand.spindle_rpm, "Your hand: the spindle's full speed; by default the tool's own");
   app.add_option("--law", options.hand.law,
                  "Your hand: the force law by which the tool resists, see osteon-haptic laws; by default the tool's own");
-  app.add_option("--wear", options.hand.wear, "Your hand: how blunt the tool is, from 1, sharp; about 2 is blunt")
-      ->capture_default_str();
+  app.add_option("--wear", options.hand.wear,
+                 "Your hand: how blunt the tool is, from 1, sharp (unless said otherwise); about 2 is blunt");
   add_device_options(app, options.hand.devices);
-  app.add_option("--scale", options.client.force_scale,
+  app.add_option("--scale", options.force_scale,
                  "Rendered over physical force; by default the device's continuous force / 30 N");
   app.add_option("--session-log", options.client.session_log, "CSV with a row for each millisecond");
   app.add_option("--record", options.client.record,
-                 "HDF5 file with a row for each millisecond: poses, wrenches, spindle, bone; --device recorded:FILE plays it");
+                 "HDF5 file with a row for each millisecond: poses, wrenches, spindle, bone; --device recorded:FILE plays it. A file that is there is left alone");
   app.add_option("--cut-log", options.cut_log, "CSV with a row for each cut");
   app.add_option("--summary", options.summary, "JSON written at the end: steps, forces, loop times, field hash");
   app.add_option("--cache", options.room.cache, "Folder where fetched cases are kept")->capture_default_str();

@@ -25,16 +25,18 @@ double number(const json& object, const char* field, double otherwise, double lo
   return value.get<double>();
 }
 
+constexpr double kFarthest = 1e5;  // mm; no bone is there, and beyond it sentences become unreadable
+
 template <std::size_t N>
 std::array<double, N> numbers(const json& object, const char* field) {
   const json& value = object.at(field);
   std::array<double, N> result{};
   bool right = value.is_array() && value.size() == N;
   for (std::size_t i = 0; right && i < N; ++i) {
-    right = value[i].is_number() && std::isfinite(value[i].get<double>());
+    right = value[i].is_number() && std::abs(value[i].get<double>()) <= kFarthest;
     if (right) result[i] = value[i].get<double>();
   }
-  if (!right) throw Wrong(std::string("\"") + field + "\" must be a list of " + std::to_string(N) + " numbers");
+  if (!right) throw Wrong(std::string("\"") + field + "\" must be a list of " + std::to_string(N) + " numbers from -100000 to 100000");
   return result;
 }
 
@@ -72,10 +74,11 @@ PlanEntry read_entry(const json& step) {
   return result;
 }
 
-// The force law, which must suit the tool; empty where none is named.
+// The force law; empty where none is named. A tool that is not of the box may be the room's own: of it only the room can
+// say whether it is there and which laws suit it.
 std::string read_law(const json& object, const std::string& tool) {
   const std::string law = text(object, "law", "");
-  if (const auto chosen = choose_law(*find_tool(tool), law); !chosen) throw Wrong("\"law\": " + chosen.error().message);
+  if (const Result<void> well = check_law(tool, law); !well) throw Wrong("\"law\": " + well.error().message);
   return law;
 }
 
@@ -93,7 +96,6 @@ PlanStep read_step(const json& object) {
     only(object, {"action", "tool", "entry", "seconds"});
     step.action = Action::place;
     step.tool = text(object, "tool", "guide-1");
-    if (const Result<Tool> known = find_tool(step.tool); !known) throw Wrong("\"tool\": " + known.error().message);
     step.seconds = number(object, "seconds", 0.5, 0.0, 3600.0);
     step.entry = read_entry(object);
     return step;
@@ -102,7 +104,6 @@ PlanStep read_step(const json& object) {
     only(object, {"action", "tool", "spindle_rpm", "entry", "tremor_mm", "wear", "law"});
     step.action = Action::screw;
     step.tool = text(object, "tool", "screw-1");
-    if (const Result<Tool> known = find_tool(step.tool); !known) throw Wrong("\"tool\": " + known.error().message);
     step.spindle_rpm = number(object, "spindle_rpm", 0.0, 50.0, 600.0);
     step.tremor_mm = number(object, "tremor_mm", 0.0, 0.0, 5.0);
     step.wear = number(object, "wear", step.wear, 1.0, 5.0);
@@ -118,7 +119,6 @@ PlanStep read_step(const json& object) {
                 "hand_damping_n_s_per_mm"});
   step.action = drill ? Action::drill : Action::burr;
   step.tool = text(object, "tool", drill ? "drill-3.2" : "burr-round-5");
-  if (const Result<Tool> known = find_tool(step.tool); !known) throw Wrong("\"tool\": " + known.error().message);
   const std::string hand = text(object, "hand", "expert");
   if (hand == "expert") step.hand = HandKind::expert;
   else if (hand == "novice") step.hand = HandKind::novice;
@@ -160,9 +160,18 @@ PlanStep read_step(const json& object) {
 
 }  // namespace
 
+Result<void> check_law(const std::string& tool, const std::string& law) {
+  if (const Result<Tool> known = find_tool(tool)) {
+    if (const auto chosen = choose_law(*known, law); !chosen) return tl::unexpected(chosen.error());
+  } else if (!law.empty() && !find_force_law(law)) {
+    return failure(ErrorCode::invalid_input, "there is no force law \"" + law + "\"; osteon-haptic laws lists them");
+  }
+  return {};
+}
+
 Result<std::vector<PlanStep>> read_plan(const std::filesystem::path& file) {
   const Result<std::string> content = read_file(file);
-  if (!content) return tl::unexpected(content.error());
+  if (!content) return failure(content.error().code, "--plan: " + content.error().message);
   const json plan = json::parse(*content, nullptr, false);
   const std::string name = "the plan " + file.string();
   if (plan.is_discarded()) return failure(ErrorCode::invalid_input, name + " is not JSON; see the plans that deploy/demo writes");

@@ -406,7 +406,8 @@ bool RecordFile::Impl::make_metadata() {
                                                               {"tick_s", info.loop.dt_s},
                                                               {"pitch_mm", info.pitch_mm}};
   bool ok = set_text(g, recording::kDevice, info.device) && set_text(g, recording::kModel, info.device_info.model) &&
-            set_text(g, recording::kCaseHash, info.case_hash) && set_text(g, "case_title", info.case_title) &&
+            set_text(g, recording::kCaseHash, info.case_hash) && set_text(g, recording::kCaseTitle, info.case_title) &&
+            set_text(g, recording::kPlanDigest, info.plan_digest) &&
             set_integer(g, "author", static_cast<std::int64_t>(info.author));
   for (const auto& [name, value] : numbers_of_device) ok = ok && set_number(g, name, value);
   std::vector<std::string> tools;
@@ -421,7 +422,7 @@ bool RecordFile::Impl::make_metadata() {
   const Hdf5Handle readme_type = text_type(std::strlen(kReadme));
   const Hdf5Handle readme = make_value(file.id(), "metadata/README", readme_type.id(), kReadme);
   ok = ok && voxel.ok() && readme.ok() && set_text(voxel.id(), "units", "mm3") &&
-       make_texts(file.id(), "metadata/tools", tools) && make_texts(file.id(), "metadata/laws", laws) &&
+       make_texts(file.id(), recording::kTools, tools) && make_texts(file.id(), "metadata/laws", laws) &&
        make_texts(file.id(), "metadata/event_bits", event_names()) && make_texts(file.id(), "metadata/range_bits", range_names());
   // What only the end can say: there from the start, because nothing new may appear while others read.
   const std::string nothing(64, '\0');
@@ -433,7 +434,7 @@ bool RecordFile::Impl::make_metadata() {
   finished = make_value(file.id(), "metadata/finished", H5T_NATIVE_UINT64, &zero);
   return ok && hash.ok() && room_seq.ok() && rows_dropped.ok() && finished.ok() &&
          set_text(hash.id(), "meaning", "of the whole bone at room_seq, SHA-256 in hexadecimal digits") &&
-         set_text(finished.id(), "meaning", "1: the session ended as it should; 0: it goes on, or its end was lost");
+         set_text(finished.id(), "meaning", "1: the session ended as it should; 0: it goes on, its room was lost, or its writer was killed");
 }
 
 // The same array under the names that each group of the layout knows it by.
@@ -528,12 +529,12 @@ Result<void> RecordFile::finish(const RecordingEnd& end) {
   if (!impl.write_all()) return impl.failed("written whole");
   std::string text = end.field_hash;
   text.resize(64, '\0');
-  const std::uint64_t one = 1;
+  const std::uint64_t as_it_should = end.lost ? 0 : 1;
   const Hdf5Handle hash_type = text_type(64);
   const bool ok = H5Dwrite(impl.hash.id(), hash_type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()) >= 0 &&
                   H5Dwrite(impl.room_seq.id(), H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &end.room_seq) >= 0 &&
                   H5Dwrite(impl.rows_dropped.id(), H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &end.rows_dropped) >= 0 &&
-                  H5Dwrite(impl.finished.id(), H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &one) >= 0 &&
+                  H5Dwrite(impl.finished.id(), H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &as_it_should) >= 0 &&
                   H5Fflush(impl.file.id(), H5F_SCOPE_GLOBAL) >= 0;
   if (!ok) return impl.failed("written whole");
   impl.take_ups.clear();

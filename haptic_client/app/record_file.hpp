@@ -20,6 +20,7 @@ struct RecordingInfo {
   DeviceLimits limits;
   LoopParams loop;
   std::string case_hash, case_title;
+  std::string plan_digest;  // of plan_digest(), in hexadecimal digits
   double pitch_mm = 0;  // h of the case
   std::uint64_t author = 0;
   struct Item {
@@ -35,6 +36,7 @@ struct RecordingEnd {
   std::string field_hash;  // of the whole bone
   std::uint64_t room_seq = 0;
   std::uint64_t rows_dropped = 0;
+  bool lost = false;       // the session did not end as it should: its room was lost
 };
 
 class RecordFile {

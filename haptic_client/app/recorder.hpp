@@ -22,7 +22,11 @@ class Recorder {
   };
 
   Recorder() = default;
-  ~Recorder() { (void)finish({}); }
+  ~Recorder() {
+    RecordingEnd end;
+    end.lost = true;
+    (void)finish(end);
+  }
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 

@@ -31,13 +31,15 @@ Eigen::Quaterniond view_along(const Vec3& toward) {
   return Eigen::Quaterniond(view).normalized();
 }
 
+constexpr double kFarthest = 1e5;  // mm; no bone is there
+
 bool read_numbers(std::string_view text, Vec3& v) {
   for (int i = 0; i < 3; ++i) {
     const std::size_t comma = text.find(',');
     if ((comma == std::string_view::npos) != (i == 2)) return false;
     const std::string_view one = text.substr(0, comma);
     const auto [end, wrong] = std::from_chars(one.data(), one.data() + one.size(), v[i]);
-    if (wrong != std::errc{} || end != one.data() + one.size() || !std::isfinite(v[i])) return false;
+    if (wrong != std::errc{} || end != one.data() + one.size() || !(std::abs(v[i]) <= kFarthest)) return false;
     if (comma != std::string_view::npos) text.remove_prefix(comma + 1);
   }
   return true;
@@ -75,9 +77,17 @@ Result<Vec3> read_point(std::string_view text, std::string_view option) {
   return v;
 }
 
+Result<void> check_held(const Tool& tool) {
+  if (tool.cuts()) return {};
+  return failure(ErrorCode::invalid_input, "the tool \"" + tool.name +
+                                               "\" takes no bone; take one that does (drill, bur, saw, reamer, broach, pin, "
+                                               "screw) and set guides and trial implants in the viewer or with a plan");
+}
+
 Result<ReadyPlan> make_free_hand(const FreeHandOptions& options, const Case& bone, const ToolFinder& find) {
   const Result<Tool> tool = find(options.tool);
   if (!tool) return tl::unexpected(tool.error());
+  if (const Result<void> held = check_held(*tool); !held) return tl::unexpected(held.error());
   const Vec3 toward = options.toward.normalized();
   const Result<Site> site = options.at_mm ? find_site_at(bone, *options.at_mm, toward) : find_site_toward(bone, -toward);
   if (!site) return tl::unexpected(site.error());

@@ -22,6 +22,9 @@ struct FreeHandOptions {
 // "x,y,z" in millimetres. Error invalid_input; `option` is named in it.
 [[nodiscard]] Result<Vec3> read_point(std::string_view text, std::string_view option);
 
+// Whether a person's hand can do anything with a tool. Error invalid_input: it takes no bone, and what it is for.
+[[nodiscard]] Result<void> check_held(const Tool& tool);
+
 // A plan of one step without end: the tool, and where it is taken up. Error invalid_input or not_found.
 [[nodiscard]] Result<ReadyPlan> make_free_hand(const FreeHandOptions& options, const Case& bone,
                                                const ToolFinder& find = find_tool);

@@ -39,7 +39,9 @@ class SimulatedSession final : public Session {
   SessionTick tick(const Patch& patch, bool link_ok, int periods = 1, const std::vector<PlacedGuide>* room_guides = nullptr) noexcept override;
   [[nodiscard]] bool done() const noexcept override { return surgeon_.done(); }
   // Before the first tick: the handle moves as this device says, and the simulated hand lets go. The plan still says
-  // which tools are taken up when; with a recording of the same plan on the same bone everything happens again.
+  // which tools are taken up when. The same cuts and forces come again, bit for bit, with a recording of the same plan at
+  // the same force scale on bone that is as it was then, if patches, confirmed cuts and late ticks come in the ticks in
+  // which they came then; where threads bring them, as in a running client, cuts come again to their size, not to the bit.
   void play(HapticDevice& device) noexcept { played_ = &device; }
 
   [[nodiscard]] HapticLoop& loop() noexcept override { return loop_; }

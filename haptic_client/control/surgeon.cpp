@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 namespace osteon::haptic {
 namespace {
@@ -208,6 +209,50 @@ Result<ReadyPlan> make_ready(const std::vector<PlanStep>& plan, const Case& bone
   return ready;
 }
 
+double ReadyStep::asked_mm() const {
+  if (plan.to_mm > 0.0) return plan.to_mm;
+  double deepest_mm = sweep_mm.empty() ? site.thickness_mm : 0.0;
+  for (const Vec3& tip_mm : sweep_mm) deepest_mm = std::max(deepest_mm, depth_mm(*this, tip_mm));
+  return deepest_mm;
+}
+
+Digest plan_digest(const ReadyPlan& plan) {
+  Hasher hasher;
+  for (const ReadyStep& step : plan.steps) {
+    const PlanStep& p = step.plan;
+    for (const auto word : {static_cast<int>(p.action), static_cast<int>(p.hand), int{p.through_guide}, int{p.leave}})
+      hasher.integer(static_cast<std::uint64_t>(word));
+    hasher.text(p.tool);
+    hasher.text(p.law);
+    const Digest tool = step.plan.action == Action::place ? step.item.hash()
+                        : step.takes_tool()               ? plan.tools[static_cast<std::size_t>(step.tool)].tool.hash()
+                                                          : Digest{};
+    hasher.bytes(std::as_bytes(std::span(tool.bytes)));
+    for (const double value :
+         {step.spindle_rpm, p.push_n, p.hand_stiffness_n_per_mm, p.hand_damping_n_s_per_mm, p.feed_mm_per_s, p.beyond_mm, p.to_mm,
+          p.window_u_mm, p.window_v_mm, p.depth_mm, p.sweep_mm_per_s, p.wear, p.tremor_mm, p.seconds})
+      hasher.number(value);
+    for (const Vec3& v : {step.site.entry_mm, step.site.axis})
+      for (const double value : v) hasher.number(value);
+  }
+  return hasher.finish();
+}
+
+const char* given_up_words(SurgeonPhase phase) {
+  switch (phase) {
+    case SurgeonPhase::take_up: return "the bone round the tool was not known in time; look at the server's log";
+    case SurgeonPhase::spin_up: return "the spindle did not come up to its speed";
+    case SurgeonPhase::seek: return "the tool did not meet the bone; look whether something is in its way";
+    case SurgeonPhase::push: return "the bone did not give way; press harder (\"push_n\"), or take another tool or a sharper one";
+    case SurgeonPhase::feed:
+      return "the tool did not come as deep as asked; feed it more slowly (\"feed_mm_per_s\"), or take a device that shows more force";
+    case SurgeonPhase::sweep: return "the window was not swept in time";
+    case SurgeonPhase::retract: return "the tool did not come out of the bone";
+    case SurgeonPhase::lift: return "the spindle did not stop";
+    default: return "the hand did not get there in time";
+  }
+}
+
 const char* name(Action action) {
   constexpr const char* kNames[] = {"drill", "burr", "wait", "place", "screw", "free_hand"};
   return kNames[static_cast<int>(action)];
@@ -410,7 +455,7 @@ bool Surgeon::work(const ReadyStep& step, const LoopReport& report, double dt_s)
 }
 
 bool Surgeon::give_up(const ReadyStep& step, const LoopReport& report) noexcept {
-  results_[step_].completed = false;
+  if (!results_[step_].gave_up) results_[step_].gave_up = phase_;
   if (phase_ == SurgeonPhase::lift) return true;
   if (phase_ == SurgeonPhase::retract) {
     enter(SurgeonPhase::lift);
@@ -446,7 +491,7 @@ SurgeonOrder Surgeon::act(const LoopReport& report, double dt_s) noexcept {
       left_.push_back({step_, plan_.guides[static_cast<std::size_t>(step.guide)].pose_bone_guide, 0.0});
     }
     results_[step_].duration_s = in_phase_s_;
-    results_[step_].completed = finished = in_phase_s_ >= step.plan.seconds;
+    finished = in_phase_s_ >= step.plan.seconds;
   } else if (phase_ == SurgeonPhase::take_up) {
     if (in_phase_s_ <= 1.5 * dt_s) {
       // Above the first place that the tool goes to, along the axis of the site.
@@ -457,9 +502,9 @@ SurgeonOrder Surgeon::act(const LoopReport& report, double dt_s) noexcept {
       spindle_rpm_ = 0.0;
       order.take_up = true;
     } else if (!(report.events & kUncovered)) {
-      results_[step_].completed = true;
       enter(SurgeonPhase::approach);
     } else if (in_phase_s_ > most_s(step, phase_)) {
+      results_[step_].gave_up = phase_;
       finished = true;
     }
   } else {
@@ -473,6 +518,7 @@ SurgeonOrder Surgeon::act(const LoopReport& report, double dt_s) noexcept {
   if (step.plan.tremor_mm > 0.0 && step.takes_tool()) tremble(step, order);
   order.spindle_rpm = spindle_rpm_;
   if (finished) {
+    results_[step_].completed = !results_[step_].gave_up;
     ++step_;
     enter(SurgeonPhase::take_up);
   }

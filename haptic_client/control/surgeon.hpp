@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "common/core/digest.hpp"
 #include "common/mechanics/hand.hpp"
 #include "haptic_client/control/haptic_loop.hpp"
 #include "haptic_client/control/site.hpp"
@@ -58,6 +59,9 @@ struct ReadyStep {
   double sweep_length_mm = 0;         // from the first to the last of them
   [[nodiscard]] bool takes_tool() const { return plan.action != Action::wait && plan.action != Action::place; }
   [[nodiscard]] bool feeds() const { return plan.action == Action::drill || plan.action == Action::screw; }
+  // How deep the tip is to come below the entry, mm: through the bone, to_mm, or the lowest place of a sweep. What a device
+  // and a hand of limited stiffness reach falls short of it.
+  [[nodiscard]] double asked_mm() const;
 };
 
 struct ReadyPlan {
@@ -68,10 +72,14 @@ struct ReadyPlan {
 using ToolFinder = std::function<Result<Tool>(std::string_view name)>;
 // Error invalid_input or not_found: names the step, the field and the remedy.
 [[nodiscard]] Result<ReadyPlan> make_ready(const std::vector<PlanStep>& plan, const Case& bone, const ToolFinder& find = find_tool);
+// Of everything that a plan says and that was found for it, tools included: another plan has another.
+[[nodiscard]] Digest plan_digest(const ReadyPlan& plan);
 
 // free_hand: of no plan, a person's own.
 enum class SurgeonPhase : std::uint8_t { take_up, approach, spin_up, seek, push, feed, react, sweep, retract, lift, wait, done, free_hand };
 [[nodiscard]] const char* name(SurgeonPhase phase);
+// What was waited for in vain where a phase's time ran out, and what may help: the end of a sentence.
+[[nodiscard]] const char* given_up_words(SurgeonPhase phase);
 
 // What the hand is to do in the next tick; bone frame.
 struct SurgeonOrder {
@@ -98,7 +106,8 @@ struct LeftItem {
 };
 
 struct StepResult {
-  bool completed = false;      // false: the time ran out
+  bool completed = false;      // it came to its end by itself; false while it is under way
+  std::optional<SurgeonPhase> gave_up;  // the phase whose time ran out
   bool broke_through = false;
   double duration_s = 0;
   double peak_force_n = 0;

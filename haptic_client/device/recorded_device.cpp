@@ -56,7 +56,33 @@ class Reader {
     return value;
   }
 
-  [[nodiscard]] bool has(const char* name) const { return H5Aexists_by_name(file_.id(), ".", name, H5P_DEFAULT) > 0; }
+  [[nodiscard]] bool has(const char* name, const char* group = ".") const {
+    return H5Aexists_by_name(file_.id(), group, name, H5P_DEFAULT) > 0;
+  }
+
+  // A list of texts of one length.
+  std::vector<std::string> texts(const char* path) {
+    const Hdf5Handle dataset = find_dataset(path);
+    if (!dataset.ok()) return {};
+    const Hdf5Handle space(H5Dget_space(dataset.id()), H5Sclose), type(H5Dget_type(dataset.id()), H5Tclose);
+    const hssize_t count = H5Sget_simple_extent_npoints(space.id());
+    const std::size_t size = H5Tget_size(type.id());
+    constexpr hssize_t kMostTexts = 10'000;
+    if (H5Tget_class(type.id()) != H5T_STRING || H5Tis_variable_str(type.id()) != 0 || count < 0 || count > kMostTexts ||
+        size == 0 || size > 4096) {
+      wrong(ErrorCode::invalid_input, name_ + ": the dataset \"" + path + "\" is not a list of texts");
+      return {};
+    }
+    std::string all(static_cast<std::size_t>(count) * size, '\0');
+    if (count > 0 && H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, all.data()) < 0) {
+      damaged(path);
+      return {};
+    }
+    std::vector<std::string> texts;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i)
+      texts.emplace_back(std::string(all.substr(i * size, size).c_str()));
+    return texts;
+  }
 
   // The rows that are complete: as many as have their time.
   std::size_t rows() {
@@ -201,6 +227,9 @@ Result<RecordedSession> read_recording(const std::filesystem::path& file) {
   session.device = reader.text(g, recording::kDevice);
   session.device_model = reader.text(g, recording::kModel);
   session.case_hash = reader.text(g, recording::kCaseHash);
+  session.case_title = reader.text(g, recording::kCaseTitle);
+  if (reader.has(recording::kPlanDigest, g)) session.plan_digest = reader.text(g, recording::kPlanDigest);
+  session.tools = reader.texts(recording::kTools);
   session.force_scale = reader.number(g, recording::kForceScale);
   session.limits = limits_of(reader);
   session.info.model = "a recording of " + (session.device_model.empty() ? session.device : session.device_model);
@@ -217,6 +246,27 @@ Result<RecordedSession> read_recording(const std::filesystem::path& file) {
   H5Tset_cset(type.id(), H5T_CSET_UTF8);
   if (hash.ok() && H5Dread(hash.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, digits) >= 0) session.field_hash = digits;
   return session;
+}
+
+Result<void> check_played(const RecordedSession& recorded, std::string_view name, std::string_view case_hash,
+                          const std::vector<std::string>& tools, std::string_view plan_digest) {
+  const std::string is_of = std::string(name) + " is of ";
+  if (recorded.case_hash != case_hash)
+    return failure(ErrorCode::invalid_input, is_of + "another bone, \"" + recorded.case_title + "\" (case " +
+                                                 recorded.case_hash.substr(0, 12) + "); join a room on that case");
+  const auto list = [](const std::vector<std::string>& names) {
+    std::string text;
+    for (const std::string& one : names) text += (text.empty() ? "" : ", ") + one;
+    return text.empty() ? std::string("no tool") : text;
+  };
+  if (recorded.tools != tools)
+    return failure(ErrorCode::invalid_input, is_of + "a session with " + list(recorded.tools) + ", not with " + list(tools) +
+                                                 "; give the --plan or --tool that it was made with");
+  if (!recorded.plan_digest.empty() && recorded.plan_digest != plan_digest)
+    return failure(ErrorCode::invalid_input,
+                   is_of + "another plan or another start of the tool; give the --plan, or --tool, --view, --at, --rpm, --law "
+                           "and --wear, that it was made with");
+  return {};
 }
 
 RecordedDevice::RecordedDevice(std::string name, RecordedSession session)

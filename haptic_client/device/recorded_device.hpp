@@ -1,5 +1,6 @@
 // A device that does again what another did: plays the handle's poses and buttons of a recording, a row for each tick.
-// Force goes nowhere. On the same bone with the same plan it makes the same cuts, bit for bit where time is virtual.
+// Force goes nowhere. On the same bone with the same plan it makes the same cuts, bit for bit where time is virtual; what
+// differs in either is refused by check_played().
 #pragma once
 #include <filesystem>
 #include <memory>
@@ -13,13 +14,20 @@ namespace osteon::haptic {
 // What a recording says of the session that it is of.
 struct RecordedSession {
   std::string device, device_model;
-  std::string case_hash;   // of the bone, in hexadecimal digits
+  std::string case_hash, case_title;  // of the bone; the hash in hexadecimal digits
+  std::string plan_digest;            // of what was done with which tools, likewise; empty: the recording does not say
+  std::vector<std::string> tools;     // names, by their place in the session
   std::string field_hash;  // of the bone as it was left; empty: the recording has no end
   double force_scale = 0;  // s
   DeviceLimits limits;
   DeviceInfo info;
   std::vector<DeviceReading> readings;  // one for each tick from the first row on; a lost row shows the one before
 };
+
+// Whether a recording can be played in a session: only the same bone, tools and plan make sense of its handle. `name`: of
+// the recording, for the sentence. Errors: invalid_input, which says what differs and what to give.
+[[nodiscard]] Result<void> check_played(const RecordedSession& recorded, std::string_view name, std::string_view case_hash,
+                                        const std::vector<std::string>& tools, std::string_view plan_digest);
 
 // Reads a recording, also one that goes on or whose writer was killed: as far as it is complete. Errors: not_found (no
 // such file), invalid_input (no HDF5 file, no recording, a dataset missing or of the wrong kind, no row, a number that

@@ -29,6 +29,8 @@ inline constexpr const char* kMetadata = "metadata";
 inline constexpr const char* kDevice = "device";
 inline constexpr const char* kModel = "device_model";
 inline constexpr const char* kCaseHash = "case_hash";
+inline constexpr const char* kCaseTitle = "case_title";
+inline constexpr const char* kPlanDigest = "plan_digest";  // recordings of before it was written have none
 inline constexpr const char* kForceScale = "force_scale";
 inline constexpr const char* kPeak = "device_peak_n";
 inline constexpr const char* kContinuous = "device_continuous_n";
@@ -42,6 +44,8 @@ inline constexpr const char* kMiddleY = "device_workspace_middle_y_mm";
 inline constexpr const char* kMiddleZ = "device_workspace_middle_z_mm";
 inline constexpr const char* kForceAxes = "device_force_axes";
 inline constexpr const char* kTorqueAxes = "device_torque_axes";
+// Names of the tools that the session had, by their place in it.
+inline constexpr const char* kTools = "metadata/tools";
 // Set at the end.
 inline constexpr const char* kFieldHash = "metadata/field_hash";
 

@@ -117,6 +117,37 @@ Result<Case> fetch_case(const wire::JoinedRoom& room, const fs::path& cache, con
   return fetched;
 }
 
+Result<void> fetch_tools(const wire::JoinedRoom& room, ToolBox& tools) {
+  constexpr auto kPatience = 10s;
+  const auto stub = v1::RoomService::NewStub(room.channel);
+  const auto lost = [](const grpc::Status& status) {
+    return failure(ErrorCode::unavailable, "the server does not say which tools it has: " + status.error_message() +
+                                               "; see whether osteon-server still runs");
+  };
+  v1::ListToolsRequest list;
+  v1::ListToolsResponse listed;
+  list.set_author(room.author.value);
+  grpc::ClientContext listing;
+  listing.set_deadline(std::chrono::system_clock::now() + kPatience);
+  if (const grpc::Status status = stub->ListTools(&listing, list, &listed); !status.ok()) return lost(status);
+  for (const v1::KnownTool& known : listed.tools()) {
+    const Result<Digest> hash = wire::digest_from_wire(known.tool_hash());
+    if (!hash) return tl::unexpected(hash.error());
+    if (tools.find(*hash)) continue;
+    v1::GetToolRequest request;
+    v1::GetToolResponse answer;
+    request.set_author(room.author.value);
+    request.set_tool_hash(known.tool_hash());
+    grpc::ClientContext getting;
+    getting.set_deadline(std::chrono::system_clock::now() + kPatience);
+    if (const grpc::Status status = stub->GetTool(&getting, request, &answer); !status.ok()) return lost(status);
+    const Result<Tool> tool = wire::from_wire(answer.tool());
+    if (!tool) return tl::unexpected(tool.error());
+    tools.add(*tool);
+  }
+  return {};
+}
+
 }  // namespace
 
 fs::path default_case_cache() {
@@ -263,7 +294,8 @@ void RoomSession::Impl::read() {
   events.lost(broken ? *broken
                      : Error{ErrorCode::unavailable, "the server ended the session: " +
                                                          (status.error_message().empty() ? std::string("it closed the connection")
-                                                                                         : status.error_message())});
+                                                                                         : status.error_message()) +
+                                                         "; see whether osteon-server still runs, then join again"});
 }
 
 RoomSession::RoomSession(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -283,7 +315,9 @@ Result<RoomSession> RoomSession::join(const RoomSessionOptions& options, const s
   if (!room) return tl::unexpected(room.error());
   Result<Case> bone = fetch_case(*room, options.cache, stop);
   if (!bone) return tl::unexpected(bone.error());
-  return RoomSession(std::make_unique<Impl>(std::move(*room), std::move(*bone)));
+  auto impl = std::make_unique<Impl>(std::move(*room), std::move(*bone));
+  if (Result<void> fetched = fetch_tools(impl->room, *impl->tools); !fetched) return tl::unexpected(fetched.error());
+  return RoomSession(std::move(impl));
 }
 
 const wire::JoinedRoom& RoomSession::room() const { return impl_->room; }

@@ -65,8 +65,8 @@ class RoomSession {
   // Cuts that may wait for the network before send() refuses more.
   static constexpr std::size_t kMaxWaitingCuts = 1024;
 
-  // Joins and fetches the case unless the cache has it. Errors: those of wire::join_room; what Case::load says of a
-  // fetched case; internal (the cache cannot be written).
+  // Joins, fetches the case unless the cache has it, and the tools that the room knows and this program does not. Errors:
+  // those of wire::join_room; what Case::load says of a fetched case; internal (the cache cannot be written).
   [[nodiscard]] static Result<RoomSession> join(const RoomSessionOptions& options, const std::function<bool()>& stop);
   ~RoomSession();  // closes
   RoomSession(RoomSession&&) noexcept;

@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "common/geometry/mesh_file.hpp"
+#include "common/mechanics/force_law.hpp"
 #include "common/runtime/files.hpp"
 #include "common/tools/tool_surface.hpp"
 #include "common/volume/cell_collision.hpp"
@@ -257,6 +258,7 @@ Result<std::string> run_tools(const Arguments& a) {
   if (!a.file.empty()) {
     auto own = load_tool_file(a.file);  // with the STL that it may name
     if (!own) return tl::unexpected(own.error());
+    if (const auto law = choose_law(*own); !law) return failure(law.error().code, a.file + ": \"law\": " + law.error().message);
     tools = {std::move(*own)};
   }
   if (!a.tool.empty()) {

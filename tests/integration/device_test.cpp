@@ -156,6 +156,16 @@ TEST_F(PhantomInRoom, WaitsForItsUserWhereItMustBeCalibrated) {
   EXPECT_EQ(arm_->unsafe_forces, 0u);
 }
 
+// Only the room knows which tools it has.
+TEST_F(PhantomInRoom, AToolThatTheRoomHasNotIsNamed) {
+  const Stage stage(16.0);
+  Process haptic = stage.start("osteon-haptic", {"--server", stage.address(), "--device", "phantom", "--libhd", OSTEON_STAND_IN_HD,
+                                                 "--tool", "drill-99", "--cache", stage / "cache"});
+  ASSERT_EQ(haptic.wait(kPatience), 1) << haptic.err();
+  EXPECT_THAT(haptic.err(), testing::HasSubstr("the room has no tool \"drill-99\"; choose one of"));
+  EXPECT_EQ(arm_->is_open, 0);
+}
+
 // The recording of a hand moves the tool again, with the force scale it was made with, and the session ends with it.
 TEST_F(PhantomInRoom, AHandsRecordingIsPlayedWithItsForceScale) {
   const Stage stage(16.0);
@@ -189,7 +199,8 @@ TEST_F(PhantomInRoom, WhatIsWrongIsSaidBeforeAServerIsLookedFor) {
   using testing::HasSubstr;
   EXPECT_THAT(said({}), HasSubstr("needs a --plan"));
   EXPECT_THAT(said({"--device", "phantom"}), HasSubstr("--tool is missing"));
-  EXPECT_THAT(said({"--device", "phantom", "--tool", "drill-99"}), HasSubstr("drill-99"));
+  EXPECT_THAT(said({"--device", "phantom", "--tool", "guide-1"}), HasSubstr("guide-1\" takes no bone"));
+  EXPECT_THAT(said({"--device", "phantom", "--tool", "drill-3.2", "--law", "hooke"}), HasSubstr("--law"));
   EXPECT_THAT(said({"--device", "phantom", "--tool", "drill-3.2", "--view", "above"}), HasSubstr("--view must be"));
   EXPECT_THAT(said({"--device", "phantom", "--tool", "drill-3.2", "--at", "here"}), HasSubstr("--at"));
   EXPECT_THAT(said({"--device", "phantom+phantom", "--tool", "drill-3.2"}), HasSubstr("cannot be added"));

@@ -124,7 +124,114 @@ TEST(Trouble, AHapticClientNamesWhatIsWrongWithItsPlan) {
   expect_one_sentence(run(program("osteon-haptic"), {"--server", deserted_address(), "--plan", temp / "missing.json"}), "osteon-haptic", {"missing.json"});
   expect_one_sentence(with_plan("{"), "osteon-haptic", {"plan.json"});
   expect_one_sentence(with_plan(R"({"steps":[{"action":"saw"}]})"), "osteon-haptic", {"plan.json", "action"});
-  expect_one_sentence(with_plan(R"({"steps":[{"action":"drill","tool":"drill-99","entry":{"toward":[0,0,1]}}]})"), "osteon-haptic", {"drill-99"});
+  const auto drill = [&](const std::string& more, const std::string& entry = R"({"toward":[0,0,1]})") {
+    return with_plan(R"({"steps":[{"action":"drill",)" + more + R"("entry":)" + entry + "}]}");
+  };
+  expect_one_sentence(drill(R"("law":"hooke",)"), "osteon-haptic", {"law", "hooke", "choose one of"});
+  expect_one_sentence(drill(R"("tool":"my-drill","law":"hooke",)"), "osteon-haptic", {"law", "hooke", "osteon-haptic laws"});
+  // No number that fills the line.
+  const RunResult far = drill("", R"({"toward":[1e300,0,1]})");
+  expect_one_sentence(far, "osteon-haptic", {"toward", "from -100000 to 100000"});
+  EXPECT_LT(far.err.size(), 300u);
+  expect_one_sentence(run(program("osteon-haptic"), {"--server", deserted_address(), "--plan", temp / "missing.json"}), "osteon-haptic", {"--plan: "});
+}
+
+TEST(Trouble, AnAddressThatIsNoneIsSaidWithOneThatIs) {
+  const TempDir temp;
+  write_plan(temp / "plan.json");
+  expect_one_sentence(run(program("osteon-haptic"), {"--server", "nonsense", "--plan", temp / "plan.json"}), "osteon-haptic",
+                      {"nonsense is not HOST:PORT", "osteon-server prints"});
+}
+
+// Nothing that was asked for is left out without a word.
+TEST(Trouble, WhatAPlanSaysItselfIsRefusedBesideIt) {
+  const TempDir temp;
+  write_plan(temp / "plan.json");
+  const auto beside = [&](const std::string& option, const std::string& value) {
+    return run(program("osteon-haptic"), {"--server", deserted_address(), "--patience", "0", "--plan", temp / "plan.json", option, value});
+  };
+  for (const auto& [option, value] : {std::pair<std::string, std::string>{"--wear", "1"}, {"--view", "front"}, {"--at", "0,0,0"}, {"--rpm", "0"}, {"--law", "chi"}})
+    expect_one_sentence(beside(option, value), "osteon-haptic", {option + " is for a hand without a plan"});
+  for (const char* scale : {"0", "nan", "-0.5", "1.01", "inf"})
+    expect_one_sentence(beside("--scale", scale), "osteon-haptic", {"--scale must be a number above 0"});
+  for (const std::string output : {"--summary", "--cut-log", "--session-log", "--record"})
+    for (const std::string place : {"/nowhere/at/all", "/proc/y.h5"})
+      expect_one_sentence(beside(output, place), "osteon-haptic", {place, "give " + output + " a file in a folder"});
+  std::ofstream(temp / "mine.h5") << "hours of work";
+  expect_one_sentence(beside("--record", temp / "mine.h5"), "osteon-haptic", {"mine.h5 already", "--record"});
+  EXPECT_EQ(std::filesystem::file_size(temp / "mine.h5"), 13u);
+}
+
+// A tool of the server's own, with a law of its own, in the hand of a plan.
+TEST(Trouble, AToolOfTheRoomsOwnIsTakenIntoTheHandAndAnUnknownOneNamed) {
+  const TempDir tools;
+  std::ofstream(tools / "my-drill.yaml") << "name: my-drill\ntitle: My drill\nkind: drill\ndiameter_mm: 4\ncutting_length_mm: 40\n"
+                                            "point_angle_deg: 118\nshank_diameter_mm: 4\nshank_length_mm: 40\nspindle_rpm: 1000\n"
+                                            "teeth: 2\nfeed_mm_per_rev: 0.05\ncut_level: 2\nlaw: allotta\n";
+  Stage stage(16.0, {"--tools", tools.path()});
+  nlohmann::json step = drill_at(0, 0, "rig");
+  step["tool"] = "my-drill";
+  step["feed_mm_per_s"] = 4.0;
+  step["to_mm"] = 5.0;
+  const auto plan = stage / "own.json";
+  std::ofstream(plan) << nlohmann::json{{"steps", nlohmann::json::array({step})}}.dump();
+  Process own = stage.start("osteon-haptic", {"--server", stage.address(), "--plan", plan, "--cache", stage / "cache", "--summary",
+                                              stage / "own-summary.json", "--record", stage / "own.h5"});
+  ASSERT_EQ(own.wait(60s), 0) << own.err();
+  const auto summary = read_json(stage / "own-summary.json");
+  EXPECT_EQ(summary["steps"][0]["tool"], "my-drill");
+  EXPECT_EQ(summary["steps"][0]["completed"], true);
+  // A cylinder of 4 mm to within its point, 1.2 mm high.
+  const double cylinder_mm3 = 3.14159 * 4.0 * (summary["steps"][0]["deepest_mm"].get<double>() - 2.0 / 3.0 * 1.2);
+  EXPECT_NEAR(summary["removed_mm3"].get<double>(), cylinder_mm3, 0.1 * cylinder_mm3);
+  EXPECT_EQ(summary["steps"][0]["law"], "allotta");  // its file says so
+
+  const auto refused = [&](const nlohmann::json& wrong) {
+    std::ofstream(plan) << nlohmann::json{{"steps", nlohmann::json::array({wrong})}}.dump();
+    return run(program("osteon-haptic"), {"--server", stage.address(), "--plan", plan, "--cache", stage / "cache"});
+  };
+  step["tool"] = "drill-99";
+  expect_one_sentence(refused(step), "osteon-haptic", {"own.json", "step 1", "drill-99", "my-drill"});
+  step["tool"] = "my-drill";
+  step["law"] = "saw";
+  expect_one_sentence(refused(step), "osteon-haptic", {"own.json", "step 1", "my-drill", "not for a drill"});
+
+  // The recording of one tool or place is not played with another.
+  const std::string recorded = "recorded:" + (stage / "own.h5").string();
+  step.erase("law");
+  const auto played = [&](const nlohmann::json& with) {
+    std::ofstream(plan) << nlohmann::json{{"steps", nlohmann::json::array({with})}}.dump();
+    return run(program("osteon-haptic"), {"--server", stage.address(), "--plan", plan, "--cache", stage / "cache", "--device", recorded});
+  };
+  step["tool"] = "drill-3.2";
+  expect_one_sentence(played(step), "osteon-haptic", {"my-drill, not with drill-3.2"});
+  step["tool"] = "my-drill";
+  step["to_mm"] = 6.0;
+  expect_one_sentence(played(step), "osteon-haptic", {"another plan"});
+  step["to_mm"] = 5.0;
+  ASSERT_EQ(run(program("osteon-import"), {"phantom", "block", "--layers", "10:1.9", "--width", "16", "--pitch", "0.5", "--title", "Other", "--out", stage / "other"}).exit_code, 0);
+  Process other = stage.start("osteon-server", {"--case", stage / "other", "--tools", tools.path(), "--address-file", stage / "other-address"});
+  const auto address = wait_for_address(stage / "other-address", 60s);
+  ASSERT_TRUE(address) << other.err();
+  std::ofstream(plan) << nlohmann::json{{"steps", nlohmann::json::array({step})}}.dump();
+  expect_one_sentence(run(program("osteon-haptic"), {"--server", *address, "--plan", plan, "--cache", stage / "cache", "--device", recorded}),
+                      "osteon-haptic", {"another bone"});
+}
+
+// A step that gives up ends the session with what was done, a sentence and no success.
+TEST(Trouble, AStepThatDoesNotFinishIsSaid) {
+  Stage stage(16.0);
+  nlohmann::json step = drill_at(0, 0, "expert");
+  step["push_n"] = 1.0;   // through dense bone in hours
+  step["wear"] = 5.0;
+  Process haptic = stage.start_haptic("soft", {{"steps", nlohmann::json::array({step})}});
+  const auto code = haptic.wait(120s);
+  ASSERT_TRUE(code);
+  expect_one_sentence({*code, false, haptic.out(), haptic.err()}, "osteon-haptic", {"step 1 (drill) did not finish", "push_n"});
+  const auto summary = read_json(stage / "soft.json");
+  EXPECT_EQ(summary["steps"][0]["completed"], false);
+  EXPECT_EQ(summary["steps"][0]["gave_up_in"], "push");
+  EXPECT_NE(haptic.out().find("0 of 1 steps done"), std::string::npos) << haptic.out();
 }
 
 TEST(Trouble, ADeviceThatIsNotThereIsNamed) {
@@ -145,12 +252,20 @@ void expect_all_notice(int signal) {
   Process haptic = stage.start_haptic("work", {{"steps", nlohmann::json::array({drill_at(0, 0, "rig")})}});
   std::this_thread::sleep_for(3s);
   ASSERT_TRUE(haptic.running()) << haptic.err();
+  ASSERT_GT(std::filesystem::file_size(stage / "work.csv"), 1000u);
   stage.server().signal(signal);
   for (auto& [name, process] : {std::pair<std::string, Process*>{"osteon-haptic", &haptic}, {"osteon-audio", &audio}, {"osteon-viewer", &viewer.process()}}) {
     const auto code = process->wait(30s);
     ASSERT_TRUE(code) << name << " did not notice";
     expect_one_sentence({*code, false, process->out(), process->err()}, name, {});
   }
+  // What was done until then is told all the same.
+  const auto summary = read_json(stage / "work.json");
+  ASSERT_TRUE(summary.is_object());
+  EXPECT_TRUE(summary["lost"].is_string()) << summary["lost"];
+  EXPECT_EQ(summary["steps"][0]["completed"], false);
+  EXPECT_GT(summary["loop"]["ticks"].get<int>(), 1000);
+  EXPECT_TRUE(std::filesystem::exists(stage / "work-cuts.csv"));
 }
 
 TEST(Trouble, AKilledServerIsNoticedByAllItsClients) { expect_all_notice(SIGKILL); }
@@ -176,7 +291,11 @@ TEST(Trouble, AHapticClientStopsCleanlyInTheMiddleOfWork) {
   EXPECT_EQ(haptic.terminate(), 0);
   // What it had cut is in the bone, and its own record agrees with the server's.
   EXPECT_EQ(stage.server().terminate(), 0);
-  EXPECT_EQ(read_json(stage / "work.json")["field_hash"], read_json(stage / "server.json")["field_hash"]);
+  const auto work = read_json(stage / "work.json");
+  EXPECT_EQ(work["field_hash"], read_json(stage / "server.json")["field_hash"]);
+  EXPECT_EQ(work["stopped"], true);
+  EXPECT_EQ(work["lost"], nullptr);
+  EXPECT_EQ(work["steps"][0]["completed"], false);  // in the middle of the hole
 }
 
 }  // namespace

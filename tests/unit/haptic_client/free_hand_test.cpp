@@ -215,7 +215,7 @@ TEST(FreeHandView, IsNamedOrGiven) {
   EXPECT_EQ(*read_view("top"), Vec3(0, 0, -1));
   EXPECT_EQ(*read_view("0,0,-2"), Vec3(0, 0, -1));
   EXPECT_EQ(*read_point("1.5,-2,3e1", "--at"), Vec3(1.5, -2, 30));
-  for (const char* wrong : {"", "above", "1,2", "1,2,3,4", "0,0,0", "1,,2", "1,2,x", "nan,0,1"})
+  for (const char* wrong : {"", "above", "1,2", "1,2,3,4", "0,0,0", "1,,2", "1,2,x", "nan,0,1", "1e300,0,1"})
     EXPECT_FALSE(read_view(wrong)) << wrong;
   EXPECT_NE(read_point("1;2;3", "--at").error().message.find("--at"), std::string::npos);
 }
@@ -244,6 +244,20 @@ TEST(FreeHandTool, IsNamedWhereItIsNotKnown) {
   const auto plan = make_free_hand(options, block_case());
   ASSERT_FALSE(plan);
   EXPECT_NE(plan.error().message.find("drill-99"), std::string::npos);
+}
+
+// What takes no bone is for the scene, not for the hand.
+TEST(FreeHandTool, TakesBone) {
+  for (const Tool& tool : builtin_tools()) {
+    FreeHandOptions options;
+    options.tool = tool.name;
+    const auto plan = make_free_hand(options, block_case());
+    const bool scene = tool.name.starts_with("guide-") || tool.name.starts_with("trial-");
+    EXPECT_EQ(plan.has_value(), !scene) << tool.name;
+    if (scene && !plan) {
+      EXPECT_NE(plan.error().message.find(tool.name + "\" takes no bone"), std::string::npos);
+    }
+  }
 }
 
 }  // namespace

@@ -34,6 +34,7 @@ RecordingInfo info_of_a_session() {
   info.loop.force_scale = 0.0466;
   info.case_hash = std::string(64, 'c');
   info.case_title = "block";
+  info.plan_digest = std::string(64, 'p');
   info.pitch_mm = 0.5;
   info.author = 7;
   info.tools = {{"drill-3.2", "chi", 3.2}, {"burr-round-5", "milling", 5.0}};
@@ -126,6 +127,45 @@ TEST(Recording, GivesTheDeviceBackBitForBit) {
   EXPECT_EQ(recorded.limits().damping_n_s_per_mm, info.limits.damping_n_s_per_mm);
   EXPECT_EQ(recorded.limits().workspace_middle_mm, info.limits.workspace_middle_mm);
   EXPECT_EQ(recorded.name(), "recorded:" + (temp / "a.h5").string());
+}
+
+// Its handle makes sense only with the bone, the tools and the plan that it was recorded with.
+TEST(Recording, IsOfOneBoneToolAndPlan) {
+  const TempDir temp;
+  write_rows(temp / "a.h5", 3);
+  const auto session = read_recording(temp / "a.h5");
+  ASSERT_TRUE(session) << session.error().message;
+  const RecordingInfo info = info_of_a_session();
+  const std::vector<std::string> tools{"drill-3.2", "burr-round-5"};
+  EXPECT_EQ(session->tools, tools);
+  EXPECT_EQ(session->plan_digest, info.plan_digest);
+  EXPECT_TRUE(check_played(*session, "a.h5", info.case_hash, tools, info.plan_digest));
+  const auto said = [&](const std::string& hash, const std::vector<std::string>& names, const std::string& plan) {
+    const Result<void> played = check_played(*session, "a.h5", hash, names, plan);
+    EXPECT_FALSE(played);
+    return played ? std::string() : played.error().message;
+  };
+  using testing::HasSubstr;
+  EXPECT_THAT(said(std::string(64, 'd'), tools, info.plan_digest), HasSubstr("a.h5 is of another bone, \"block\""));
+  EXPECT_THAT(said(info.case_hash, {"drill-3.2"}, info.plan_digest), HasSubstr("drill-3.2, burr-round-5, not with drill-3.2"));
+  EXPECT_THAT(said(info.case_hash, {"burr-round-5", "drill-3.2"}, info.plan_digest), HasSubstr("--plan or --tool"));
+  EXPECT_THAT(said(info.case_hash, tools, std::string(64, 'q')), HasSubstr("another plan"));
+}
+
+// Only a session that ended as it should says so; the numbers of one that lost its room are there all the same.
+TEST(Recording, SaysWhetherItsRoomWasLost) {
+  const TempDir temp;
+  for (const bool lost : {false, true}) {
+    const auto file = temp / (lost ? "lost.h5" : "whole.h5");
+    Result<RecordFile> recording = RecordFile::create(file, info_of_a_session());
+    ASSERT_TRUE(recording);
+    const TickRow one = row(0);
+    ASSERT_TRUE(recording->append({&one, 1}));
+    ASSERT_TRUE(recording->finish({std::string(64, 'f'), 321, 0, lost}));
+    const auto read = python("import sys, h5py; f = h5py.File(sys.argv[1], 'r'); "
+                             "print(f['metadata/finished'][()], f['metadata/room_seq'][()])", file);
+    EXPECT_EQ(read.out, lost ? "0 321\n" : "1 321\n") << read.err;
+  }
 }
 
 // A row that was lost is a tick that saw what the one before it saw: later rows keep their time.

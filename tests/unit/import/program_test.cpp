@@ -114,6 +114,21 @@ TEST_F(Program, WrongUsageIsOneSentence) {
   expect_refused({"phantom", "block", "--layers", "5:1", "--pitch", "7", "--out", path("case")}, "--pitch", folder_);
 }
 
+// Who holds it would find out too late.
+TEST_F(Program, AToolWithALawThatDoesNotFitIsRefused) {
+  const auto write = [&](const std::string& law) {
+    std::ofstream(folder_ / "my-drill.yaml") << "name: my-drill\ntitle: My drill\nkind: drill\ndiameter_mm: 4\ncutting_length_mm: 40\n"
+                                                "point_angle_deg: 118\nshank_diameter_mm: 4\nshank_length_mm: 40\nspindle_rpm: 1000\n"
+                                                "teeth: 2\nfeed_mm_per_rev: 0.05\ncut_level: 2\nlaw: " << law << "\n";
+  };
+  write("allotta");
+  EXPECT_EQ(test::run(kProgram, {"tools", "--file", path("my-drill.yaml")}).exit_code, 0);
+  write("hooke");
+  expect_refused({"tools", "--file", path("my-drill.yaml")}, "there is no force law \"hooke\"", folder_);
+  write("saw");
+  expect_refused({"tools", "--file", path("my-drill.yaml")}, "is not for a drill", folder_);
+}
+
 TEST_F(Program, NothingIsOverwritten) {
   fs::create_directory(folder_ / "mine");
   std::ofstream(folder_ / "mine" / "letter.txt") << "keep me\n";

@@ -144,6 +144,23 @@ TEST(Files, AreWrittenWholeAndReadBack) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp.path()), {}), 2) << "a partial file was left";
 }
 
+// Asked before hours of work: the answer is that of the writing itself, and nothing is left behind.
+TEST(Files, SayBeforehandWhetherTheyCanBeWritten) {
+  const osteon::test::TempDir temp;
+  EXPECT_TRUE(check_writable({}, "the log", "--log"));
+  EXPECT_TRUE(check_writable(temp / "new", "the log", "--log"));
+  EXPECT_FALSE(std::filesystem::exists(temp / "new"));
+  ASSERT_TRUE(write_file(temp / "old", "kept"));
+  EXPECT_TRUE(check_writable(temp / "old", "the log", "--log"));
+  EXPECT_EQ(*read_file(temp / "old"), "kept");
+  // Root may write into /proc, and still no file can be made there.
+  for (const std::filesystem::path& wrong : {temp / "no-folder" / "a", temp.path(), std::filesystem::path("/proc/a.log")}) {
+    const Result<void> answer = check_writable(wrong, "the log", "--log");
+    ASSERT_FALSE(answer) << wrong;
+    EXPECT_NE(answer.error().message.find("give --log a file in a folder"), std::string::npos) << answer.error().message;
+  }
+}
+
 TEST(Log, LinesHaveKeysAndQuotesWhereNeeded) {
   log::open("runtime-test");
   testing::internal::CaptureStderr();

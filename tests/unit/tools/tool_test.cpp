@@ -2,12 +2,30 @@
 
 #include <gtest/gtest.h>
 
+#include "common/tools/tool_box.hpp"
+
 #include <algorithm>
 #include <functional>
 #include <set>
 
 namespace osteon {
 namespace {
+
+// A box finds what comes with Osteon and what was added; two of a name it does not choose from.
+TEST(ToolBox, FindsToolsByName) {
+  const auto box = builtin_tool_box();
+  EXPECT_EQ(box->find("drill-3.2")->hash(), find_tool("drill-3.2")->hash());
+  Tool own = *find_tool("drill-3.2");
+  own.name = "my-drill";
+  own.diameter_mm = 4.0;
+  EXPECT_EQ(box->find("my-drill").error().code, ErrorCode::not_found);
+  EXPECT_NE(box->find("my-drill").error().message.find("burr-round-5"), std::string::npos);
+  box->add(own);
+  EXPECT_EQ(box->find("my-drill")->diameter_mm, 4.0);
+  own.diameter_mm = 4.5;
+  box->add(own);
+  EXPECT_EQ(box->find("my-drill").error().code, ErrorCode::invalid_input);
+}
 
 // Table B.1 of the dissertation: its eight groups.
 TEST(Tools, AllOfAppendixBAreThereInTheirGroups) {
