@@ -16,17 +16,4 @@ Newtons allotta_thrust(const AllottaParams& params, double feed_mm_per_rev, Gram
                  std::sin(0.5 * params.point_angle_rad)};
 }
 
-NewtonMillimetres allotta_torque(const AllottaParams& params, double feed_mm_per_rev, GramsPerCm3 density) noexcept {
-  if (!(feed_mm_per_rev > 0.0)) return NewtonMillimetres{0.0};
-  return NewtonMillimetres{allotta_energy_mj_per_mm3(params, density) * feed_mm_per_rev * params.diameter_mm *
-                           params.diameter_mm / 8.0};
-}
-
-MillimetresPerSecond allotta_feed(const AllottaParams& params, RevolutionsPerMinute speed, Newtons thrust,
-                                  GramsPerCm3 density) noexcept {
-  const double newtons_per_mm_of_turn = allotta_thrust(params, 1.0, density).value();
-  if (!(thrust.value() > 0.0) || !(newtons_per_mm_of_turn > 0.0)) return MillimetresPerSecond{0.0};
-  return MillimetresPerSecond{speed.value() / 60.0 * thrust.value() / newtons_per_mm_of_turn};
-}
-
 }  // namespace osteon

@@ -2,6 +2,7 @@
 // and torque M = 5 R_u a D^2/8 with the feed a in mm per REVOLUTION (not per second), the drill's diameter D in mm and
 // the full angle beta of its point. K_s = 5 R_u is the energy of a unit of volume (4.8 to 6 R_u were found), R_u the
 // ultimate stress, 130 (density/1.9)^2 MPa [A]. So the torque's work in a turn is K_s for each mm3: 2 pi M = K_s a pi D^2/4.
+// M = T D / (4 sin(beta/2)), as two lips have it, so drilling_torque() of the thrust is (7.2).
 // Thrust is about 1.85 times Chi's at 1000 rpm, 1 mm/s and 3.2 mm; the speed matters by the feed of a turn alone.
 #pragma once
 #include "common/core/units.hpp"
@@ -19,11 +20,7 @@ struct AllottaParams {
 
 // K_s in N/mm2 = mJ/mm3.
 [[nodiscard]] double allotta_energy_mj_per_mm3(const AllottaParams& params, GramsPerCm3 density) noexcept;
-// (7.1) and (7.2). `feed_mm_per_rev`: a.
+// (7.1). `feed_mm_per_rev`: a.
 [[nodiscard]] Newtons allotta_thrust(const AllottaParams& params, double feed_mm_per_rev, GramsPerCm3 density) noexcept;
-[[nodiscard]] NewtonMillimetres allotta_torque(const AllottaParams& params, double feed_mm_per_rev, GramsPerCm3 density) noexcept;
-// (7.1) solved for the feed: v = (N/60) T / (K_s (D/2) sin(beta/2)), not capped.
-[[nodiscard]] MillimetresPerSecond allotta_feed(const AllottaParams& params, RevolutionsPerMinute speed, Newtons thrust,
-                                                GramsPerCm3 density) noexcept;
 
 }  // namespace osteon

@@ -24,7 +24,7 @@ struct AgusParams {
 [[nodiscard]] Newtons agus_elastic_force(const AgusParams& params, double depth_mm) noexcept;
 [[nodiscard]] double agus_depth_mm(const AgusParams& params, Newtons force) noexcept;
 // (7.5): the friction of a contact whose middle is `axis_distance_mm` from the spindle's axis, along omega x r there.
-// mu F far from the pole; less near it, where the directions in the contact differ; nothing at it.
+// mu F far from the pole; less near it, where the directions in the contact differ; nothing at it. [haptic]
 [[nodiscard]] Newtons agus_friction(const AgusParams& params, Newtons normal, double axis_distance_mm) noexcept;
 // Feed under a force, not capped. `area_mm2` projected on the feed.
 [[nodiscard]] MillimetresPerSecond agus_erosion(const AgusParams& params, RevolutionsPerMinute speed, Newtons force,

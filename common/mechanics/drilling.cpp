@@ -15,22 +15,6 @@ double scale_n(const DrillingParams& p, double rpm, double density_g_cm3) noexce
 
 }  // namespace
 
-Newtons drilling_thrust(const DrillingParams& params, RevolutionsPerMinute speed, MillimetresPerSecond feed,
-                        GramsPerCm3 density) noexcept {
-  if (speed.value() < kMinCuttingRpm || feed.value() <= 0.0 || density.value() <= 0.0) return Newtons{0.0};
-  return Newtons{scale_n(params, speed.value(), density.value()) * std::pow(feed.value(), kChiFeed)};
-}
-
-MillimetresPerSecond drilling_feed(const DrillingParams& params, RevolutionsPerMinute speed, Newtons thrust,
-                                   GramsPerCm3 density) noexcept {
-  if (speed.value() < kMinCuttingRpm || thrust.value() <= 0.0 || density.value() <= 0.0) return MillimetresPerSecond{0.0};
-  return MillimetresPerSecond{std::pow(thrust.value() / scale_n(params, speed.value(), density.value()), 1.0 / kChiFeed)};
-}
-
-MillimetresPerSecond heel_contact_feed(const DrillingParams& params, RevolutionsPerMinute speed) noexcept {
-  return MillimetresPerSecond{0.33 * params.diameter_mm * speed.value() / 60.0};
-}
-
 NewtonMillimetres drilling_torque(const DrillingParams& params, Newtons thrust) noexcept {
   return NewtonMillimetres{thrust.value() * params.diameter_mm / (4.0 * std::sin(0.5 * params.point_angle_rad))};
 }
@@ -41,7 +25,7 @@ FeedLaw drilling_law(const DrillingParams& params, RevolutionsPerMinute speed, G
   const double rho = density.value() > 0.0 ? density.value() : 0.0;
   return {.scale_n = engaged * scale_n(params, speed.value(), rho),
           .exponent = kChiFeed,
-          .max_feed_mm_per_s = heel_contact_feed(params, speed).value(),
+          .max_feed_mm_per_s = params.heel_mm_per_rev * speed.value() / 60.0,
           .threshold_n = params.threshold_n * params.wear * engaged * (params.diameter_mm / kReferenceDiameter_mm) *
                          std::pow(rho / kReferenceDensity, kChiDensity)};
 }

@@ -12,22 +12,15 @@ struct DrillingParams {
   double point_angle_rad = 2.0594885173533;  // 118 degrees
   double wear = 1.0;                         // 1 sharp; a blunt drill needs about twice the thrust
   double threshold_n = 1.0;                  // rubs below this at 1.9 g/cm3, whole point engaged, 3.2 mm [A]
+  double heel_mm_per_rev = 0.33 * 3.2;       // feed at which the drill's heel touches the cut surface: 0.33 D
 };
 
 // Below this the spindle counts as standing: (7.3) has no limit at N = 0.
 inline constexpr double kMinCuttingRpm = 50.0;
 
-// (7.3) forward.
-[[nodiscard]] Newtons drilling_thrust(const DrillingParams& params, RevolutionsPerMinute speed,
-                                      MillimetresPerSecond feed, GramsPerCm3 density) noexcept;
-// (7.3) solved for v: the feed at which the thrust is `thrust`, not capped.
-[[nodiscard]] MillimetresPerSecond drilling_feed(const DrillingParams& params, RevolutionsPerMinute speed,
-                                                 Newtons thrust, GramsPerCm3 density) noexcept;
-// Feed at which the drill's heel touches the cut surface: 0.33 D per revolution.
-[[nodiscard]] MillimetresPerSecond heel_contact_feed(const DrillingParams& params, RevolutionsPerMinute speed) noexcept;
 // Torque that goes with a thrust, both from one cutting force on two lips: M = T D / (4 sin(beta/2)).
 [[nodiscard]] NewtonMillimetres drilling_torque(const DrillingParams& params, Newtons thrust) noexcept;
-// The law of a moment: `engaged` is the share (0 to 1) of the point's projected area in bone of that density.
+// (7.3) at a moment: `engaged` is the share (0 to 1) of the point's projected area in bone of that density.
 [[nodiscard]] FeedLaw drilling_law(const DrillingParams& params, RevolutionsPerMinute speed, GramsPerCm3 density,
                                    double engaged) noexcept;
 

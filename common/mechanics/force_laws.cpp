@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "common/mechanics/allotta.hpp"
 #include "common/mechanics/broaching.hpp"
@@ -35,7 +34,10 @@ double area_mm2(const LawTool& tool, const LawInputs& in) noexcept {
 bool stands(const LawInputs& in) noexcept { return in.spindle_rpm < kMinCuttingRpm; }
 
 DrillingParams drilling_of(const LawTool& tool, const LawInputs& in) noexcept {
-  return {.diameter_mm = tool.diameter_mm, .point_angle_rad = tool.point_angle_rad, .wear = in.wear};
+  return {.diameter_mm = tool.diameter_mm,
+          .point_angle_rad = tool.point_angle_rad,
+          .wear = in.wear,
+          .heel_mm_per_rev = tool.heel_mm_per_rev};
 }
 // The laws of which no torque is known: two lips whose cutting force makes the thrust, M = T D / (4 sin(beta/2)) [A].
 double lips_torque(const LawTool& tool, const LawInputs& in, double thrust_n) noexcept {
@@ -46,9 +48,7 @@ double rubbing_below_n(const LawTool& tool, const LawInputs& in) noexcept {
 }
 
 FeedLaw chi(const LawTool& tool, const LawInputs& in) noexcept {
-  FeedLaw law = drilling_law(drilling_of(tool, in), speed_of(in), density_of(in), in.engaged);
-  if (law.max_feed_mm_per_s > 0.0) law.max_feed_mm_per_s = heel_feed(tool, in);
-  return law;
+  return drilling_law(drilling_of(tool, in), speed_of(in), density_of(in), in.engaged);
 }
 
 FeedLaw allotta(const LawTool& tool, const LawInputs& in) noexcept {
@@ -75,37 +75,28 @@ FeedLaw agus(const LawTool& tool, const LawInputs& in) noexcept {
           .max_feed_mm_per_s = heel_feed(tool, in),
           .threshold_n = 0.0};
 }
-// (7.5) far from the pole.
 double agus_across(const LawTool& tool, const LawInputs& in, double thrust_n) noexcept {
-  return agus_of(tool, in).friction * thrust_n;
+  return agus_friction(agus_of(tool, in), Newtons{thrust_n}, arm_mm(tool, in)).value();
 }
 double agus_torque(const LawTool& tool, const LawInputs& in, double thrust_n) noexcept {
-  return agus_of(tool, in).friction * thrust_n * arm_mm(tool, in);
+  return agus_across(tool, in, thrust_n) * arm_mm(tool, in);
 }
 
-double ploughing_n(const LawTool& tool, const LawInputs& in) noexcept {
-  const MilledFace edges{
-      .area_mm2 = 0.0, .axis_distance_mm = 1.0, .edge_length_mm = edges_mm(tool, in), .density = density_of(in)};
-  return milling_tangential({.wear = in.wear}, speed_of(in), MillimetresPerSecond{1.0}, edges).value();
+MillingParams milling_of(const LawTool& tool, const LawInputs& in) noexcept {
+  return {.diameter_mm = tool.diameter_mm, .wear = in.wear, .heel_mm_per_rev = tool.heel_mm_per_rev};
 }
 FeedLaw milling(const LawTool& tool, const LawInputs& in) noexcept {
-  if (stands(in)) return {};
-  const double omega = in.spindle_rpm * 2.0 * std::numbers::pi / 60.0;
+  const MillingParams params = milling_of(tool, in);
   // Without a sum over points: the whole engaged area at the mean distance.
-  const MillingParams sharp{.diameter_mm = tool.diameter_mm};
-  const double mean = milling_resistance(sharp, area_mm2(tool, in), arm_mm(tool, in), in.density_g_cm3);
-  const double sum = in.milling_sum > 0.0 ? in.milling_sum : mean;
-  return {.offset_n = ploughing_n(tool, in),
-          .scale_n = in.wear * sum / omega,
-          .exponent = 1.0,
-          .max_feed_mm_per_s = heel_feed(tool, in),
-          .threshold_n = 0.0};
+  const double mean = milling_resistance(params, area_mm2(tool, in), arm_mm(tool, in), in.density_g_cm3);
+  return milling_law(params, speed_of(in), in.milling_sum > 0.0 ? in.milling_sum : mean, edges_mm(tool, in), density_of(in));
 }
-// (7.8): the edges' ploughing has no part in it.
 double milling_across(const LawTool& tool, const LawInputs& in, double thrust_n) noexcept {
-  return milling_radial({}, Newtons{std::max(0.0, thrust_n - ploughing_n(tool, in))}).value();
+  const MillingParams params = milling_of(tool, in);
+  const double ploughing_n = milling_ploughing(params, edges_mm(tool, in), density_of(in)).value();
+  return milling_radial(params, Newtons{std::max(0.0, thrust_n - ploughing_n)}).value();
 }
-double milling_law_torque(const LawTool& tool, const LawInputs& in, double thrust_n) noexcept {
+double milling_torque(const LawTool& tool, const LawInputs& in, double thrust_n) noexcept {
   return thrust_n * arm_mm(tool, in);
 }
 
@@ -169,9 +160,16 @@ double no_torque(const LawTool&, const LawInputs&, double) noexcept { return 0.0
 
 bool is_saw(ToolKind kind) noexcept { return kind == ToolKind::oscillating_saw || kind == ToolKind::reciprocating_saw; }
 bool is_broach(ToolKind kind) noexcept { return kind == ToolKind::broach; }
-bool turns(ToolKind kind) noexcept {
-  return (kind < ToolKind::drill_sleeve && !is_saw(kind) && !is_broach(kind)) || kind == ToolKind::pin ||
-         kind == ToolKind::screw || kind == ToolKind::mesh;
+// Those whose point goes ahead of their flutes. A screw is none: it cuts by its thread, at a tenth of such speeds.
+bool is_drill(ToolKind kind) noexcept {
+  return kind == ToolKind::drill || kind == ToolKind::end_drill || kind == ToolKind::pin;
+}
+bool is_round_burr(ToolKind kind) noexcept { return kind == ToolKind::round_burr; }
+bool mills(ToolKind kind) noexcept {
+  return is_round_burr(kind) || kind == ToolKind::barrel_burr || kind == ToolKind::contoured_burr || kind == ToolKind::mesh;
+}
+bool is_reamer(ToolKind kind) noexcept {
+  return kind == ToolKind::sphere_reamer || kind == ToolKind::cylinder_reamer || kind == ToolKind::outside_reamer;
 }
 bool any(ToolKind) noexcept { return true; }
 
@@ -182,13 +180,16 @@ constexpr std::array kLaws{
              .number = "7.3",
              .source = "Chi et al. 2005",
              .inputs = "N rpm, v mm/s, rho g/cm3, D mm, beta rad; T N, M N mm",
-             .constants = "rubs below 1 N at 1.9 g/cm3 [A]; heel at 0.33 D a turn",
+             .constants = "rubs below 1 N at 1.9 g/cm3 [A]; heel at 0.33 D a turn [A]",
              .wear = "T and M in proportion; a blunt drill (2) needs twice the thrust and advances at 0.26 of the feed",
-             .range = "0.3 to 2.0 g/cm3, 500 to 3000 rpm, 0.5 to 3 mm/s",
+             .range = "drills and pins of 1.6 to 10 mm [A], 0.3 to 2.0 g/cm3, 500 to 3000 rpm, 0.5 to 3 mm/s",
              .notes = "The drill of the regression is not stated: thrust grows as D/3.2 [A]. It gives no torque; that is "
                       "of two lips [A]. No limit at N = 0: a spindle below 50 rpm counts as standing.",
-             .limits = {.spindle_rpm = {500, 3000}, .feed_mm_per_s = {0.5, 3.0}, .density_g_cm3 = {0.3, 2.0}},
-             .fits = turns,
+             .limits = {.spindle_rpm = {500, 3000},
+                        .feed_mm_per_s = {0.5, 3.0},
+                        .density_g_cm3 = {0.3, 2.0},
+                        .diameter_mm = {1.6, 10.0}},
+             .fits = is_drill,
              .feed_law = chi,
              .torque_nmm = lips_torque},
     ForceLaw{.name = "allotta",
@@ -197,13 +198,13 @@ constexpr std::array kLaws{
              .number = "7.1-7.2",
              .source = "Allotta et al. 1996",
              .inputs = "a mm per turn, N rpm, v mm/s, D mm, beta rad, R_u MPa; T N, M N mm",
-             .constants = "R_u = 130 (rho/1.9)^2 MPa [A]; beta 118 degrees where a drill says nothing else",
+             .constants = "R_u = 130 (rho/1.9)^2 MPa [A]; beta is the tool's own; heel at 0.33 D a turn [A]",
              .wear = "K_s in proportion, so T and M; a blunt drill (2) advances at half the feed",
-             .range = "cortical bone, drills of 2.5 to 8 mm, K_s 4.8 to 6 R_u",
+             .range = "drills and pins of 2.5 to 8 mm in cortical bone, K_s 4.8 to 6 R_u",
              .notes = "a is for a turn, not a second. The torque's work in a turn is K_s for each mm3. About 1.85 times Chi at "
                       "1000 rpm, 1 mm/s, 3.2 mm.",
              .limits = {.density_g_cm3 = {1.5, 2.1}, .diameter_mm = {2.5, 8.0}},
-             .fits = turns,
+             .fits = is_drill,
              .feed_law = allotta,
              .torque_nmm = lips_torque},
     ForceLaw{.name = "agus",
@@ -213,30 +214,36 @@ constexpr std::array kLaws{
              .source = "Agus et al. 2002",
              .inputs = "h mm, R mm, omega rad/s, r mm (mean distance from the axis), A mm2 (on the feed), rho g/cm3; F N, "
                        "v mm/s",
-             .constants = "C1 25 GPa; mu 0.3 [A]; u 1 J/mm3 at 1.9 g/cm3 [A], growing as rho^1.1841 [A]",
+             .constants = "C1 25 GPa; mu 0.3 [A]; u 1 J/mm3 at 1.9 g/cm3 [A], growing as rho^1.1841 [A]; heel at 5 usual "
+                          "feeds a turn [A]",
              .wear = "u in proportion: a blunt burr (2) erodes at half the feed",
              .range = "round burs on cortical bone, 10000 to 80000 rpm [A]",
-             .notes = "The elastic depth is microns: what a hand feels is the erosion. Nothing is cut at the pole.",
+             .notes = "The elastic depth is microns: what a hand feels along the feed is the erosion. h is asked only for "
+                      "how wide the contact is: across the feed and as torque comes F_mu, mu F but for places within some "
+                      "widths of the pole. Nothing is cut at the pole.",
              .limits = {.spindle_rpm = {10'000, 80'000}, .density_g_cm3 = {1.5, 2.1}},
-             .fits = turns,
+             .fits = is_round_burr,
              .feed_law = agus,
              .torque_nmm = agus_torque,
              .across_n = agus_across},
     ForceLaw{.name = "milling",
              .title = "Milling force from the rate of removal",
-             .equation = "F_t = K_t MRR / v_c + k_e L, v_c = omega r; F_r = K_r (F_t - k_e L)",
+             .equation = "F_t = K_t MRR / v_c + k_e L, v_c = omega r; F_r = K_r (F_t - k_e L) [A]",
              .number = "7.7-7.8",
              .source = "Yang and Chen 2003; Choi and Jerard 1998; Eriksson et al. 2005 for bone",
              .inputs = "MRR mm3/s, v_c mm/s, L mm of edge in bone, rho g/cm3; F N",
-             .constants = "K_t 200 N/mm2, K_r 0.5, k_e 0.01 N/mm at 1.9 g/cm3 [A], growing as rho^1.1841 [A]",
+             .constants = "K_t 200 N/mm2, K_r 0.5, k_e 0.01 N/mm at 1.9 g/cm3 [A], growing as rho^1.1841 [A]; heel at 5 "
+                          "usual feeds a turn [A]",
              .wear = "K_t and k_e in proportion, so F_t and F_r",
-             .range = "assumed: 5000 to 80000 rpm, 0.2 to 2.1 g/cm3 [A]",
-             .notes = "As printed, K_t MRR / f with the feed f, the force does not depend on the feed and cannot be solved for "
-                      "it. Below 0.15 R the cutting speed is taken as constant: at the pole it hardly cuts.",
+             .range = "burs and other solids of any form; assumed: 5000 to 80000 rpm, 0.2 to 2.1 g/cm3 [A]",
+             .notes = "As printed, K_t MRR / f with the feed f, the force does not depend on the feed and cannot be solved "
+                      "for it; and F_r is of all of F_t, here not of the edges that only plough [A]. F_t is felt against the "
+                      "feed and as torque, F_r across the feed [A]. Below 0.15 R the cutting speed is taken as constant: at "
+                      "the pole it hardly cuts.",
              .limits = {.spindle_rpm = {5'000, 80'000}, .density_g_cm3 = {0.2, 2.1}},
-             .fits = turns,
+             .fits = mills,
              .feed_law = milling,
-             .torque_nmm = milling_law_torque,
+             .torque_nmm = milling_torque,
              .across_n = milling_across},
     ForceLaw{.name = "spring-damper",
              .title = "Spring and damper of the surface",
@@ -248,23 +255,24 @@ constexpr std::array kLaws{
                           "D/3.2 [A]",
              .wear = "t_s and t_r in proportion",
              .range = "near the fit: 0.5 to 2 mm/s, 0.3 to 2.0 g/cm3",
-             .notes = "It does not know the spindle's speed. Where the density's gradient vanishes the spring has no direction "
-                      "and is left out.",
+             .notes = "It does not know the spindle's speed. The surface's normal is taken as the feed's own direction [A], "
+                      "so the spring is felt inside even bone too, where the density's gradient, which gives N, vanishes. It "
+                      "gives no torque; that is of two lips [A].",
              .limits = {.feed_mm_per_s = {0.5, 2.0}, .density_g_cm3 = {0.3, 2.0}},
              .fits = any,
              .feed_law = spring_damper,
              .torque_nmm = lips_torque},
     ForceLaw{.name = "multi-point",
              .title = "Sum over the contact points",
-             .equation = "F = sum K1 K2_i D_i |v_i| n_i where -n_i v_i > 0; along the feed K1 v sum K2_i D_i "
-                         "max(0, -n_i v/|v|)",
+             .equation = "along the feed F = K1 v sum K2_i D_i max(0, -n_i v/|v|), of K1 K2_i D_i |v| n_i where -n_i v > 0",
              .number = "7.12, 7.14",
              .source = "Niu 2008; there is no 7.13",
              .inputs = "v mm/s, D g/cm3, K2 share of the active area, n inward normal; F N",
              .constants = "K1 17.7 N s/mm per g/cm3 [A: fitted to Chi at 1 mm/s, 1.9 g/cm3 and a 118 degree point]",
              .wear = "K1 in proportion",
              .range = "near the fit: 0.5 to 2 mm/s",
-             .notes = "As printed it pushes during retraction too: here only points that move into bone count. It knows "
+             .notes = "As printed it pushes during retraction too: here only points that move into bone count. A "
+                      "tool cuts as it is fed, so every point's own velocity is the feed's; turning it cuts nothing. It knows "
                       "neither the spindle's speed nor the diameter. It gives no torque; that is of two lips [A].",
              .limits = {.feed_mm_per_s = {0.5, 2.0}},
              .fits = any,
@@ -280,7 +288,7 @@ constexpr std::array kLaws{
              .constants = "7.5 N of thrust at 2 um, 4 N along the cut at 1.9 g/cm3 [A: resultant 8 to 11 N]; 0.15 of the teeth "
                           "bear at a time [A]; at most 20 um [A]",
              .wear = "thrust and cutting force of each tooth in proportion",
-             .range = "2 to 10 um a tooth, teeth at 1700 to 7000 mm/s, cortical bone",
+             .range = "saws: 2 to 10 um a tooth, teeth at 1700 to 7000 mm/s, cortical bone",
              .notes = "At the same depth of cut the speed has no effect. Below the thrust at no depth the teeth rub.",
              .limits = {.density_g_cm3 = {1.5, 2.1}, .depth_um = {2, 10}, .tooth_mm_per_s = {1700, 7000}},
              .fits = is_saw,
@@ -296,10 +304,10 @@ constexpr std::array kLaws{
                        "M N mm",
              .constants = "K_t 200 N/mm2, K_r 0.5, k_e 0.01 N/mm at 1.9 g/cm3 [A]; heel at 5 usual feeds a turn [A]",
              .wear = "K_t and k_e in proportion, so T and M",
-             .range = "assumed: 50 to 600 rpm, 0.1 to 2.0 g/cm3 [A]",
+             .range = "reamers; assumed: 50 to 600 rpm, 0.1 to 2.0 g/cm3 [A]",
              .notes = "Nothing was measured for it: for the order of size and the way it scales.",
              .limits = {.spindle_rpm = {50, 600}, .density_g_cm3 = {0.1, 2.0}},
-             .fits = turns,
+             .fits = is_reamer,
              .feed_law = reamer,
              .torque_nmm = reamer_torque},
     ForceLaw{.name = "broach",
@@ -310,7 +318,7 @@ constexpr std::array kLaws{
              .inputs = "J N s of a blow, m kg of the mallet, A mm2 of wall and face in bone (on the advance), rho g/cm3; R N",
              .constants = "J 2.8 N s, m 0.7 kg, at most 5 mm a blow, held with 5 N [A]",
              .wear = "R in proportion: a blunt broach (2) advances half as far at a blow",
-             .range = "assumed: 0.1 to 1.0 g/cm3, 20 to 120 blows a minute [A]",
+             .range = "broaches; assumed: 0.1 to 1.0 g/cm3, 20 to 120 blows a minute [A]",
              .notes = "The push of the hand hardly matters: the blows advance it, and it stops when seated.",
              .limits = {.spindle_rpm = {20, 120}, .density_g_cm3 = {0.1, 1.0}},
              .fits = is_broach,
@@ -337,7 +345,6 @@ const ForceLaw& default_law(const Tool& tool) {
       case ToolKind::drill:
       case ToolKind::end_drill:
       case ToolKind::pin:
-      case ToolKind::screw:
         return "chi";
       case ToolKind::round_burr:
       case ToolKind::barrel_burr:
@@ -353,7 +360,7 @@ const ForceLaw& default_law(const Tool& tool) {
       case ToolKind::broach:
         return "broach";
       default:
-        return "multi-point";  // a solid of any form; what does not cut asks for none
+        return "multi-point";  // screws and solids of any form; what does not cut asks for none
     }
   }();
   return *find_force_law(name);

@@ -8,8 +8,8 @@ namespace osteon {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-// A reamer's teeth stand out enough for some turns' usual feed [A].
-constexpr double kReamerHeel = 5.0;
+// Teeth of a reamer or burr stand out enough for some turns' usual feed [A].
+constexpr double kUsualFeeds = 5.0;
 
 double disc_mm2(double diameter_mm) noexcept { return 0.25 * kPi * diameter_mm * diameter_mm; }
 
@@ -33,7 +33,7 @@ LawTool law_tool(const Tool& tool) {
   law.arm_mm = 0.5 * radius_mm;
   law.edge_length_mm = law.teeth * radius_mm / std::sin(0.5 * law.point_angle_rad);
   law.leading_area_mm2 = disc_mm2(law.diameter_mm);
-  const double usual_heel_mm = tool.feed_mm_per_rev > 0.0 ? kReamerHeel * tool.feed_mm_per_rev : law.heel_mm_per_rev;
+  const double usual_heel_mm = tool.feed_mm_per_rev > 0.0 ? kUsualFeeds * tool.feed_mm_per_rev : law.heel_mm_per_rev;
 
   switch (tool.kind) {
     case ToolKind::screw:
@@ -44,11 +44,13 @@ LawTool law_tool(const Tool& tool) {
       // Fed sideways: the mean of sqrt(R^2 - z^2) over the disc, and half of the meridians that are its edges.
       law.arm_mm = 8.0 / (3.0 * kPi) * radius_mm;
       law.edge_length_mm = 0.5 * law.teeth * kPi * radius_mm;
+      law.heel_mm_per_rev = usual_heel_mm;
       break;
     case ToolKind::barrel_burr:
     case ToolKind::contoured_burr:
       law.arm_mm = radius_mm;
       law.edge_length_mm = 0.5 * law.teeth * tool.cutting_length_mm;
+      law.heel_mm_per_rev = usual_heel_mm;
       law.leading_area_mm2 = tool.diameter_mm * tool.cutting_length_mm;
       break;
     case ToolKind::oscillating_saw:

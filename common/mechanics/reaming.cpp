@@ -20,20 +20,6 @@ double chip_n(const ReamingParams& p, double rpm, double edge_length_mm, GramsPe
 
 }  // namespace
 
-Newtons reaming_thrust(const ReamingParams& params, RevolutionsPerMinute speed, MillimetresPerSecond feed,
-                       double edge_length_mm, GramsPerCm3 density) noexcept {
-  if (speed.value() < kMinCuttingRpm || !(feed.value() > 0.0)) return Newtons{0.0};
-  return Newtons{edge_n(params, edge_length_mm, density) + chip_n(params, speed.value(), edge_length_mm, density) * feed.value()};
-}
-
-MillimetresPerSecond reaming_feed(const ReamingParams& params, RevolutionsPerMinute speed, Newtons thrust,
-                                  double edge_length_mm, GramsPerCm3 density) noexcept {
-  const double surplus_n = thrust.value() - edge_n(params, edge_length_mm, density);
-  if (speed.value() < kMinCuttingRpm || !(surplus_n > 0.0)) return MillimetresPerSecond{0.0};
-  const double slope = chip_n(params, speed.value(), edge_length_mm, density);
-  return MillimetresPerSecond{slope > 0.0 ? surplus_n / slope : 0.0};
-}
-
 FeedLaw reaming_law(const ReamingParams& params, RevolutionsPerMinute speed, double edge_length_mm,
                     GramsPerCm3 density) noexcept {
   if (speed.value() < kMinCuttingRpm || !(params.teeth > 0.0)) return {};

@@ -17,10 +17,6 @@ struct ReamingParams {
   double wear = 1.0;                  // 1 sharp
 };
 
-[[nodiscard]] Newtons reaming_thrust(const ReamingParams& params, RevolutionsPerMinute speed, MillimetresPerSecond feed,
-                                     double edge_length_mm, GramsPerCm3 density) noexcept;
-[[nodiscard]] MillimetresPerSecond reaming_feed(const ReamingParams& params, RevolutionsPerMinute speed, Newtons thrust,
-                                                double edge_length_mm, GramsPerCm3 density) noexcept;
 [[nodiscard]] FeedLaw reaming_law(const ReamingParams& params, RevolutionsPerMinute speed, double edge_length_mm,
                                   GramsPerCm3 density) noexcept;
 // The tangential force that goes with a thrust, at its mean distance from the axis.

@@ -46,6 +46,16 @@ std::string defaults_of(const ForceLaw& law) {
   return names.empty() ? "none; it is chosen" : names;
 }
 
+std::string tools_of(const ForceLaw& law) {
+  std::string names;
+  for (const auto& [kind, name] : tool_kinds()) {
+    Tool tool;
+    tool.kind = kind;
+    if (tool.cuts() && law.fits(kind)) names += (names.empty() ? "" : ", ") + std::string(name);
+  }
+  return names;
+}
+
 json span(const Span& s) { return s.lowest == 0.0 && s.highest == 0.0 ? json() : json::array({s.lowest, s.highest}); }
 
 // A whole point of a tool in bone, at a speed and a feed.
@@ -108,6 +118,7 @@ std::string laws_text() {
     paragraph(out, "wear", law.wear);
     paragraph(out, "range", law.range);
     paragraph(out, "notes", law.notes);
+    paragraph(out, "fits", tools_of(law));
     paragraph(out, "default of", defaults_of(law));
   }
   out << "\nA tool file chooses with a line such as \"law: allotta\". The laws disagree with each other; wear 1 is sharp, a\n"

@@ -17,6 +17,7 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
+// continuous_n [A]: see make_falcon().
 const DeviceLimits kLimits{.peak_n = 8.0, .continuous_n = 4.5, .stiffness_n_per_mm = 3.0, .workspace_radius_mm = 40.0};
 constexpr auto kRunsPatience = 200ms;     // for firmware that ran before
 constexpr auto kStartsPatience = 2000ms;  // for firmware just loaded

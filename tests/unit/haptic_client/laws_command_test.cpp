@@ -25,8 +25,18 @@ TEST(LawsCommand, ListsEveryLawWithAllThatIsToBeKnown) {
     ASSERT_NE(at, std::string::npos) << law.name;
     const std::size_t end = std::min(text.find("\n\n", at), text.size());
     const std::string paragraph = text.substr(at, end - at);
-    for (const char* label : {"equation", "source", "units", "constants", "wear", "range", "notes", "default of"})
+    for (const char* label : {"equation", "source", "units", "constants", "wear", "range", "notes", "fits", "default of"})
       EXPECT_NE(paragraph.find("\n  " + std::string(label) + " "), std::string::npos) << law.name << " " << label;
+    // What it can be chosen for: all that fits, and no more.
+    for (const auto& [kind, name] : tool_kinds()) {
+      Tool tool;
+      tool.kind = kind;
+      const std::size_t fits = paragraph.find("\n  fits "), defaults = paragraph.find("\n  default of ");
+      std::istringstream words(paragraph.substr(fits, defaults - fits));
+      std::set<std::string> named;
+      for (std::string word; words >> word;) named.insert(word.back() == ',' ? word.substr(0, word.size() - 1) : word);
+      EXPECT_EQ(named.contains(std::string(name)), tool.cuts() && law.fits(kind)) << law.name << " " << name;
+    }
     if (!law.number.empty()) {
       EXPECT_NE(paragraph.find("(" + std::string(law.number) + " of"), std::string::npos) << paragraph;
     }

@@ -72,7 +72,8 @@ TEST(Ticks, AStallIsOverWhenItIsOver) {
   EXPECT_NEAR(result.plunge_mm, 6.0, 0.15 * 6.0);
 }
 
-// A motor of 5 N mm under a hand that pushes for 27: it stands in the bone, nothing advances; drawn back it turns again.
+// A motor of 5 N mm, an eightieth of a drill's, under a hand that pushes for 27: it stands in the bone, nothing advances; drawn
+// back it turns again. A sharp, clean drill's own motor never stalls under a hand; a bur's does, see the tools' effects.
 TEST(Ticks, ASpindleStallsInBoneAndTurnsAgain) {
   const Case bone = block_case();
   ReadyPlan plan = *make_ready({expert_drilling()}, bone);

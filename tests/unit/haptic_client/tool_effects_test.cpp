@@ -30,10 +30,11 @@ Case slab(double deep_mm, double density_g_cm3, double pitch_mm = 0.5, double wi
 // A machine holds the handle exactly where it is told, over the tool's axis.
 class Rig {
  public:
-  Rig(Case bone, const Tool& tool, const LoopParams& params = {}, const char* law = nullptr, double wear = 1.0)
+  Rig(Case bone, const Tool& tool, const LoopParams& params = {}, const char* law = nullptr, double wear = 1.0,
+      const Pose& start = {{0, 0, -0.5}, Eigen::Quaterniond::Identity()})
       : replica_(std::move(bone), BodyId{}, box_with(tool)),
         loop_(params, models(tool, replica_.predicted().bone().pitch_mm(), law, wear)) {
-    input_.pose_device_tool.position_mm = {0, 0, -0.5};
+    input_.pose_device_tool = start;
     input_.spindle_rpm = tool.spindle_rpm;
     loop_.take_up(0, input_.pose_device_tool, WorkspaceMapping{});
     build(input_.pose_device_tool);
@@ -228,6 +229,44 @@ TEST(ToolEffects, ADeepHoleClogsTheDrillUntilItIsDrawnBack) {
   const Mean cleared = between(rig.move({0, 0, 1.5}, 1.5), 12.6, 13.5);
   ASSERT_GT(cleared.ticks, 200);
   EXPECT_NEAR(cleared.torque_nmm / shallow.torque_nmm, 1.0, 0.06);
+}
+
+// A barrel bur lies on a bar of cortical bone, shorter than it, and is pressed in with its side, its teeth 3 mm from the axis.
+// Its own motor has 80 N mm, four times a drill's power at twenty times its speed: it carries on at less than 80 / 3 N and
+// stands in the bone at more, where it goes no farther, and turns again when it is drawn back.
+TEST(ToolEffects, ABurThatIsPressedTooHardStalls) {
+  const Tool bur = *find_tool("burr-barrel");
+  const Pose lying{{4, 0, -3.5}, Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), Vec3::UnitX())};
+  Rig rig(slab(20.0, 1.9, 0.5, 7.0), bur, {}, nullptr, 1.0, lying);
+  const double most_nmm = 80.0, arm_mm = 3.0, droop = 0.7 * 20.0 * 20.0 / 4.0;
+  double least_rpm = 1e9, torque_nmm = 0.0, pressed_n = 0.0;
+  for (const LoopReport& r : rig.move({0, 0, 5.5}, 1.5)) {
+    least_rpm = std::min(least_rpm, r.spindle_rpm);
+    torque_nmm = std::max(torque_nmm, r.torque_nmm);
+    pressed_n = std::max(pressed_n, r.force_physical_n.norm());
+    EXPECT_FALSE(r.events & kStalled);
+  }
+  std::printf("  bur pressed with %.1f N: %.1f N mm, down to %.0f rpm\n", pressed_n, torque_nmm, least_rpm);
+  EXPECT_LT(pressed_n, most_nmm / arm_mm);
+  EXPECT_GT(torque_nmm, 5.0);
+  EXPECT_GE(least_rpm, 20'000.0 - 1.02 * droop * torque_nmm);
+
+  rig.move({0, 0, 9.0}, 0.15);  // faster than its teeth can take
+  rig.move(Vec3::Zero(), 0.35);
+  double way_mm = 0.0, least_n = 1e9;
+  for (const LoopReport& r : rig.move(Vec3::Zero(), 0.5)) {
+    EXPECT_TRUE(r.events & kStalled);
+    EXPECT_LT(r.spindle_rpm, 1.0);
+    way_mm += r.moved_mm.norm();
+    least_n = std::min(least_n, r.force_physical_n.norm());
+  }
+  std::printf("  and with %.1f N it stands\n", least_n);
+  EXPECT_GT(least_n, most_nmm / arm_mm);
+  EXPECT_LT(way_mm, 0.1);
+
+  const LoopReport out = rig.move({0, 0, -16.0}, 1.5).back();
+  EXPECT_FALSE(out.events & kStalled);
+  EXPECT_NEAR(out.spindle_rpm, 20'000.0, 200.0);
 }
 
 // The motor's port pulls a drill forward while its rim is left, no longer, and not on the way in.

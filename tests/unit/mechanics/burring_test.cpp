@@ -56,6 +56,14 @@ TEST(Agus, FrictionNearThePoleHasItsClosedForm) {
   EXPECT_NEAR(agus_friction(params, normal, d).value(), 0.9 * 3.0 * std::numbers::pi / 8.0 * 0.1, 0.05 * 0.9 * 0.1 * 1.18);
 }
 
+// The sum over the disc near the pole and the series far from it meet.
+TEST(Agus, FrictionIsOneCurve) {
+  const AgusParams params;
+  const double contact = std::sqrt(agus_depth_mm(params, Newtons{3.0}) * params.radius_mm);
+  const double inside = agus_friction(params, Newtons{3.0}, 3.999 * contact).value();
+  EXPECT_NEAR(agus_friction(params, Newtons{3.0}, 4.001 * contact).value(), inside, 2e-4 * inside);
+}
+
 // The power of friction is the power of removal: mu F omega r = u A v.
 TEST(Agus, ErosionBalancesPower) {
   const double v = agus_erosion({}, RevolutionsPerMinute{20'000}, Newtons{2.0}, 2.0, 6.0, GramsPerCm3{1.9}).value();

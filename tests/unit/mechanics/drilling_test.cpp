@@ -6,10 +6,10 @@ namespace osteon {
 namespace {
 
 double thrust(double rpm, double feed, double density, DrillingParams params = {}) {
-  return drilling_thrust(params, RevolutionsPerMinute{rpm}, MillimetresPerSecond{feed}, GramsPerCm3{density}).value();
+  return resistance_n(drilling_law(params, RevolutionsPerMinute{rpm}, GramsPerCm3{density}, 1.0), feed);
 }
 double feed(double rpm, double force, double density) {
-  return drilling_feed({}, RevolutionsPerMinute{rpm}, Newtons{force}, GramsPerCm3{density}).value();
+  return feed_at_mm_per_s(drilling_law({}, RevolutionsPerMinute{rpm}, GramsPerCm3{density}, 1.0), force);
 }
 
 // Points of comparison at 1000 rpm and 1 mm/s, published to one decimal.
@@ -47,7 +47,7 @@ TEST(Drilling, TorqueAtTheCorticalPoint) {
 }
 
 TEST(Drilling, HeelTouchesAtAThirdOfADiameterPerTurn) {
-  EXPECT_NEAR(heel_contact_feed({}, RevolutionsPerMinute{1000}).value(), 17.6, 1e-9);
+  EXPECT_NEAR(drilling_law({}, RevolutionsPerMinute{1000}, GramsPerCm3{1.9}, 1.0).max_feed_mm_per_s, 17.6, 1e-9);
 }
 
 TEST(Drilling, AStandingSpindleDoesNotCut) {

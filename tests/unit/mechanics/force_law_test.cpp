@@ -3,8 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
+#include <functional>
+#include <map>
 #include <numbers>
 #include <set>
+#include <sstream>
 #include <string>
 
 #include "common/mechanics/milling.hpp"
@@ -53,11 +57,65 @@ TEST(ForceLaws, EveryOneSaysWhatItIs) {
   EXPECT_EQ(find_force_law("hooke"), nullptr);
 }
 
-// Equations that the dissertation has, all of chapter 7's laws among them.
-TEST(ForceLaws, CoverTheNumberedEquations) {
-  std::string numbers;
-  for (const ForceLaw& l : force_laws()) numbers += std::string(l.number) + " ";
-  EXPECT_EQ(numbers, "7.3 7.1-7.2 7.4-7.6 7.7-7.8 7.9-7.11 7.12, 7.14    ");
+// "7.7-7.8", "7.12, 7.14": what follows 7. of all of them.
+std::set<int> numbers_of(const ForceLaw& l) {
+  std::set<int> found;
+  std::istringstream parts{std::string(l.number)};
+  for (std::string part; std::getline(parts, part, ',');) {
+    int first = 0, last = 0;
+    const int read = std::sscanf(part.c_str(), " 7.%d-7.%d", &first, &last);
+    EXPECT_GE(read, 1) << l.name << ": " << part;
+    for (int k = first; k <= (read == 2 ? last : first); ++k) EXPECT_TRUE(found.insert(k).second) << l.name << " " << k;
+  }
+  return found;
+}
+
+// Every numbered equation of chapter 7 but 7.15, which is a filter, computed by hand: what the law that claims it must give.
+// The whole point of a 3.2 mm drill at 1000 rpm in cortical bone; a 5 mm burr at 20 000 rpm with 10 mm2 at 2 mm from its axis.
+TEST(ForceLaws, ComputeEveryNumberedEquation) {
+  const LawTool drill = tool_of("drill-3.2"), burr = tool_of("burr-round-5");
+  const LawInputs drilled{.spindle_rpm = 1000, .density_g_cm3 = 1.9, .engaged = 1.0, .directed_density = 0.4};
+  const LawInputs burred{.spindle_rpm = 20'000, .density_g_cm3 = 1.9, .engaged = 0.5, .engaged_area_mm2 = 10.0,
+                         .edge_length_mm = 40.0, .mean_arm_mm = 2.0};
+  LawInputs at_pole = burred;
+  // (7.4): 3 N press a sphere of 2.5 mm in by h; Hertz's disc has a^2 = h R. There friction's directions differ: 3 pi d / (8 a).
+  const double h_mm = 2.5 * std::pow(3.0 / (25'000.0 * 2.5 * 2.5), 2.0 / 3.0), a_mm = std::sqrt(h_mm * 2.5);
+  at_pole.mean_arm_mm = 0.2 * a_mm;
+  const double omega = 20'000 * 2.0 * std::numbers::pi / 60.0, half_point = std::sin(59.0 * std::numbers::pi / 180.0);
+  const auto thrust = [&](const ForceLaw& l, const LawTool& tool, const LawInputs& in, double v) {
+    return resistance_n(l.feed_law(tool, in), v);
+  };
+  struct Given {
+    double is, expected, within;
+  };
+  const std::map<int, std::function<Given(const ForceLaw&)>> equations = {
+      {1, [&](auto& l) { return Given{thrust(l, drill, drilled, 2.0), 650.0 * 0.12 * 1.6 * half_point, 1e-9}; }},
+      {2, [&](auto& l) { return Given{l.torque_nmm(drill, drilled, thrust(l, drill, drilled, 2.0)),
+                                      650.0 * 0.12 * 3.2 * 3.2 / 8.0, 1e-9}; }},
+      {3, [&](auto& l) { return Given{thrust(l, drill, drilled, 2.0),
+                                      134.6 * std::pow(1000, -0.3327) * std::pow(2.0, 0.5189) * std::pow(1.9, 1.1841), 1e-9}; }},
+      {4, [&](auto& l) { return Given{l.across_n(burr, at_pole, 3.0), 0.9 * 3.0 * std::numbers::pi / 8.0 * 0.2, 0.05}; }},
+      {5, [&](auto& l) { return Given{l.across_n(burr, burred, 3.0), 0.9, 2e-4}; }},
+      {6, [&](auto& l) { return Given{feed_at_mm_per_s(l.feed_law(burr, burred), 3.0),
+                                      0.3 * 3.0 * omega * 2.0 / (1000.0 * 10.0), 1e-9}; }},
+      {7, [&](auto& l) { return Given{thrust(l, burr, burred, 8.0), 200.0 * 10.0 * 8.0 / (omega * 2.0) + 0.4, 1e-9}; }},
+      {8, [&](auto& l) { return Given{l.across_n(burr, burred, 5.0), 0.5 * (5.0 - 0.4), 1e-9}; }},
+      {9, [&](auto& l) { return Given{thrust(l, drill, drilled, 2.0), 5.0 + 24.0 * 2.0, 1e-9}; }},
+      {10, [&](auto& l) { return Given{thrust(l, drill, drilled, 1e-9), 5.0, 1e-6}; }},  // the spring, even bone or not
+      {11, [&](auto& l) { return Given{thrust(l, drill, drilled, 3.0) - thrust(l, drill, drilled, 1.0), 24.0 * 2.0, 1e-9}; }},
+      {12, [&](auto& l) { return Given{thrust(l, drill, drilled, 2.0), 17.7 * 0.4 * 2.0, 1e-9}; }},
+      {14, [&](auto& l) { return Given{feed_at_mm_per_s(l.feed_law(drill, drilled), 17.7), 1.0 / 0.4, 1e-9}; }},
+  };
+  std::set<int> claimed;
+  for (const ForceLaw& l : force_laws())
+    for (const int number : numbers_of(l)) {
+      EXPECT_TRUE(claimed.insert(number).second) << "7." << number << " is claimed twice";
+      const auto equation = equations.find(number);
+      ASSERT_NE(equation, equations.end()) << l.name << " claims 7." << number;
+      const Given given = equation->second(l);
+      EXPECT_NEAR(given.is, given.expected, given.within * given.expected) << l.name << " 7." << number;
+    }
+  EXPECT_EQ(claimed.size(), equations.size());
 }
 
 // Points of comparison: 1000 rpm, 1 mm/s, the whole point in bone.
@@ -237,12 +295,71 @@ TEST(ForceLaws, EveryToolThatCutsHasALawThatFits) {
     const FeedLaw feed_law = l.feed_law(law_tool(tool), {.spindle_rpm = tool.spindle_rpm, .density_g_cm3 = 0.5, .engaged = 0.5});
     EXPECT_GT(feed_law.max_feed_mm_per_s, 0.0) << tool.name;
   }
-  EXPECT_EQ(used, (std::set<std::string_view>{"chi", "milling", "saw", "reamer", "broach"}));
+  EXPECT_EQ(used, (std::set<std::string_view>{"chi", "milling", "saw", "reamer", "broach", "multi-point"}));
   EXPECT_EQ(default_law(*find_tool("drill-3.2")).name, "chi");
   EXPECT_EQ(default_law(*find_tool("burr-barrel")).name, "milling");
   EXPECT_EQ(default_law(*find_tool("saw-reciprocating")).name, "saw");
   EXPECT_EQ(default_law(*find_tool("reamer-outside")).name, "reamer");
   EXPECT_EQ(default_law(*find_tool("broach-2")).name, "broach");
+  EXPECT_EQ(default_law(*find_tool("screw-1")).name, "multi-point");
+}
+
+// A tool used as it comes, in the middle of the law's densities, is not outside what its law was made for: nobody who chose
+// nothing is to be warned.
+TEST(ForceLaws, ADefaultIsWithinItsRangeAtTheToolsOwnSpeed) {
+  const unsigned pressed = static_cast<unsigned>(OutOfRange::feed) | static_cast<unsigned>(OutOfRange::depth_of_cut);
+  for (const Tool& tool : builtin_tools()) {
+    if (!tool.cuts()) continue;
+    const ForceLaw& l = default_law(tool);
+    const Span& range = l.limits.density_g_cm3;
+    const double density = range.highest > 0.0 ? 0.5 * (range.lowest + range.highest) : 1.0;
+    const LawInputs in{.spindle_rpm = tool.spindle_rpm, .density_g_cm3 = density, .engaged = 1.0};
+    unsigned outside = out_of_range(l, law_tool(tool), in, 1.0) & ~pressed;  // how hard it is pressed is the hand's
+    // Its teeth make 1200 mm/s, and slower ones than 1700 were not measured: that is said.
+    if (tool.name == "saw-reciprocating") outside ^= static_cast<unsigned>(OutOfRange::tooth_speed);
+    EXPECT_EQ(outside, 0u) << tool.name << ", " << l.name << ": " << out_of_range_words(outside);
+  }
+}
+
+// What a law can be chosen for is what its range names.
+TEST(ForceLaws, FitTheToolsThatTheirRangeNames) {
+  using enum ToolKind;
+  const std::map<std::string_view, std::set<ToolKind>> kinds = {
+      {"chi", {drill, end_drill, pin}},
+      {"allotta", {drill, end_drill, pin}},
+      {"agus", {round_burr}},
+      {"milling", {round_burr, barrel_burr, contoured_burr, mesh}},
+      {"saw", {oscillating_saw, reciprocating_saw}},
+      {"reamer", {sphere_reamer, cylinder_reamer, outside_reamer}},
+      {"broach", {broach}}};
+  const std::map<std::string_view, std::string_view> words = {{"chi", "drills"}, {"allotta", "drills"}, {"agus", "round burs"},
+      {"milling", "burs"}, {"saw", "saws"}, {"reamer", "reamers"}, {"broach", "broaches"}};
+  for (const auto& [name, fitting] : kinds) {
+    for (const auto& [kind, word] : tool_kinds())
+      EXPECT_EQ(law(name).fits(kind), fitting.contains(kind)) << name << " " << word;
+    EXPECT_EQ(law(name).range.substr(0, words.at(name).size()), words.at(name)) << law(name).range;
+  }
+  const auto drilled = choose_law(*find_tool("drill-3.2"), "agus");
+  ASSERT_FALSE(drilled);
+  EXPECT_NE(drilled.error().message.find("choose one of chi, allotta, spring-damper, multi-point"), std::string::npos)
+      << drilled.error().message;
+}
+
+// Burs' teeth stand out for five usual feeds: 0.1 mm a turn, 33 mm/s at 20 000 rpm. A drill's heel is a third of its diameter.
+TEST(ForceLaws, TeethAndHeelsLimitTheFeed) {
+  const LawInputs milled{.spindle_rpm = 20'000, .density_g_cm3 = 1.9, .engaged = 1.0};
+  for (const char* name : {"burr-round-5", "burr-barrel"})
+    for (const char* of : {"milling", "multi-point"})
+      EXPECT_NEAR(law(of).feed_law(tool_of(name), milled).max_feed_mm_per_s, 100.0 / 3.0, 1e-9) << name << " " << of;
+  const LawInputs drilled{.spindle_rpm = 1000, .density_g_cm3 = 1.9, .engaged = 1.0};
+  for (const char* of : {"chi", "allotta"})
+    EXPECT_NEAR(law(of).feed_law(tool_of("drill-3.2"), drilled).max_feed_mm_per_s, 17.6, 1e-9) << of;
+  for (const char* of : {"chi", "allotta", "agus", "milling", "reamer"}) {
+    const std::string_view constants = law(of).constants;
+    const std::size_t at = constants.find("heel");
+    ASSERT_NE(at, std::string_view::npos) << of;
+    EXPECT_NE(constants.find("[A]", at), std::string_view::npos) << of;
+  }
 }
 
 TEST(ForceLaws, ALawIsChosenByTheToolOrInstead) {
@@ -269,8 +386,9 @@ TEST(ForceLaws, FitEveryBuiltinTool) {
   for (const Tool& tool : builtin_tools()) EXPECT_TRUE(choose_law(tool).has_value()) << tool.name;
 }
 
-// Across the feed: (7.8) K_r of what cuts, without the edges' ploughing; (7.5) mu of the contact's force; of a saw's teeth
-// the force along the cut, which depth does not change and torque is made of. All round a drill or reamer it cancels.
+// Across the feed: (7.8) K_r of what cuts, without the edges' ploughing; (7.5) mu of the contact's force but at the pole; of
+// a saw's teeth the force along the cut, which depth does not change and torque is made of. All round a drill or reamer it
+// cancels.
 TEST(ForceLaws, ActAcrossTheFeedAsTheirEquationsSay) {
   const LawTool burr = tool_of("burr-round-5"), blade = tool_of("saw-oscillating-1");
   const LawInputs milled{.spindle_rpm = 20'000, .density_g_cm3 = 1.9, .engaged = 1.0, .edge_length_mm = 40.0};
@@ -281,7 +399,11 @@ TEST(ForceLaws, ActAcrossTheFeedAsTheirEquationsSay) {
     EXPECT_NEAR(law("milling").across_n(burr, milled, thrust), 0.5 * (thrust - 0.4), 1e-9);
   }
   EXPECT_EQ(law("milling").across_n(burr, milled, 0.3), 0.0);
-  EXPECT_NEAR(law("agus").across_n(burr, milled, 6.0), 0.3 * 6.0, 1e-12);
+  EXPECT_NEAR(law("agus").across_n(burr, milled, 6.0), 0.3 * 6.0, 1e-3);
+  LawInputs pole = milled;
+  pole.mean_arm_mm = 1e-4;  // microns from the pole friction has no direction, and no arm
+  EXPECT_LT(law("agus").across_n(burr, pole, 6.0), 0.01);
+  EXPECT_LT(law("agus").torque_nmm(burr, pole, 6.0), 1e-5);
   const LawInputs sawn{.spindle_rpm = 12'000, .density_g_cm3 = 1.9, .teeth_engaged = 10.0};
   for (const double thrust : {12.0, 15.0}) {
     const double across = law("saw").across_n(blade, sawn, thrust);
@@ -328,7 +450,7 @@ TEST(ForceLaws, SayWhenTheyAreUsedOutsideTheirRange) {
 TEST(ForceLaws, AScrewsThreadLimitsItsFeed) {
   const Tool screw = *find_tool("screw-1");
   const LawInputs in{.spindle_rpm = 120, .density_g_cm3 = 1.0, .engaged = 1.0};
-  for (const char* name : {"chi", "allotta", "multi-point"})
+  for (const char* name : {"spring-damper", "multi-point"})
     EXPECT_NEAR(law(name).feed_law(law_tool(screw), in).max_feed_mm_per_s, 2.0 * screw.thread_pitch_mm, 1e-12) << name;
 }
 

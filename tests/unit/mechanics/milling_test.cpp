@@ -9,20 +9,23 @@ namespace {
 
 const RevolutionsPerMinute kSpeed{20000.0};
 
-// (7.7): F = K_t · MRR / v_c for a face of 2 mm² at the equator of a 5 mm burr, moved at 10 mm/s.
-TEST(Milling, ForceIsRemovalRateOverCuttingSpeed) {
-  const double sum = milling_resistance({}, 2.0, 2.5, 1.9);
-  const FeedLaw law = milling_law({}, kSpeed, sum, GramsPerCm3{1.9}, 0.5);
+constexpr double kEdge_mm = 20.0;
+// What one face of 2 mm² at the equator of a 5 mm burr resists with, moved at `v` mm/s.
+double force(double v, MillingParams params = {}, RevolutionsPerMinute speed = kSpeed, double edge_mm = kEdge_mm) {
+  return resistance_n(milling_law(params, speed, milling_resistance(params, 2.0, 2.5, 1.9), edge_mm, GramsPerCm3{1.9}), v);
+}
+
+// (7.7): F_t = K_t · MRR / v_c + k_e L.
+TEST(Milling, ForceIsRemovalRateOverCuttingSpeedAndTheEdges) {
   const double cutting_speed = 20000.0 * 2.0 * std::numbers::pi / 60.0 * 2.5;
-  EXPECT_NEAR(resistance_n(law, 10.0), 200.0 * 2.0 * 10.0 / cutting_speed, 1e-9);
-  EXPECT_NEAR(resistance_n(law, 20.0), 2.0 * resistance_n(law, 10.0), 1e-9);
+  EXPECT_NEAR(force(10.0, {}, kSpeed, 0.0), 200.0 * 2.0 * 10.0 / cutting_speed, 1e-9);
+  EXPECT_NEAR(force(10.0), 200.0 * 2.0 * 10.0 / cutting_speed + 0.2, 1e-9);
+  EXPECT_NEAR(milling_ploughing({}, kEdge_mm, GramsPerCm3{1.9}).value(), 0.2, 1e-12);
 }
 
 TEST(Milling, FasterSpindleCutsLighter) {
-  const double sum = milling_resistance({}, 2.0, 2.5, 1.9);
-  const double slow = resistance_n(milling_law({}, kSpeed, sum, GramsPerCm3{1.9}, 0.5), 10.0);
-  const double fast = resistance_n(milling_law({}, RevolutionsPerMinute{40000.0}, sum, GramsPerCm3{1.9}, 0.5), 10.0);
-  EXPECT_NEAR(fast, 0.5 * slow, 1e-9);
+  const double slow = force(10.0, {}, kSpeed, 0.0);
+  EXPECT_NEAR(force(10.0, {}, RevolutionsPerMinute{40000.0}, 0.0), 0.5 * slow, 1e-9);
 }
 
 TEST(Milling, ThePoleResistsMoreThanTheEquator) {
@@ -30,37 +33,28 @@ TEST(Milling, ThePoleResistsMoreThanTheEquator) {
 }
 
 TEST(Milling, AStandingBurrDoesNotCut) {
-  EXPECT_EQ(milling_law({}, RevolutionsPerMinute{0.0}, 1.0, GramsPerCm3{1.9}, 1.0).max_feed_mm_per_s, 0.0);
+  EXPECT_EQ(milling_law({}, RevolutionsPerMinute{0.0}, 1.0, kEdge_mm, GramsPerCm3{1.9}).max_feed_mm_per_s, 0.0);
 }
 
-const MilledFace kFace{.area_mm2 = 2.0, .axis_distance_mm = 2.5, .edge_length_mm = 20.0, .density = GramsPerCm3{1.9}};
-
-// F_t = K_t MRR / v_c + k_e L, F_r = K_r of what cuts.
-TEST(Milling, TangentialAndRadialForce) {
-  const double cutting_speed = 20000.0 * 2.0 * std::numbers::pi / 60.0 * 2.5;
-  const double cutting = 200.0 * 2.0 * 10.0 / cutting_speed;
-  EXPECT_NEAR(milling_tangential({}, kSpeed, MillimetresPerSecond{10.0}, kFace).value(), cutting + 0.2, 1e-9);
-  EXPECT_NEAR(milling_radial({}, Newtons{cutting}).value(), 0.5 * cutting, 1e-12);
+// A turn advances by no more than the teeth stand out: 0.1 mm at 20 000 rpm is 33 mm/s.
+TEST(Milling, TeethLimitTheFeed) {
+  const FeedLaw law = milling_law({.heel_mm_per_rev = 0.1}, kSpeed, 1.0, kEdge_mm, GramsPerCm3{1.9});
+  EXPECT_NEAR(law.max_feed_mm_per_s, 100.0 / 3.0, 1e-9);
 }
+
+// (7.8): F_r = K_r of what cuts.
+TEST(Milling, RadialForce) { EXPECT_NEAR(milling_radial({}, Newtons{3.0}).value(), 1.5, 1e-12); }
 
 TEST(Milling, InverseUndoesForward) {
-  for (const double v : {0.5, 10.0, 80.0}) {
-    const Newtons force = milling_tangential({}, kSpeed, MillimetresPerSecond{v}, kFace);
-    EXPECT_NEAR(milling_feed({}, kSpeed, force, kFace).value(), v, 1e-9 * v);
-  }
-  EXPECT_EQ(milling_feed({}, kSpeed, Newtons{0.19}, kFace).value(), 0.0);  // the edges only plough
+  const FeedLaw law = milling_law({}, kSpeed, milling_resistance({}, 2.0, 2.5, 1.9), kEdge_mm, GramsPerCm3{1.9});
+  for (const double v : {0.5, 10.0, 80.0}) EXPECT_NEAR(feed_at_mm_per_s(law, force(v)), v, 1e-9 * v);
+  EXPECT_EQ(feed_at_mm_per_s(law, 0.19), 0.0);  // the edges only plough
 }
 
 // As printed, with the feed below the fraction, the force would be K_t times the swept area at any feed: here it grows.
 TEST(Milling, DependsOnTheFeedAsThePrintedFormDoesNot) {
-  const MillingParams smooth{.edge_n_per_mm = 0.0};
-  const auto force = [&](double v, double wear = 1.0) {
-    MillingParams params = smooth;
-    params.wear = wear;
-    return milling_tangential(params, kSpeed, MillimetresPerSecond{v}, kFace).value();
-  };
-  EXPECT_NEAR(force(20.0), 2.0 * force(10.0), 1e-9);
-  EXPECT_NEAR(force(10.0, 2.0), 2.0 * force(10.0), 1e-9);
+  EXPECT_NEAR(force(20.0, {}, kSpeed, 0.0), 2.0 * force(10.0, {}, kSpeed, 0.0), 1e-9);
+  EXPECT_NEAR(force(10.0, {.wear = 2.0}), 2.0 * force(10.0), 1e-9);
 }
 
 }  // namespace

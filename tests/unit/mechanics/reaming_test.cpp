@@ -13,6 +13,11 @@ namespace {
 const GramsPerCm3 kSubchondral{0.9};
 const RevolutionsPerMinute kSpeed{250};
 
+double thrust(const ReamingParams& reamer, double feed, double edge_mm, GramsPerCm3 density,
+              RevolutionsPerMinute speed = kSpeed) {
+  return resistance_n(reaming_law(reamer, speed, edge_mm, density), feed);
+}
+
 // Another road: the milling law of the whole face, ring by ring, whose radial part is the reamer's thrust.
 TEST(Reaming, IsMillingAlongTheAxis) {
   const double radius = 25.0, teeth = 40.0, feed = 0.7;
@@ -22,46 +27,42 @@ TEST(Reaming, IsMillingAlongTheAxis) {
   for (int i = 0; i < rings; ++i) {
     const double width = radius / rings, r = (i + 0.5) * width;
     const MillingParams mill{.diameter_mm = 2.0 * radius, .pole_radius = 0.0, .edge_n_per_mm = 0.0};
-    tangential += milling_tangential(mill, kSpeed, MillimetresPerSecond{feed},
-                                     {2.0 * std::numbers::pi * r * width, r, teeth * width, kSubchondral}).value();
+    const double ring = milling_resistance(mill, 2.0 * std::numbers::pi * r * width, r, kSubchondral.value());
+    tangential += resistance_n(milling_law(mill, kSpeed, ring, teeth * width, kSubchondral), feed);
   }
-  const double thrust = reaming_thrust(reamer, kSpeed, MillimetresPerSecond{feed}, teeth * radius, kSubchondral).value();
-  EXPECT_NEAR(thrust, 0.5 * tangential, 1e-9 * thrust);
+  EXPECT_NEAR(thrust(reamer, feed, teeth * radius, kSubchondral), 0.5 * tangential, 1e-9 * tangential);
 }
 
 // K_r K_t t L by hand: 0.5 · 200 · (60 · 0.5 / (250 · 40)) · 1000 at 1.9 g/cm3.
 TEST(Reaming, HasItsClosedForm) {
   const ReamingParams reamer{.teeth = 40, .edge_n_per_mm = 0.0};
-  EXPECT_NEAR(reaming_thrust(reamer, kSpeed, MillimetresPerSecond{0.5}, 1000.0, GramsPerCm3{1.9}).value(), 300.0, 1e-9);
+  EXPECT_NEAR(thrust(reamer, 0.5, 1000.0, GramsPerCm3{1.9}), 300.0, 1e-9);
 }
 
 TEST(Reaming, InverseUndoesForwardAndEdgesPlough) {
   const ReamingParams reamer;
-  for (const double v : {0.05, 0.5, 3.0}) {
-    const Newtons thrust = reaming_thrust(reamer, kSpeed, MillimetresPerSecond{v}, 600.0, kSubchondral);
-    EXPECT_NEAR(reaming_feed(reamer, kSpeed, thrust, 600.0, kSubchondral).value(), v, 1e-9);
-    EXPECT_NEAR(resistance_n(reaming_law(reamer, kSpeed, 600.0, kSubchondral), v), thrust.value(), 1e-9);
-  }
-  EXPECT_EQ(reaming_feed(reamer, kSpeed, Newtons{9.9}, 1000.0, GramsPerCm3{1.9}).value(), 0.0);
-  EXPECT_GT(reaming_feed(reamer, kSpeed, Newtons{10.1}, 1000.0, GramsPerCm3{1.9}).value(), 0.0);
+  const FeedLaw law = reaming_law(reamer, kSpeed, 600.0, kSubchondral);
+  const FeedLaw cortical = reaming_law(reamer, kSpeed, 1000.0, GramsPerCm3{1.9});
+  for (const double v : {0.05, 0.5, 3.0}) EXPECT_NEAR(feed_at_mm_per_s(law, resistance_n(law, v)), v, 1e-9);
+  EXPECT_EQ(feed_at_mm_per_s(cortical, 9.9), 0.0);
+  EXPECT_GT(feed_at_mm_per_s(cortical, 10.1), 0.0);
 }
 
 TEST(Reaming, FasterTurningAndMoreTeethNeedLessEdgesAndWearMore) {
   const ReamingParams reamer{.edge_n_per_mm = 0.0};
-  const MillimetresPerSecond v{0.5};
-  const double at = reaming_thrust(reamer, kSpeed, v, 600.0, kSubchondral).value();
-  EXPECT_NEAR(reaming_thrust(reamer, RevolutionsPerMinute{500}, v, 600.0, kSubchondral).value(), 0.5 * at, 1e-9);
-  EXPECT_NEAR(reaming_thrust({.teeth = 80, .edge_n_per_mm = 0.0}, kSpeed, v, 600.0, kSubchondral).value(), 0.5 * at, 1e-9);
-  EXPECT_NEAR(reaming_thrust(reamer, kSpeed, v, 1200.0, kSubchondral).value(), 2.0 * at, 1e-9);
-  EXPECT_NEAR(reaming_thrust({.edge_n_per_mm = 0.0, .wear = 2.0}, kSpeed, v, 600.0, kSubchondral).value(), 2.0 * at, 1e-9);
+  const double at = thrust(reamer, 0.5, 600.0, kSubchondral);
+  EXPECT_NEAR(thrust(reamer, 0.5, 600.0, kSubchondral, RevolutionsPerMinute{500}), 0.5 * at, 1e-9);
+  EXPECT_NEAR(thrust({.teeth = 80, .edge_n_per_mm = 0.0}, 0.5, 600.0, kSubchondral), 0.5 * at, 1e-9);
+  EXPECT_NEAR(thrust(reamer, 0.5, 1200.0, kSubchondral), 2.0 * at, 1e-9);
+  EXPECT_NEAR(thrust({.edge_n_per_mm = 0.0, .wear = 2.0}, 0.5, 600.0, kSubchondral), 2.0 * at, 1e-9);
 }
 
 // All the tangential force at one distance: M = (K_t t + k_e) L r.
 TEST(Reaming, TorqueIsTheTangentialForceAtItsArm) {
   const ReamingParams reamer{.teeth = 40};
   const double edge = 1000.0, t = 60.0 * 0.5 / (250.0 * 40.0);
-  const Newtons thrust = reaming_thrust(reamer, kSpeed, MillimetresPerSecond{0.5}, edge, GramsPerCm3{1.9});
-  EXPECT_NEAR(reaming_torque(reamer, thrust, edge, GramsPerCm3{1.9}, 12.5).value(), (200.0 * t + 0.01) * edge * 12.5, 1e-6);
+  const Newtons along{thrust(reamer, 0.5, edge, GramsPerCm3{1.9})};
+  EXPECT_NEAR(reaming_torque(reamer, along, edge, GramsPerCm3{1.9}, 12.5).value(), (200.0 * t + 0.01) * edge * 12.5, 1e-6);
 }
 
 // E = efficiency J^2 / (2 m): 0.7 · 2.8^2 / 1.4 = 3.92 J against 130 (0.3/1.9)^2 · 400 mm2.
