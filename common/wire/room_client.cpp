@@ -69,7 +69,8 @@ Error error_of(const grpc::Status& status, const std::string& server) {
 Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
                              std::chrono::milliseconds patience, const std::function<bool()>& stop) {
   if (!is_host_port(address))
-    return failure(ErrorCode::invalid_input, "the server's address " + address + " is not HOST:PORT; give the one that osteon-server prints, such as 127.0.0.1:50151");
+    return failure(ErrorCode::invalid_input, "the server's address " + address +
+                                                 " is not HOST:PORT; give the one that osteon-server prints, such as 127.0.0.1:50151");
   JoinedRoom room;
   room.channel = make_channel(address);
 

@@ -109,8 +109,8 @@ Result<std::unique_ptr<Session>> HandChoice::on(const Case& bone, const ToolBox&
   if (recorded_) {
     std::vector<std::string> names;
     for (const ToolModel& model : ready->tools) names.push_back(model.tool.name);
-    if (Result<void> played =
-            check_played(recorded_->session(), "--device " + options_.device, to_hex(bone.hash()), names, to_hex(plan_digest(*ready)));
+    if (Result<void> played = check_played(recorded_->session(), "--device " + options_.device, to_hex(bone.hash()), names,
+                                           to_hex(plan_digest(*ready)));
         !played)
       return tl::unexpected(played.error());
     // What a hand did against one force it would not have done against another.

@@ -160,7 +160,8 @@ Result<void> check_outputs(const Options& options) {
     return failure(ErrorCode::exists, "there is a file " + options.client.record.string() +
                                           " already; give --record another name, or move that one away");
   if (Result<void> usable = check_writable(options.client.record, "the recording", "--record"); !usable) return usable;
-  if (Result<void> usable = check_writable(options.client.session_log, "the session log", "--session-log"); !usable) return usable;
+  if (Result<void> usable = check_writable(options.client.session_log, "the session log", "--session-log"); !usable)
+    return usable;
   if (Result<void> usable = check_writable(options.cut_log, "the cut log", "--cut-log"); !usable) return usable;
   return check_writable(options.summary, "the summary", "--summary");
 }
@@ -263,7 +264,8 @@ int main(int argc, char** argv) {
                  "Rendered over physical force; by default the device's continuous force / 30 N");
   app.add_option("--session-log", options.client.session_log, "CSV with a row for each millisecond");
   app.add_option("--record", options.client.record,
-                 "HDF5 file with a row for each millisecond: poses, wrenches, spindle, bone; --device recorded:FILE plays it. A file that is there is left alone");
+                 "HDF5 file with a row for each millisecond: poses, wrenches, spindle, bone; --device recorded:FILE plays it. A "
+                 "file that is there is left alone");
   app.add_option("--cut-log", options.cut_log, "CSV with a row for each cut");
   app.add_option("--summary", options.summary, "JSON written at the end: steps, forces, loop times, field hash");
   app.add_option("--cache", options.room.cache, "Folder where fetched cases are kept")->capture_default_str();

@@ -36,7 +36,8 @@ std::array<double, N> numbers(const json& object, const char* field) {
     right = value[i].is_number() && std::abs(value[i].get<double>()) <= kFarthest;
     if (right) result[i] = value[i].get<double>();
   }
-  if (!right) throw Wrong(std::string("\"") + field + "\" must be a list of " + std::to_string(N) + " numbers from -100000 to 100000");
+  if (!right) throw Wrong(std::string("\"") + field + "\" must be a list of " + std::to_string(N) +
+                          " numbers from -100000 to 100000");
   return result;
 }
 

@@ -434,7 +434,8 @@ bool RecordFile::Impl::make_metadata() {
   finished = make_value(file.id(), "metadata/finished", H5T_NATIVE_UINT64, &zero);
   return ok && hash.ok() && room_seq.ok() && rows_dropped.ok() && finished.ok() &&
          set_text(hash.id(), "meaning", "of the whole bone at room_seq, SHA-256 in hexadecimal digits") &&
-         set_text(finished.id(), "meaning", "1: the session ended as it should; 0: it goes on, its room was lost, or its writer was killed");
+         set_text(finished.id(), "meaning",
+                  "1: the session ended as it should; 0: it goes on, its room was lost, or its writer was killed");
 }
 
 // The same array under the names that each group of the layout knows it by.

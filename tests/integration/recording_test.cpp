@@ -95,6 +95,27 @@ TEST_F(RecordedRoom, OfAKilledClientCanBeRead) {
   EXPECT_EQ(ask(file, "int((f['data/state'][:n] == h5py.check_enum_dtype(f['data/state'].dtype)['cutting']).any())"), 1);
 }
 
+// Whoever plays or plots it later can tell it from one that was done to its end.
+TEST_F(RecordedRoom, OfALostRoomSaysThatItDidNotEndAsItShould) {
+  Stage stage(24.0);
+  Process haptic = stage.start("osteon-haptic", arguments(stage, "lost", 0.0));
+  const auto deadline = std::chrono::steady_clock::now() + 60s;
+  while (std::chrono::steady_clock::now() < deadline && !std::filesystem::exists(stage / "lost.h5"))
+    std::this_thread::sleep_for(20ms);
+  std::this_thread::sleep_for(4s);
+  ASSERT_TRUE(haptic.running());
+  stage.server().signal(SIGKILL);
+  ASSERT_EQ(haptic.wait(30s), 1);
+  EXPECT_THAT(haptic.err(), testing::HasSubstr("see whether osteon-server still runs"));
+  const auto file = stage / "lost.h5";
+  EXPECT_EQ(ask(file, "int(f['metadata/finished'][()])"), 0);
+  const json summary = read_json(stage / "lost.json");
+  ASSERT_TRUE(summary.is_object());
+  EXPECT_THAT(haptic.err(), testing::HasSubstr(summary["lost"].get<std::string>()));
+  EXPECT_EQ(ask(file, "n"), summary["recording"]["rows"]);
+  EXPECT_GT(summary["cuts"].get<int>(), 0);
+}
+
 TEST_F(RecordedRoom, OnAFullDiskTheSessionGoesOn) {
   const Stage stage(24.0);
   // The case is fetched first, where files may be large.

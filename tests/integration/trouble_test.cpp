@@ -178,7 +178,7 @@ TEST(Trouble, AToolOfTheRoomsOwnIsTakenIntoTheHandAndAnUnknownOneNamed) {
   Process own = stage.start("osteon-haptic", {"--server", stage.address(), "--plan", plan, "--cache", stage / "cache", "--summary",
                                               stage / "own-summary.json", "--record", stage / "own.h5"});
   ASSERT_EQ(own.wait(60s), 0) << own.err();
-  const auto summary = read_json(stage / "own-summary.json");
+  auto summary = read_json(stage / "own-summary.json");
   EXPECT_EQ(summary["steps"][0]["tool"], "my-drill");
   EXPECT_EQ(summary["steps"][0]["completed"], true);
   // A cylinder of 4 mm to within its point, 1.2 mm high.
@@ -221,17 +221,35 @@ TEST(Trouble, AToolOfTheRoomsOwnIsTakenIntoTheHandAndAnUnknownOneNamed) {
 // A step that gives up ends the session with what was done, a sentence and no success.
 TEST(Trouble, AStepThatDoesNotFinishIsSaid) {
   Stage stage(16.0);
-  nlohmann::json step = drill_at(0, 0, "expert");
-  step["push_n"] = 1.0;   // through dense bone in hours
+  // So blunt and slow a drill advances by a millimetre or two while it is waited for.
+  nlohmann::json step = drill_at(0, 0, "rig");
+  step["to_mm"] = 29.0;
+  step["feed_mm_per_s"] = 20.0;
+  step["spindle_rpm"] = 100.0;
   step["wear"] = 5.0;
   Process haptic = stage.start_haptic("soft", {{"steps", nlohmann::json::array({step})}});
   const auto code = haptic.wait(120s);
   ASSERT_TRUE(code);
-  expect_one_sentence({*code, false, haptic.out(), haptic.err()}, "osteon-haptic", {"step 1 (drill) did not finish", "push_n"});
-  const auto summary = read_json(stage / "soft.json");
+  expect_one_sentence({*code, false, haptic.out(), haptic.err()}, "osteon-haptic", {"step 1 (drill) did not finish", "feed_mm_per_s"});
+  auto summary = read_json(stage / "soft.json");
   EXPECT_EQ(summary["steps"][0]["completed"], false);
-  EXPECT_EQ(summary["steps"][0]["gave_up_in"], "push");
+  EXPECT_EQ(summary["steps"][0]["gave_up_in"], "feed");
+  EXPECT_EQ(summary["steps"][0]["asked_mm"], 29.0);
+  EXPECT_LT(summary["steps"][0]["deepest_mm"].get<double>(), 5.0);  // the near cortex
   EXPECT_NE(haptic.out().find("0 of 1 steps done"), std::string::npos) << haptic.out();
+}
+
+// What it has just measured goes into what it says: here it was stopped in the middle of it.
+TEST(Trouble, ACheckThatMissedTicksDoesNotSayThatNothingIsLacking) {
+  Process check(program("osteon-haptic"), {"check", "--seconds", "2"});
+  std::this_thread::sleep_for(1s);
+  ASSERT_TRUE(check.running());
+  check.signal(SIGSTOP);
+  std::this_thread::sleep_for(100ms);
+  check.signal(SIGCONT);
+  EXPECT_EQ(check.wait(20s), 1);
+  EXPECT_EQ(check.out().find(" 0 missed"), std::string::npos) << check.out();
+  EXPECT_EQ(check.out().find("lacks nothing"), std::string::npos) << check.out();
 }
 
 TEST(Trouble, ADeviceThatIsNotThereIsNamed) {
@@ -260,7 +278,7 @@ void expect_all_notice(int signal) {
     expect_one_sentence({*code, false, process->out(), process->err()}, name, {});
   }
   // What was done until then is told all the same.
-  const auto summary = read_json(stage / "work.json");
+  auto summary = read_json(stage / "work.json");
   ASSERT_TRUE(summary.is_object());
   EXPECT_TRUE(summary["lost"].is_string()) << summary["lost"];
   EXPECT_EQ(summary["steps"][0]["completed"], false);
@@ -291,7 +309,7 @@ TEST(Trouble, AHapticClientStopsCleanlyInTheMiddleOfWork) {
   EXPECT_EQ(haptic.terminate(), 0);
   // What it had cut is in the bone, and its own record agrees with the server's.
   EXPECT_EQ(stage.server().terminate(), 0);
-  const auto work = read_json(stage / "work.json");
+  auto work = read_json(stage / "work.json");
   EXPECT_EQ(work["field_hash"], read_json(stage / "server.json")["field_hash"]);
   EXPECT_EQ(work["stopped"], true);
   EXPECT_EQ(work["lost"], nullptr);
