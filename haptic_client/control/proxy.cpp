@@ -673,10 +673,9 @@ bool Proxy::near_bone(const Tick& tick) noexcept {
 void Proxy::note_pushed_back(ProxyStep& report) noexcept {
   const double work_mj = report.cutting_force_n.dot(report.moved_mm);
   if (work_mj >= 0.0) return;
-  // The coupling's spring has paid for no cutting in this tick: it rubbed.
   report.pushed_back_mj = -work_mj;
   report.cutting = report.heel_contact = false;
-  report.feed_mm_per_s = report.torque_nmm = report.across_n = report.cutting_work_mj = 0.0;
+  report.across_n = 0.0;
   report.out_of_range = 0;
   report.cutting_force_n.setZero();
   cut_moment_nmm_.setZero();

@@ -40,8 +40,9 @@ struct ProxyStep {
   unsigned out_of_range = 0;   // bits: outside of which of its limits the law was used
   Vec3 cutting_force_n = Vec3::Zero();  // of the tool on the bone
   double cutting_work_mj = 0;  // of the law's force over the way cut in this tick, its parts added; never negative
-  // What turned the tool pushed it back by more than it then cut, and the force of that cut would have done this work: such a
-  // tick counts as rubbing, without force, torque, feed and work. Zero in every other.
+  // Turning cuts nothing: what turned the tool pushed it back by more than it then cut, and the force of that cut would have
+  // done this work on the tool. As a whole such a tick is rubbing, without force, though what was cut in it took its work,
+  // torque and feed. Zero in every other.
   double pushed_back_mj = 0;
   // What was being cut ended in this tick or with the one before: the tool has stopped there, its coupling still
   // stretched; where it goes on is the loop's to say.

@@ -34,10 +34,13 @@ class HandStage {
     work_min_ = std::min(work_min_, report.cutting_force_n.dot(report.moved_mm));
     const bool cuts = report.phase == CuttingPhase::cutting;
     cutting_ += cuts;
-    // A law's force, its work, its torque and its feed belong to the same ticks. A broach is driven by its blows, not by a force.
+    // What cuts has a force; what was cut took work, torque and feed, all or none, also in a tick whose turning pushed the tool
+    // back by more than that. A broach is driven by its blows, not by a force.
+    const bool worked = report.cutting_work_mj > 0.0;
+    pushed_ += worked && !cuts;
     if (loop_.tool(0).tool.kind != ToolKind::broach)
-      disagree_ += cuts != (report.cutting_force_n.norm() > 0.0) || cuts != (report.cutting_work_mj > 0.0) ||
-                   cuts != (report.feed_mm_per_s > 0.0) || cuts != (report.torque_nmm > 0.0);
+      disagree_ += cuts != (report.cutting_force_n.norm() > 0.0) || (cuts && !worked) ||
+                   worked != (report.feed_mm_per_s > 0.0) || worked != (report.torque_nmm > 0.0);
     touching_ += report.phase == CuttingPhase::rubbing;
     CutPiece piece;
     while (loop_.take_piece(piece)) {
@@ -72,7 +75,7 @@ class HandStage {
   LoopInput input_;
   double force_n_ = 0, torque_nmm_ = 0, work_min_ = 0;
   std::int64_t allocations_ = 0, ticks_ = 0;
-  int cutting_ = 0, touching_ = 0, disagree_ = 0;
+  int cutting_ = 0, touching_ = 0, disagree_ = 0, pushed_ = 0;
   std::uint64_t seq_ = 0;
 };
 
@@ -114,8 +117,8 @@ TEST(HandTools, EveryToolThatCutsTakesBone) {
     const LoopReport pushed = stage.lead({0, 0, 2.0}, 2.0);
     const LoopReport back = stage.lead({0, 0, -3.5}, 0.7);
     const double removed = stage.replica_.removed_mm3() - before;
-    std::printf("  %-20s cut for %4d of 2700 ticks, %8.2f mm3, at most %6.1f N and %8.1f N mm, %.2f mm deep\n", tool.name.c_str(),
-                stage.cutting_, removed, stage.force_n_, stage.torque_nmm_,
+    std::printf("  %-20s cut for %4d of 2700 ticks, pushed back in %3d, %8.2f mm3, at most %6.1f N, %8.1f N mm, %.2f mm deep\n",
+                tool.name.c_str(), stage.cutting_, stage.pushed_, removed, stage.force_n_, stage.torque_nmm_,
                 pushed.pose_bone_proxy.position_mm.z() - held(tool).position_mm.z() - 0.4);
     // A broach moves in its blows only: one a second, of some 5 ms.
     if (tool.kind == ToolKind::broach) {
@@ -128,6 +131,10 @@ TEST(HandTools, EveryToolThatCutsTakesBone) {
     EXPECT_GT(stage.force_n_, 0.05) << tool.name;
     EXPECT_GE(stage.work_min_, 0.0) << tool.name;
     EXPECT_EQ(stage.disagree_, 0) << tool.name;
+    // A thin bur's shank soon lies on the bone: the bur digs in, its turning back to the hand's lifts it, and so on.
+    const bool lies = held(tool).rotation.angularDistance(Eigen::Quaterniond::Identity()) > 0.1 && tool.shank_diameter_mm > 0.0 &&
+                      0.5 * (tool.diameter_mm - tool.shank_diameter_mm) < 1.0;
+    EXPECT_LE(stage.pushed_, (lies ? 1.0 : 0.1) * stage.cutting_) << tool.name;
     EXPECT_EQ(stage.allocations_, 0) << tool.name;
     // Drawn back it is free: nothing jams in what it has made.
     EXPECT_EQ(back.force_physical_n.norm(), 0.0) << tool.name;
@@ -135,6 +142,65 @@ TEST(HandTools, EveryToolThatCutsTakesBone) {
     ++tried;
   }
   EXPECT_GE(tried, 21);
+}
+
+// A bur in its groove that a hand rocks hard, by 9 degrees 1.5 times a second: turning cuts nothing and lifts it out, its
+// coupling cuts it in again. Where a tick does more of the first it rubs; but what was cut in it took its work.
+TEST(HandTools, ARockedBurIsPushedBackAndCutsAgain) {
+  const Tool bur = *find_tool("burr-round-3.2");
+  const Case bone = block(0.5, 40.0, 12.0);
+  const ToolModel model(bur, bone.pitch_mm());
+  Replica replica(bone, BodyId{});
+  PatchBuilder builder;
+  Patch patch;
+  Proxy proxy;
+  CutRecorder recorder;
+  const Pose start = held(bur);
+  proxy.place(start);
+  std::uint64_t cuts = 0;
+  int cutting = 0, pushed = 0;
+  double work_mj = 0, pushed_mj = 0;
+  for (int i = 0; i < 6000; ++i) {
+    if (i % 12 == 0) {
+      for (const ChangedLeaves& change : replica.take_changes()) builder.changed(bone.pitch_mm(), change.level, change.origins);
+      builder.build(replica.predicted(), model, proxy.pose(), patch);
+      patch.own_cuts = replica.last_own();
+    }
+    const double t = 1e-3 * i, rock = 0.15 * std::sin(2.0 * std::numbers::pi * 1.5 * t);
+    const Pose device{start.position_mm + Vec3(0, 0.5 * t, std::min(2.0, t)),
+                      Eigen::AngleAxisd(rock, Vec3(0.3, 1.0, 0.2).normalized()) * start.rotation};
+    const ProxyStep step = proxy.step(model, patch, device, bur.spindle_rpm, 50.0, true, 1e-3);
+    ASSERT_TRUE(step.covered);
+    cutting += step.cutting;
+    work_mj += step.cutting_work_mj;
+    if (step.pushed_back_mj > 0.0) {
+      ++pushed;
+      pushed_mj += step.pushed_back_mj;
+      EXPECT_FALSE(step.cutting);
+      EXPECT_TRUE(step.contact);
+      EXPECT_EQ(step.cutting_force_n.norm() + step.across_n, 0.0);
+      EXPECT_GT(step.cutting_work_mj, 0.0);
+      EXPECT_GT(step.torque_nmm, 0.0);
+    }
+    if (!recorder.recording()) {
+      if (step.near_bone && proxy.begin_sweep(model)) recorder.begin(proxy.cut_pose(), bur.cutting_length_mm);
+      continue;
+    }
+    recorder.add(proxy.cut_pose());
+    CutPiece piece;
+    if (!recorder.due() || !recorder.close(piece)) continue;
+    piece.author_seq = ++cuts;
+    proxy.closed(model, cuts);
+    const Cut cut = cut_of(piece, model, AuthorId{1}, 0);
+    replica.add_own(cut);
+    replica.commit(RoomSeq{cuts}, cut, true);
+  }
+  std::printf("  rocked bur: %d ticks cut, %d pushed it back; %.3g mJ beside %.3g mJ of cutting\n", cutting, pushed, pushed_mj,
+              work_mj);
+  EXPECT_GT(cutting, 1000);
+  EXPECT_GT(pushed, 0);
+  EXPECT_LT(pushed, cutting);
+  EXPECT_LT(pushed_mj, 0.5 * work_mj);
 }
 
 TEST(HandTools, WhatDoesNotCutOnlyTouches) {
@@ -191,8 +257,8 @@ TEST(OwnHole, DoesNotJamAtAnyAngle) {
       spindle_nmm = std::max(spindle_nmm, tick.report.torque_nmm);
       turning_nmm = std::max(turning_nmm, tick.report.torque_physical_nmm.norm());
     });
-    std::printf("  own hole at %2.0f degrees: %.2f mm deep, at most %.3f N and %.3f N mm on the way out\n", degrees, deepest, out_n,
-                turning_nmm);
+    std::printf("  own hole at %2.0f degrees: %.2f mm deep, at most %.3f N and %.3f N mm on the way out\n", degrees, deepest,
+                out_n, turning_nmm);
     EXPECT_TRUE(bench.session().surgeon().results()[0].completed) << degrees;
     EXPECT_GE(deepest, 9.0) << degrees;
     EXPECT_LT(out_n, 0.5) << degrees;
