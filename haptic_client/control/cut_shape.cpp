@@ -2,10 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 namespace osteon::haptic {
 namespace {
+
+// Registers that every processor has.
+constexpr std::size_t kRow = 4;
+typedef float Row __attribute__((vector_size(kRow * 4)));
+typedef std::int32_t RowInt __attribute__((vector_size(kRow * 4)));
+Row load(const float* from) {
+  Row row;
+  std::memcpy(&row, from, sizeof row);
+  return row;
+}
+void store(float* to, const Row& row) { std::memcpy(to, &row, sizeof row); }
 
 double sampled_mm(const SampledDistance& mesh, const Vec3& p) noexcept {
   const double pitch = mesh.pitch * kQuantum_mm;
@@ -66,6 +78,11 @@ CutShape::CutShape(const Tool& tool, bool open_behind) : open_behind_(open_behin
     const Vec3 n = Vec3(plane.normal[0], plane.normal[1], plane.normal[2]).normalized();
     if (!(open_behind && n.z() < -kSideways)) add(n, kQuantum_mm * plane.offset);
   }
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
+    const Plane& plane = planes_[i];
+    faces_[i] = {static_cast<float>(plane.n.x()), static_cast<float>(plane.n.y()), static_cast<float>(plane.n.z()),
+                 static_cast<float>(plane.offset_mm)};
+  }
 }
 
 double CutShape::distance_mm(const Vec3& p, Vec3& out) const noexcept {
@@ -103,6 +120,56 @@ double CutShape::distance_mm(const Vec3& p, Vec3& out) const noexcept {
   if (turned)
     out = r > 0.0 ? Vec3(normal.x() * p.x() / r, normal.x() * p.y() / r, normal.z()) : Vec3(normal.x(), 0.0, normal.z());
   return distance;
+}
+
+void CutShape::distance_mm(const Lanes (&p)[3], Lanes& distance, Lanes (&out)[3]) const noexcept {
+  const bool turned = kind_ == CutKind::turned;
+  if (!turned && kind_ != CutKind::hull) {
+    for (std::size_t i = 0; i < kGroupPoints; ++i) {
+      Vec3 way;
+      distance[i] = static_cast<float>(std::min(distance_mm(Vec3(p[0][i], p[1][i], p[2][i]), way), double{kLeftOut_mm}));
+      for (int k = 0; k < 3; ++k) out[k][i] = static_cast<float>(way[k]);
+    }
+    return;
+  }
+  Lanes x = p[0], y = p[1];
+  if (turned)
+    for (std::size_t i = 0; i < kGroupPoints; ++i) {
+      x[i] = std::sqrt(p[0][i] * p[0][i] + p[1][i] * p[1][i]);
+      y[i] = 0.0f;
+    }
+  for (std::size_t i = 0; i < kGroupPoints; i += kRow) {
+    const Row px = load(&x[i]), py = load(&y[i]), pz = load(&p[2][i]);
+    Row farthest = Row{} + std::numeric_limits<float>::lowest();
+    RowInt nearest{};
+    for (int plane = 0; plane < count_; ++plane) {
+      const std::array<float, 4>& face = faces_[static_cast<std::size_t>(plane)];
+      const Row to_plane = ((px * face[0] + py * face[1]) + pz * face[2]) - face[3];
+      const RowInt farther = to_plane > farthest;
+      farthest = farther ? to_plane : farthest;
+      nearest = farther ? RowInt{} + plane : nearest;
+    }
+    store(&distance[i], farthest);
+    for (std::size_t lane = 0; lane < kRow; ++lane) {
+      const std::array<float, 4>& face = faces_[static_cast<std::size_t>(nearest[lane])];
+      for (std::size_t k = 0; k < 3; ++k) out[k][i + lane] = face[k];
+    }
+  }
+  if (!turned) return;
+  const float dome = static_cast<float>(radius_mm_);
+  if (dome > 0.0f)
+    for (std::size_t i = 0; i < kGroupPoints; ++i) {
+      const float up = p[2][i] + dome, length = std::sqrt(x[i] * x[i] + up * up), to_dome = length - dome;
+      const bool farther = up > 0.0f && to_dome > distance[i];
+      distance[i] = farther ? to_dome : distance[i];
+      out[0][i] = farther ? x[i] / length : out[0][i];
+      out[2][i] = farther ? up / length : out[2][i];
+    }
+  for (std::size_t i = 0; i < kGroupPoints; ++i) {
+    const float across = out[0][i], r = x[i];
+    out[0][i] = r > 0.0f ? across * p[0][i] / r : across;
+    out[1][i] = r > 0.0f ? across * p[1][i] / r : 0.0f;
+  }
 }
 
 }  // namespace osteon::haptic

@@ -51,9 +51,11 @@ struct MotionLimits {
   const Vec3* across = nullptr;  // moves stay square to this unit vector
 };
 
-// Least squares of move and arm · turn against the wanted motion, over the conditions that it breaks (Hildreth's dual
-// method, the worst condition first). `held`: some condition kept the motion from being the wanted one. Where conditions
-// contradict each other the result breaks some of them; the caller looks. Pure, no allocation.
+// Least squares of move and arm · turn against the wanted motion, over the conditions (the dual method of D. Goldfarb and
+// A. Idnani, Mathematical Programming 27, 1983). `held`: some condition kept the motion from being the wanted one. Where
+// conditions that ask for more than to stand still contradict each other, or would push out farther than what is wanted
+// goes, they only forbid to go deeper. Bounded work; a result that was not found in time may break some, the caller looks.
+// Pure, no allocation. [haptic]
 [[nodiscard]] Motion least_motion(const Motion& wanted, const Conditions& conditions, const MotionLimits& limits,
                                   bool& held) noexcept;
 

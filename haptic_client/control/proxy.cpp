@@ -15,6 +15,7 @@ namespace {
 constexpr double kMostTravel_mm = 2.0;
 constexpr int kMostSubSteps = 24;      // of what is cut
 constexpr int kMostTravelSteps = 10;   // of what is not
+constexpr int kMostTries = 12;         // places tried in a tick; a tool that is wedged gets there a little later
 constexpr double kNothing_mm = 1e-6;
 // A point may be so deep in bone without being inside: what a step's own linearity leaves, far below what a hand feels.
 constexpr double kSkin_mm = 1e-4;
@@ -59,8 +60,14 @@ Pose with_play(const Pose& hole, const Pose& tool, double arm_mm, double play_mm
   return {tip, (Eigen::Quaterniond::FromTwoVectors(axis, along) * tool.rotation).normalized()};
 }
 
-Pose halfway(const Pose& a, const Pose& b) noexcept {
-  return {0.5 * (a.position_mm + b.position_mm), a.rotation.slerp(0.5, b.rotation)};
+// A group's points, taken out of the tool along their normals. Tool frame.
+void places_of(const ContactSet& set, int group, float lift_mm, Lanes (&p)[3]) noexcept {
+  const auto from = static_cast<std::size_t>(group * kGroupPoints);
+  for (std::size_t i = 0; i < kGroupPoints; ++i) {
+    p[0][i] = set.x[from + i] + lift_mm * set.nx[from + i];
+    p[1][i] = set.y[from + i] + lift_mm * set.ny[from + i];
+    p[2][i] = set.z[from + i] + lift_mm * set.nz[from + i];
+  }
 }
 
 }  // namespace
@@ -80,41 +87,23 @@ void Proxy::place(const Pose& pose_bone_tool) noexcept {
   skive_to_mm_.setZero();
 }
 
-void Proxy::Sweep::reach(const Pose& pose) noexcept {
-  to = pose;
-  pose_to_bone = to.inverse();
-  if (!shape->open_behind()) pose_middle_bone = halfway(from, to).inverse();
+void Proxy::see_sweeps(const ToolModel& model, const Pose& pose) noexcept {
+  const double short_mm = 0.5 * model.inset;
+  for (int s = 0; s < sweep_count_; ++s)
+    views_[static_cast<std::size_t>(s)] = SweepView(sweeps_[static_cast<std::size_t>(s)], pose, short_mm);
 }
 
-double Proxy::Sweep::left_mm(const Vec3& p, Vec3& out) const noexcept {
-  if (shape->is_ball()) {
-    const Vec3 a = from.point(shape->ball_centre_mm()), ab = to.point(shape->ball_centre_mm()) - a;
-    const double length2 = ab.squaredNorm(), t = length2 > 0.0 ? std::clamp((p - a).dot(ab) / length2, 0.0, 1.0) : 0.0;
-    const Vec3 off = a + t * ab - p;
-    const double distance = off.norm();
-    out = distance > 0.0 ? Vec3(off / distance) : Vec3(Vec3::Zero());
-    return shape->radius_mm() - distance;
-  }
-  double distance = shape->distance_mm(pose_to_bone.point(p), out);
-  out = -to.direction(out);
-  if (shape->open_behind()) {
-    // The hole before it began is older: that tool may have stood elsewhere in its play.
-    const Vec3 axis = to.direction(Vec3::UnitZ());
-    const double ahead = (p - from.position_mm).dot(axis) + shape->behind_mm();
-    if (ahead < -distance) {
-      out = axis;
-      return ahead;
+void Proxy::swept(const Lanes (&p)[3], Lanes& left, Lanes (&out)[3]) const noexcept {
+  views_[0].left_mm(p, left, out);
+  for (int s = 1; s < sweep_count_; ++s) {
+    Lanes there, way[3];
+    views_[static_cast<std::size_t>(s)].left_mm(p, there, way);
+    for (std::size_t i = 0; i < kGroupPoints; ++i) {
+      const bool more = there[i] > left[i];
+      left[i] = more ? there[i] : left[i];
+      for (int k = 0; k < 3; ++k) out[k][i] = more ? way[k][i] : out[k][i];
     }
-    return -distance;
   }
-  for (const Pose* other : {&pose_middle_bone, &pose_from_bone}) {
-    Vec3 way;
-    const double there = shape->distance_mm(other->point(p), way);
-    if (there >= distance) continue;
-    distance = there;
-    out = -(other->rotation.conjugate() * way);
-  }
-  return -distance;
 }
 
 bool Proxy::begin_sweep(const ToolModel& model) noexcept {
@@ -126,7 +115,6 @@ bool Proxy::begin_sweep(const ToolModel& model) noexcept {
   sweep.own_cut = 0;
   sweep.open = true;
   sweep.from = cut_pose_;
-  sweep.pose_from_bone = sweep.pose_middle_bone = cut_pose_.inverse();
   sweep.reach(cut_pose_);
   return true;
 }
@@ -171,7 +159,7 @@ void Proxy::forget_contained(const Patch& patch) noexcept {
   sweep_count_ = kept;
 }
 
-void Proxy::look(const Tick& tick, const Pose& pose, Against against, Sight& sight) const noexcept {
+void Proxy::look(const Tick& tick, const Pose& pose, Against against, Sight& sight) noexcept {
   const ToolModel& model = tick.model;
   const ContactSet& set = model.contact;
   ContactValues& values = sight.values;
@@ -201,28 +189,26 @@ void Proxy::look(const Tick& tick, const Pose& pose, Against against, Sight& sig
   }
   // What was cut since the patch was built is gone.
   const float near_mm = static_cast<float>(0.75 * model.fine_pitch_mm);
+  if (sweep_count_ > 0) see_sweeps(model, pose);
+  const Eigen::Matrix3f rotation = pose.rotation.toRotationMatrix().cast<float>();
   for (int group = first; group < groups; ++group) {
     float& nearest = values.nearest_mm[static_cast<std::size_t>(group)];
     if (sweep_count_ > 0 && nearest < near_mm) {
+      Lanes p[3], left, out[3];
+      places_of(set, group, group < set.active_groups ? static_cast<float>(tick.lift_mm) : 0.0f, p);
+      swept(p, left, out);
       nearest = kLeftOut_mm;
-      for (int i = group * kGroupPoints; i < (group + 1) * kGroupPoints; ++i) {
-        const auto at = static_cast<std::size_t>(i);
+      for (std::size_t i = 0; i < kGroupPoints; ++i) {
+        const std::size_t at = static_cast<std::size_t>(group * kGroupPoints) + i;
         float& distance = values.distance_mm[at];
-        if (distance < near_mm && is_real(model, i)) {
-          const ContactPoint& point = point_at(model, i);
-          const Vec3 p =
-              pose.point(group < set.active_groups ? Vec3(point.inset_mm + tick.lift_mm * point.outward) : point.inset_mm);
-          Vec3 out;
-          for (int s = 0; s < sweep_count_; ++s) {
-            const auto left = static_cast<float>(sweeps_[static_cast<std::size_t>(s)].left_mm(p, out));
-            if (left <= distance) continue;
-            distance = left;
-            values.gx[at] = static_cast<float>(out.x());
-            values.gy[at] = static_cast<float>(out.y());
-            values.gz[at] = static_cast<float>(out.z());
-          }
-        } else if (!is_real(model, i)) {
+        if (!is_real(model, static_cast<int>(at))) {
           distance = kLeftOut_mm;
+        } else if (distance < near_mm && left[i] > distance) {
+          distance = left[i];
+          const Eigen::Vector3f way = rotation * Eigen::Vector3f(out[0][i], out[1][i], out[2][i]);
+          values.gx[at] = way.x();
+          values.gy[at] = way.y();
+          values.gz[at] = way.z();
         }
         nearest = std::min(nearest, distance);
       }
@@ -330,17 +316,18 @@ double Proxy::safe_part(const Tick& tick, const Motion& motion, Against against)
 
 Motion Proxy::allowed(const Tick& tick, const Motion& piece, Against against, const MotionLimits& limits,
                       ProxyStep& report) noexcept {
-  constexpr int kMostTries = 7, kMostSolved = 4;
+  constexpr int kMostHere = 7, kMostSolved = 4;
   const double most_mm = 1.5 * norm_mm(piece, limits.arm_mm) + 1e-3;
   bool held = false;
   conditions_->clear();
   add_conditions(tick, here_, pose_, Motion{}, 1.25 * tick.model.fine_pitch_mm, false);
   Motion motion = least_motion(piece, *conditions_, limits, held);
-  for (int attempt = 1; attempt <= kMostTries; ++attempt) {
+  for (int attempt = 1; attempt <= kMostHere; ++attempt) {
     const double length_mm = norm_mm(motion, limits.arm_mm);
     if (length_mm > most_mm) motion = (most_mm / length_mm) * motion;
     if (!(length_mm > 1e-9)) break;
     const Pose there = moved(pose_, motion);
+    ++tries_;
     look(tick, there, against, there_);
     if (!there_.values.covered) return {};  // not known there: the tool waits for its patch
     const int before = conditions_->count();
@@ -362,7 +349,7 @@ Motion Proxy::allowed(const Tick& tick, const Motion& piece, Against against, co
 
 void Proxy::travel(const Tick& tick, const Pose& wanted, const Vec3* across, bool move_too, ProxyStep& report) noexcept {
   const MotionLimits limits{.arm_mm = kTurnArm_mm, .may_turn = true, .across = across};
-  for (int i = 0; i < kMostTravelSteps; ++i) {
+  for (int i = 0; i < kMostTravelSteps && tries_ < kMostTries; ++i) {
     Motion left = between(pose_, wanted);
     if (!move_too) left.move_mm.setZero();
     if (across) left.move_mm -= left.move_mm.dot(*across) * *across;
@@ -407,23 +394,30 @@ Proxy::Engagement Proxy::engagement(const Tick& tick, const Vec3& direction) noe
   if (sweep_count_ > 0 && sums.engaged_mm2 > 0.0) {
     const Vec3 toward = pose_.rotation.conjugate() * direction;
     bool any = false;
+    see_sweeps(model, pose_);
     for (int group = 0; group < set.active_groups; ++group) {
       if (values.nearest_mm[static_cast<std::size_t>(group)] >= 0.0f) continue;
+      Lanes probe[3], left, out[3];
+      places_of(set, group, static_cast<float>(query.lift_mm), probe);
+      for (std::size_t i = 0; i < kGroupPoints; ++i) {
+        const std::size_t p = static_cast<std::size_t>(group * kGroupPoints) + i;
+        if (values.distance_mm[p] >= 0.0f) continue;
+        const double facing = model.active[std::min(p, model.active.size() - 1)].outward.dot(toward);
+        const double reach_mm = std::min(query.ahead_mm / facing, query.most_mm);
+        for (int k = 0; k < 3; ++k) probe[k][i] += static_cast<float>(reach_mm * toward[k]);
+      }
+      swept(probe, left, out);
       for (int i = group * kGroupPoints; i < (group + 1) * kGroupPoints; ++i) {
         const auto p = static_cast<std::size_t>(i);
         if (values.distance_mm[p] >= 0.0f || !is_real(model, i)) continue;
+        const float left_mm = left[p % kGroupPoints];
+        if (left_mm < 0.0f) continue;
         const ContactPoint& point = model.active[p];
         const double facing = point.outward.dot(toward);
         const Vec3 tool_mm = point.inset_mm + query.lift_mm * point.outward;
-        const Vec3 probe = pose_.point(tool_mm) + std::min(query.ahead_mm / facing, query.most_mm) * direction;
-        double left_mm = -1.0;
-        Vec3 out;
-        for (int s = 0; s < sweep_count_ && left_mm < 0.0; ++s)
-          left_mm = sweeps_[static_cast<std::size_t>(s)].left_mm(probe, out);
-        if (left_mm < 0.0) continue;
         // Gone since the patch was built: it does not count.
         any = true;
-        values.distance_mm[p] = static_cast<float>(left_mm);
+        values.distance_mm[p] = left_mm;
         const double area = point.area_mm2 * facing, density = static_cast<double>(values.density_g_cm3[p]),
                      arm = static_cast<double>(set.arm_mm[p]);
         const double step = std::min(density, kMostDensity_g_cm3) * (kDensitySteps / kMostDensity_g_cm3);
@@ -499,13 +493,13 @@ void Proxy::note_slope(const Tick& tick, const Vec3& direction, double extension
     skive_to_mm_ = aside / aside.norm() * std::min(kMostSkive_mm, (std::min(slope, kSteepest) - kBite) * extension_mm);
 }
 
-void Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm, ProxyStep& report) noexcept {
+bool Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm, ProxyStep& report) noexcept {
   const ToolModel& model = tick.model;
   const bool walls = walls_meet_bone(model);
   const Against against = walls ? Against::cutting : Against::scene;
   const MotionLimits limits{.arm_mm = kTurnArm_mm, .may_turn = false};
-  if (walls || tick.scene) look(tick, pose_, against, here_);
   const double least_mm = 0.25 * model.fine_pitch_mm;
+  bool seen = false;
   double extension_mm = distance_mm;
   double free_mm = std::min(distance_mm, kMostTravel_mm);
   double left_s = tick.dt_s;
@@ -543,6 +537,8 @@ void Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm,
     // Walls and the scene block even where the cutting part goes on.
     bool blocked = false;
     if (walls || tick.scene) {
+      if (!seen) look(tick, pose_, against, here_);
+      seen = true;
       Motion piece;
       piece.move_mm = step_mm * direction;
       const double part = engaged ? 1.0 : safe_part(tick, piece, against);
@@ -569,6 +565,7 @@ void Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm,
     if (blocked) break;
   }
   report.feed_mm_per_s = cut_mm / tick.dt_s;
+  return seen;
 }
 
 void Proxy::cut_towards(Tick& tick, const Pose& wanted, ProxyStep& report) noexcept {
@@ -602,8 +599,10 @@ void Proxy::cut_towards(Tick& tick, const Pose& wanted, ProxyStep& report) noexc
   }
   // What turns it, and of a blade what moves it across its flat, only goes as far as bone lets it. Its path takes what its
   // faces reach, so here the faces themselves block, not the points a little within: else it would creep on through bone.
-  tick.lift_mm = model.inset;
-  look(tick, pose_, Against::all, here_);
+  if (!(tick.lift_mm > 0.0)) {
+    tick.lift_mm = model.inset;
+    look(tick, pose_, Against::all, here_);
+  }
   Pose turned{pose_.position_mm, wanted.rotation};
   Vec3 away_mm = wanted.position_mm - pose_.position_mm;
   const bool blade = model.feed == Feeding::in_plane;
@@ -618,10 +617,10 @@ void Proxy::cut_towards(Tick& tick, const Pose& wanted, ProxyStep& report) noexc
     away_mm -= away_mm.dot(flat) * flat;
   }
   const double distance_mm = away_mm.norm();
-  if (distance_mm > kNothing_mm) advance(tick, away_mm / distance_mm, distance_mm, report);
+  const bool went = distance_mm > kNothing_mm && advance(tick, away_mm / distance_mm, distance_mm, report);
   if (report.cutting || report.breakthrough) return;
   // It rubs: along the surface it goes where it is led.
-  look(tick, pose_, Against::all, here_);
+  if (went) look(tick, pose_, Against::all, here_);
   travel(tick, wanted, nullptr, true, report);
 }
 
@@ -655,16 +654,16 @@ bool Proxy::near_bone(const Tick& tick) noexcept {
   query.lift_mm = model.inset;
   ContactValues& values = ahead_.values;
   evaluate_contact(tick.patch, model.contact, query, values);
+  see_sweeps(model, pose_);
   for (int group = 0; group < model.contact.active_groups; ++group) {
     if (values.nearest_mm[static_cast<std::size_t>(group)] >= near_mm) continue;
     if (sweep_count_ == 0) return true;
-    for (int i = group * kGroupPoints; i < (group + 1) * kGroupPoints; ++i) {
-      if (values.distance_mm[static_cast<std::size_t>(i)] >= near_mm || !is_real(model, i)) continue;
-      const Vec3 p = pose_.point(model.active[static_cast<std::size_t>(i)].surface_mm);
-      double left_mm = -1e9;
-      Vec3 out;
-      for (int s = 0; s < sweep_count_; ++s) left_mm = std::max(left_mm, sweeps_[static_cast<std::size_t>(s)].left_mm(p, out));
-      if (left_mm < static_cast<double>(near_mm)) return true;
+    Lanes p[3], left, out[3];
+    places_of(model.contact, group, static_cast<float>(model.inset), p);
+    swept(p, left, out);
+    for (std::size_t i = 0; i < kGroupPoints; ++i) {
+      const std::size_t at = static_cast<std::size_t>(group * kGroupPoints) + i;
+      if (is_real(model, static_cast<int>(at)) && std::max(values.distance_mm[at], left[i]) < near_mm) return true;
     }
   }
   return false;
@@ -684,11 +683,19 @@ void Proxy::note_pushed_back(ProxyStep& report) noexcept {
 ProxyStep Proxy::step(const ToolModel& model, const Patch& patch, const Pose& pose_bone_device, double spindle_rpm,
                       double stiffness_n_per_mm, bool may_cut, double dt_s, const Surroundings& around) noexcept {
   ProxyStep report;
+  tries_ = 0;
   forget_contained(patch);
   Tick tick{model, patch, around, stiffness_n_per_mm, spindle_rpm, false, dt_s};
   for (const PlacedGuide& item : around.items) tick.scene |= item.solid && !(item.id != 0 && item.id == around.guide);
 
+  // A tool that cuts wherever it is led is asked for by its faces. Where those are not deep, what is within them is neither.
+  const bool turns = may_cut && model.feed != Feeding::none && spindle_rpm >= kMinCuttingRpm;
+  tick.lift_mm = turns && model.feed != Feeding::along && !returned_ ? model.inset : 0.0;
   look(tick, pose_, Against::all, here_);
+  if (tick.lift_mm > 0.0 && static_cast<double>(here_.deepest_in_bone_mm) < tick.lift_mm - model.fine_pitch_mm) {
+    tick.lift_mm = 0.0;
+    look(tick, pose_, Against::all, here_);
+  }
   if (!here_.values.covered) {
     report.covered = false;
     return report;
@@ -698,7 +705,7 @@ ProxyStep Proxy::step(const ToolModel& model, const Patch& patch, const Pose& po
     cut_before_ = false;
     return report;
   }
-  tick.may_cut = report.may_cut = may_cut && !returned_ && model.feed != Feeding::none && spindle_rpm >= kMinCuttingRpm;
+  tick.may_cut = report.may_cut = turns && !returned_;
   if (tick.may_cut) {
     cut_towards(tick, pose_bone_device, report);
   } else {

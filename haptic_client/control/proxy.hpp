@@ -18,6 +18,7 @@
 #include "haptic_client/control/guiding.hpp"
 #include "haptic_client/control/least_motion.hpp"
 #include "haptic_client/control/patch.hpp"
+#include "haptic_client/control/sweep.hpp"
 #include "haptic_client/control/tool_model.hpp"
 
 namespace osteon::haptic {
@@ -85,19 +86,6 @@ class Proxy {
   [[nodiscard]] const Pose& cut_pose() const noexcept { return cut_pose_; }
 
  private:
-  // What the cutting part has taken away since a patch was built: from one place to another. Of what goes along its axis
-  // the deepest place holds all others from where the sweep began on, and one sweep goes on for as long as it keeps to
-  // its axis.
-  struct Sweep {
-    const CutShape* shape = nullptr;  // of the tool in hand
-    Pose from, to;                    // pose_bone_tool; `to`: the deepest, where that holds all
-    Pose pose_from_bone, pose_middle_bone, pose_to_bone;
-    std::uint64_t own_cut = 0;        // newest cut that holds it all; 0: none yet
-    bool open = false;
-    // f that it leaves at a point, at least, and the way out of bone there.
-    [[nodiscard]] double left_mm(const Vec3& point_mm, Vec3& out) const noexcept;
-    void reach(const Pose& pose) noexcept;
-  };
   // All that a tick works on.
   struct Tick {
     const ToolModel& model;
@@ -128,7 +116,7 @@ class Proxy {
     bool covered = true;
   };
 
-  void look(const Tick& tick, const Pose& pose, Against against, Sight& sight) const noexcept;
+  void look(const Tick& tick, const Pose& pose, Against against, Sight& sight) noexcept;
   void see_scene(const Tick& tick, const Pose& pose, Against against, Sight& sight) const noexcept;
   void add_conditions(const Tick& tick, const Sight& sight, const Pose& pose, const Motion& at, double reach_mm,
                       bool broken_only) noexcept;
@@ -140,8 +128,8 @@ class Proxy {
   void travel(const Tick& tick, const Pose& wanted, const Vec3* across, bool move_too, ProxyStep& report) noexcept;
   [[nodiscard]] Engagement engagement(const Tick& tick, const Vec3& direction) noexcept;
   void note_slope(const Tick& tick, const Vec3& direction, double extension_mm) noexcept;
-  // Goes along a direction, cutting what is in the way as far as the force allows.
-  void advance(const Tick& tick, const Vec3& direction, double distance_mm, ProxyStep& report) noexcept;
+  // Goes along a direction, cutting what is in the way as far as the force allows. True: here_ is another sight now.
+  bool advance(const Tick& tick, const Vec3& direction, double distance_mm, ProxyStep& report) noexcept;
   void cut_towards(Tick& tick, const Pose& wanted, ProxyStep& report) noexcept;
   // Bone that came back, by undo or rejection, where the tool is. True: the tick is over.
   [[nodiscard]] bool bone_returned(const Tick& tick, const Pose& wanted, ProxyStep& report) noexcept;
@@ -149,15 +137,20 @@ class Proxy {
   [[nodiscard]] bool near_bone(const Tick& tick) noexcept;
   void note_pushed_back(ProxyStep& report) noexcept;
   void update_sweep(const ToolModel& model) noexcept;
+  // The sweeps as they are seen from a pose, and what they leave at a group of the tool's points; way out: tool frame.
+  void see_sweeps(const ToolModel& model, const Pose& pose) noexcept;
+  void swept(const Lanes (&p)[3], Lanes& left, Lanes (&out)[3]) const noexcept;
   void forget_contained(const Patch& patch) noexcept;
 
   static constexpr int kMostSweeps = 48;
   Pose pose_, cut_pose_;
   std::array<Sweep, kMostSweeps> sweeps_;
+  std::array<SweepView, kMostSweeps> views_;
   int sweep_count_ = 0;
   bool sweeping_ = false;
   bool cut_before_ = false;  // the last step ended cutting
   bool returned_ = false, locked_ = false;
+  int tries_ = 0;  // in this tick
   Vec3 skive_mm_ = Vec3::Zero();  // how far the point is pushed aside by the slope that it stands on
   Vec3 skive_to_mm_ = Vec3::Zero();
   Vec3 cut_moment_nmm_ = Vec3::Zero();

@@ -42,6 +42,17 @@ PlanStep burring(double window_mm) {
   return step;
 }
 
+// What goes straight in, at the tool's own speed.
+PlanStep pushing(const char* tool) {
+  PlanStep step;
+  step.action = Action::drill;
+  step.tool = tool;
+  step.hand = HandKind::expert;
+  step.entry.point_mm = Vec3(0.1, -0.2, 0);
+  step.entry.axis = Vec3(0, 0, 1);
+  return step;
+}
+
 struct Cost {
   DurationHistogram all, cutting;
 };
@@ -66,6 +77,57 @@ void measure(const char* name, const PlanStep& step, double width_mm, int rounds
       name, static_cast<unsigned long long>(cost->all.count()), name, cost->all.percentile_us(50), name,
       cost->all.percentile_us(99), name, cost->all.max_us(), name, cost->cutting.percentile_us(50), name,
       cost->cutting.percentile_us(99));
+}
+
+// A tool that turns in the cut that it has made while the hand rocks, twists and pulls it from side to side there.
+void measure_wedged(const char* name, const char* tool_name) {
+  constexpr int kRest = 600, kIn = 2500, kTicks = 6000;
+  const Tool tool = *find_tool(tool_name);
+  Replica replica(block_case(24.0), BodyId{});
+  HapticLoop loop(LoopParams{}, {ToolModel(tool, 0.5)});
+  PatchBuilder builder;
+  Patch patch;
+  LoopInput input;
+  const Pose start{{0.1, -0.2, -1.0}, Eigen::Quaterniond::Identity()};
+  Pose proxy = start, kept = start;
+  input.pose_device_tool = start;
+  input.spindle_rpm = tool.spindle_rpm;
+  loop.take_up(0, start, WorkspaceMapping{});
+  auto cost = std::make_unique<Cost>();
+  std::uint64_t room_seq = 0;
+  for (int i = 0; i < kRest + kIn + kTicks; ++i) {
+    if (i % 12 == 0) {
+      for (const ChangedLeaves& change : replica.take_changes()) builder.changed(0.5, change.level, change.origins);
+      builder.build(replica.predicted(), loop.tool(0), proxy, patch);
+      patch.own_cuts = replica.last_own();
+    }
+    if (const int in = i - kRest; in >= 0 && in < kIn) {
+      input.pose_device_tool.position_mm.z() = std::min(proxy.position_mm.z() + 0.45, -1.0 + 0.006 * in);
+    } else if (in >= kIn) {
+      const auto turn = [&](double rate, const Vec3& about) {
+        return Eigen::Quaterniond(Eigen::AngleAxisd(0.1 * std::sin(rate * in), about));
+      };
+      input.pose_device_tool.position_mm =
+          kept.position_mm + Vec3(0.5 * std::sin(0.011 * in), 0.6 * std::sin(0.017 * in), 0.3 * std::sin(0.023 * in));
+      input.pose_device_tool.rotation =
+          turn(0.013, Vec3::UnitX()) * turn(0.019, Vec3::UnitY()) * turn(0.029, Vec3::UnitZ());
+    }
+    const auto begin = Clock::now();
+    const LoopReport report = loop.tick(input, patch);
+    const auto took = Clock::now() - begin;
+    proxy = report.pose_bone_proxy;
+    if (i < kRest + kIn) kept = proxy;
+    else cost->all.record(took);
+    CutPiece piece;
+    while (loop.take_piece(piece)) {
+      const Cut cut = cut_of(piece, loop.tool(0), AuthorId{1}, 0);
+      replica.add_own(cut);
+      replica.commit(RoomSeq{++room_seq}, cut, true);
+    }
+  }
+  std::printf("\"%s_ticks\": %llu, \"%s_p50_us\": %.3f, \"%s_p99_us\": %.3f, \"%s_max_us\": %.3f", name,
+              static_cast<unsigned long long>(cost->all.count()), name, cost->all.percentile_us(50), name,
+              cost->all.percentile_us(99), name, cost->all.max_us());
 }
 
 // The client's two threads that matter, and a room that answers after 20 ms or is silent.
@@ -170,6 +232,16 @@ int run(int argc, char** argv) {
     measure("drill", drilling(), 12.0, 2);
     std::printf(", ");
     measure("burr", burring(12.0), 20.0, 2);
+    std::printf(", ");
+    measure("pin", pushing("pin-1"), 16.0, 1);
+    std::printf(", ");
+    measure("saw", pushing("saw-oscillating-1"), 16.0, 1);
+    std::printf(", ");
+    measure("saw_narrow", pushing("saw-oscillating-3"), 16.0, 1);
+    std::printf(", ");
+    measure_wedged("pin_wedged", "pin-1");
+    std::printf(", ");
+    measure_wedged("saw_wedged", "saw-oscillating-1");
     std::printf("}\n");
     return 0;
   }

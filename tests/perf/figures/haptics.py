@@ -51,8 +51,9 @@ def tick(run):
     run.say("cost of the haptic loop's tick")
     out = json.loads(run.output("osteon-loop-bench", "tick"))
     values = {}
-    for work in ("drill", "burr"):
-        p50, p99 = out[f"{work}_cutting_p50_us"], out[f"{work}_cutting_p99_us"]
+    for work in ("drill", "burr", "pin", "saw", "saw_narrow", "pin_wedged", "saw_wedged"):
+        ticks = work if work.endswith("_wedged") else f"{work}_cutting"
+        p50, p99 = out[f"{ticks}_p50_us"], out[f"{ticks}_p99_us"]
         values[f"tick_{work}"] = Measured(p50 / TICK_BUDGET_US, None, None, None, 1)
         values[f"tick_{work}_p50"] = Measured(p50, None, None, None, 1)
         values[f"tick_{work}_p99"] = Measured(p99, None, None, None, 1)

@@ -295,11 +295,19 @@ FIGURES = [
            ("==", 0), full=True),
     Figure("stability_six_torque_largest", "nmm", "the largest torque", "haptic_stability", full=True),
     # The whole tick, and the loop beside a network that falls silent for 10 s.
-    *[figure for work, what in (("drill", "drilling with a 3.2 mm drill"), ("burr", "burring with a 5 mm burr")) for figure in (
+    *[figure for work, what in (
+        ("drill", "drilling with a 3.2 mm drill"), ("burr", "burring with a 5 mm burr"), ("pin", "driving a pin"),
+        ("saw", "sawing with a wide blade"), ("saw_narrow", "sawing with a narrow blade")) for figure in (
         Figure(f"tick_{work}", "of_budget", f"a whole tick of the haptic loop while {what}: median as a part of 60 us", "haptic_tick",
                ("<=", 1.0)),
         Figure(f"tick_{work}_p50", "us", "the same, median", "haptic_tick"),
         Figure(f"tick_{work}_p99", "us", "the same, 99th percentile", "haptic_tick"))],
+    # A hand that rocks, twists and pulls a turning tool from side to side in its own cut.
+    *[figure for tool in ("pin", "saw") for figure in (
+        Figure(f"tick_{tool}_wedged", "of_budget", f"a {tool} wedged in its own cut: median tick as a part of 60 us",
+               "haptic_tick"),
+        Figure(f"tick_{tool}_wedged_p50", "us", "the same, median", "haptic_tick"),
+        Figure(f"tick_{tool}_wedged_p99", "us", "the same, 99th percentile; a period is 1000", "haptic_tick", ("<=", 1000.0)))],
     Figure("blackout_missed", "per_10000", "periods that no tick ran in, per 10000 ticks, while the network is silent for 10 s",
            "haptic_blackout", baseline="before and after, in the same run"),
     Figure("blackout_missed_more", "sigma", "how many more they are than before and after, over what such counts scatter by",

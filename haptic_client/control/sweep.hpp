@@ -1,0 +1,44 @@
+// What the cutting part of the tool in hand has taken away since a patch was built: from one place to another. Of what goes
+// along its axis the deepest place holds all others from where the sweep began on, and one sweep goes on for as long as it
+// keeps to its axis.
+#pragma once
+#include <cstdint>
+
+#include "common/geometry/pose.hpp"
+#include "haptic_client/control/cut_shape.hpp"
+
+namespace osteon::haptic {
+
+struct Sweep {
+  const CutShape* shape = nullptr;  // of the tool in hand
+  Pose from, to;                    // pose_bone_tool; `to`: the deepest, where that holds all
+  Pose middle;                      // between them
+  std::uint64_t own_cut = 0;        // newest cut that holds it all; 0: none yet
+  bool open = false;
+  void reach(const Pose& pose) noexcept;
+};
+
+// A sweep as the tool sees it from where it is: for many points of it at once. [haptic]
+class SweepView {
+ public:
+  SweepView() = default;
+  // Of a sweep that is shorter than `short_mm` only the end counts.
+  SweepView(const Sweep& sweep, const Pose& pose_bone_tool, double short_mm) noexcept;
+  // f that the sweep leaves at a group of the tool's points, at least, and the way out of bone there: `p` and `out` in the
+  // tool's frame, single precision, which tells hundred-thousandths of a millimetre near the tip.
+  void left_mm(const Lanes (&p)[3], Lanes& left, Lanes (&out)[3]) const noexcept;
+
+ private:
+  // From the tool where it is to the tool where it was.
+  struct Place {
+    float rotation[9], at[3];
+    void distance_mm(const CutShape& shape, const Lanes (&p)[3], Lanes& distance, Lanes (&out)[3]) const noexcept;
+  };
+  const CutShape* shape_ = nullptr;
+  Place places_[3];
+  int count_ = 0;
+  float began_mm_ = 0;       // along the axis, of a hole that goes on behind the tool
+  Vec3 ball_from_, ball_to_; // middles
+};
+
+}  // namespace osteon::haptic
