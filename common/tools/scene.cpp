@@ -6,6 +6,8 @@
 #include <numbers>
 #include <vector>
 
+#include "common/geometry/pose_across.hpp"
+
 namespace osteon {
 namespace {
 
@@ -142,13 +144,8 @@ Result<Pose> place_on_bone(const BoneQuery& bone, const Vec3& near_mm, const std
   const auto place = nearest_surface(bone, near_mm);
   if (!place) return failure(ErrorCode::invalid_input, "no bone lies within 20 mm of " + shown(near_mm) + "; choose a point nearer to it");
   const Vec3 z = axis && axis->norm() > 1e-9 ? Vec3(axis->normalized()) : Vec3(-place->outward);
-  Vec3 x = across - across.dot(z) * z;
-  if (!(x.norm() > 1e-6)) x = z.unitOrthogonal();
-  Eigen::Matrix3d axes;
-  axes.col(0) = x.normalized();
-  axes.col(2) = z;
-  axes.col(1) = axes.col(2).cross(axes.col(0));
-  return Pose{place->point_mm, Eigen::Quaterniond(axes).normalized()};
+  const bool has_side = (across - across.dot(z) * z).norm() > 1e-6;
+  return pose_across(place->point_mm, z, has_side ? across : z.unitOrthogonal());
 }
 
 int pins_in(const Tool& guide, const Pose& pose_bone_guide, std::span<const Standing> scene) {

@@ -102,8 +102,10 @@ Result<std::string> run_contact(const Arguments& a) {
   const auto tool = tool_named(a.tool, fs::current_path());
   if (!tool) return tl::unexpected(tool.error());
   const Vec3 axis(a.axis[0], a.axis[1], a.axis[2]);
-  if (!(axis.norm() > 1e-6)) return failure(ErrorCode::invalid_input, "--axis has no length");
-  const Pose pose = pose_along({a.at[0], a.at[1], a.at[2]}, axis.normalized());
+  if (!axis.allFinite() || !(axis.stableNorm() > 1e-6)) return failure(ErrorCode::invalid_input, "--axis has no length or no finite one");
+  const Vec3 at(a.at[0], a.at[1], a.at[2]);
+  if (!at.allFinite()) return failure(ErrorCode::invalid_input, "--at is not finite; give X,Y,Z in mm");
+  const Pose pose = pose_along(at, axis.stableNormalized());
   const auto field = load_body(a);
   if (!field) return tl::unexpected(field.error());
 

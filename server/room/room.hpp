@@ -103,8 +103,8 @@ struct RoomCounts {
 inline constexpr std::size_t kMostItems = 256, kMostTools = 1024, kMostBodies = 64;
 
 // Every body holds every cut, those that were taken away too: all bodies share the case's lattice and frame, a piece has
-// all but itself taken away, and a cut is applied to each of them, so the server, every replica and the undo of a split need no notion of which body a
-// tool meets. Not synchronised: one thread calls the changing functions, or several the const ones.
+// all but itself taken away, and a cut is applied to each of them, so the server, every replica and the undo of a split need
+// no notion of which body a tool meets. Not synchronised: one thread calls the changing functions, or several the const ones.
 class Room {
  public:
   explicit Room(Case bone, CutLimits limits = {}, std::shared_ptr<ToolBox> tools = builtin_tool_box());

@@ -94,12 +94,26 @@ void put(const ItemPlace& where, const Pose& before, v1::SetSceneItemRequest& re
   *request.mutable_onto_bone()->mutable_across() = wire::to_wire(across);
 }
 
-Result<RoomAnswer> set_item(const std::shared_ptr<grpc::Channel>& channel, const v1::SetSceneItemRequest& request) {
+// A request that leaves an item as it stands.
+v1::SetSceneItemRequest request_for(const SceneItem& standing, std::uint64_t author) {
+  v1::SetSceneItemRequest request;
+  request.set_author(author);
+  *request.mutable_item() = wire::to_wire(standing);
+  return request;
+}
+
+// `more`: what there is to say of the answer besides where the item stands now.
+template <class More>
+Result<RoomAnswer> set_item(const std::shared_ptr<grpc::Channel>& channel, const v1::SetSceneItemRequest& request, More more) {
   const auto answer = ask(channel, &v1::RoomService::Stub::SetSceneItem, request);
   if (!answer) return tl::unexpected(answer.error());
   const auto now = wire::from_wire(answer->set());
   if (!now) return tl::unexpected(now.error());
-  return RoomAnswer{RoomSeq{answer->room_seq()}, {}, standing_text(*now)};
+  return RoomAnswer{RoomSeq{answer->room_seq()}, {}, standing_text(*now) + more(*answer, *now)};
+}
+
+Result<RoomAnswer> set_item(const std::shared_ptr<grpc::Channel>& channel, const v1::SetSceneItemRequest& request) {
+  return set_item(channel, request, [](const auto&, const auto&) { return std::string(); });
 }
 
 // The tools that the window can draw without being sent them.
@@ -455,9 +469,7 @@ Result<RoomAnswer> RoomWatch::move_item(std::uint32_t item, const ItemPlace& whe
   const auto [channel, author] = impl_->line();
   const auto standing = standing_item(channel, item);
   if (!standing) return tl::unexpected(standing.error());
-  v1::SetSceneItemRequest request;
-  request.set_author(author);
-  *request.mutable_item() = wire::to_wire(*standing);
+  v1::SetSceneItemRequest request = request_for(*standing, author);
   put(where, standing->pose_bone_item, request);
   return set_item(channel, request);
 }
@@ -466,9 +478,7 @@ Result<RoomAnswer> RoomWatch::turn_item(std::uint32_t item, double turns) {
   const auto [channel, author] = impl_->line();
   const auto standing = standing_item(channel, item);
   if (!standing) return tl::unexpected(standing.error());
-  v1::SetSceneItemRequest request;
-  request.set_author(author);
-  *request.mutable_item() = wire::to_wire(*standing);
+  v1::SetSceneItemRequest request = request_for(*standing, author);
   request.set_thread_turns(turns);
   return set_item(channel, request);
 }
@@ -477,18 +487,14 @@ Result<RoomAnswer> RoomWatch::seat_item(std::uint32_t item, double most_mm) {
   const auto [channel, author] = impl_->line();
   const auto standing = standing_item(channel, item);
   if (!standing) return tl::unexpected(standing.error());
-  v1::SetSceneItemRequest request;
-  request.set_author(author);
-  *request.mutable_item() = wire::to_wire(*standing);
+  v1::SetSceneItemRequest request = request_for(*standing, author);
   request.set_drive_home_mm(most_mm);
-  const auto answer = ask(channel, &v1::RoomService::Stub::SetSceneItem, request);
-  if (!answer) return tl::unexpected(answer.error());
-  const auto now = wire::from_wire(answer->set());
-  if (!now) return tl::unexpected(now.error());
-  char way[80];
-  std::snprintf(way, sizeof way, "; advanced %.2f mm, %.0f %% of it on bone",
-                (now->pose_bone_item.position_mm - standing->pose_bone_item.position_mm).norm(), 100.0 * answer->contact_fraction());
-  return RoomAnswer{RoomSeq{answer->room_seq()}, {}, standing_text(*now) + way};
+  return set_item(channel, request, [&](const v1::SetSceneItemResponse& answer, const SceneItem& now) {
+    char way[80];
+    std::snprintf(way, sizeof way, "; advanced %.2f mm, %.0f %% of it on bone",
+                  (now.pose_bone_item.position_mm - standing->pose_bone_item.position_mm).norm(), 100.0 * answer.contact_fraction());
+    return std::string(way);
+  });
 }
 
 Result<RoomAnswer> RoomWatch::remove_item(std::uint32_t item) {

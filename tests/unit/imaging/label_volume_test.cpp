@@ -121,6 +121,8 @@ TEST(LabelVolume, StopsWhenAsked) {
   const auto field = smooth_labels(ball, {}, [](double f) { return f < 0.2; });
   ASSERT_FALSE(field);
   EXPECT_EQ(field.error().code, ErrorCode::cancelled);
+  // Also at the very end, where all was done before anybody was asked again.
+  EXPECT_FALSE(smooth_labels(ball, {}, [](double f) { return f < 0.999; }));
 }
 
 }  // namespace

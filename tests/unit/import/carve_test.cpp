@@ -300,6 +300,12 @@ TEST_F(Scripts, ContactIsAskedInThreeWays) {
   const auto beyond = test::run(program, {"contact", path("case"), "burr-round-3.2", "--at", "0,0,500", "--axis", "0,0,-1"});
   EXPECT_NE(beyond.out.find("beyond the bone"), std::string::npos) << beyond.out;
   EXPECT_EQ(test::run(program, {"contact", path("case"), "burr-round-3.2", "--at", "0,0,0", "--axis", "0,0,0"}).exit_code, 1);
+  for (const char* nowhere : {"nan,0,0", "0,0,inf"}) {
+    const auto refused = test::run(program, {"contact", path("case"), "burr-round-3.2", "--at", nowhere, "--axis", "0,0,-1"});
+    EXPECT_EQ(refused.exit_code, 1) << nowhere;
+    EXPECT_NE(refused.err.find("--at"), std::string::npos) << refused.err;
+  }
+  EXPECT_EQ(test::run(program, {"contact", path("case"), "burr-round-3.2", "--at", "0,0,0", "--axis", "0,0,nan"}).exit_code, 1);
 }
 
 TEST_F(Scripts, AToolOfTheBoxIsChangedWithoutWritingAFile) {

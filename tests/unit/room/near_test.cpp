@@ -10,6 +10,7 @@
 #include "server/net/room_host.hpp"
 #include "tests/support/scenes/bones.hpp"
 #include "tests/support/wait.hpp"
+#include "tests/unit/room/parts.hpp"
 
 namespace osteon {
 namespace {
@@ -170,28 +171,9 @@ TEST(NearDetail, FollowsTheLooksOfAllViewers) {
   in_full.leave(full);
 }
 
-// The ball beyond a plane across x, by masks of whole samples.
+// The ball between two planes across x.
 Fragment cap(const Case& bone, double from_mm, double to_mm) {
-  Fragment fragment;
-  fragment.volume_mm3 = 1000.0;
-  fragment.bounds = bone.bounds();
-  const auto band = static_cast<std::int16_t>(4 * kPitch_mm * 1024);
-  const CoordBox all = bone.bounds_samples();
-  const Coord first = floor_to(all.min, kLeafSize);
-  for (int x = first.x; x <= all.max.x; x += kLeafSize)
-    for (int y = first.y; y <= all.max.y; y += kLeafSize)
-      for (int z = first.z; z <= all.max.z; z += kLeafSize) {
-        FieldLeaf taken{BodyId{0}, 0, {x, y, z}, std::vector<std::int16_t>(kLeafVoxels)}, left = taken;
-        for (std::size_t i = 0; i < kLeafVoxels; ++i) {
-          const double at_mm = kPitch_mm * (x + static_cast<int>(i / (kLeafSize * kLeafSize)));
-          const bool of_piece = at_mm >= from_mm && at_mm < to_mm;
-          taken.values[i] = static_cast<std::int16_t>(of_piece ? -band : band);
-          left.values[i] = static_cast<std::int16_t>(of_piece ? band : -band);
-        }
-        if (std::ranges::any_of(taken.values, [](std::int16_t v) { return v < 0; })) fragment.taken.push_back(std::move(taken));
-        if (std::ranges::any_of(left.values, [](std::int16_t v) { return v < 0; })) fragment.left.push_back(std::move(left));
-      }
-  return fragment;
+  return test::part(bone, [=](int x) { return kPitch_mm * x >= from_mm && kPitch_mm * x < to_mm; });
 }
 
 TEST(NearDetail, ABodyTakesAllItsBlocksAndNoOthers) {
