@@ -11,7 +11,6 @@ namespace {
 // Registers that every processor has.
 constexpr std::size_t kRow = 4;
 typedef float Row __attribute__((vector_size(kRow * 4)));
-typedef std::int32_t RowInt __attribute__((vector_size(kRow * 4)));
 Row load(const float* from) {
   Row row;
   std::memcpy(&row, from, sizeof row);
@@ -122,15 +121,13 @@ double CutShape::distance_mm(const Vec3& p, Vec3& out) const noexcept {
   return distance;
 }
 
-void CutShape::distance_mm(const Lanes (&p)[3], Lanes& distance, Lanes (&out)[3]) const noexcept {
+Lanes CutShape::distance_mm(const Lanes (&p)[3]) const noexcept {
+  Lanes distance;
   const bool turned = kind_ == CutKind::turned;
   if (!turned && kind_ != CutKind::hull) {
-    for (std::size_t i = 0; i < kGroupPoints; ++i) {
-      Vec3 way;
-      distance[i] = static_cast<float>(std::min(distance_mm(Vec3(p[0][i], p[1][i], p[2][i]), way), double{kLeftOut_mm}));
-      for (int k = 0; k < 3; ++k) out[k][i] = static_cast<float>(way[k]);
-    }
-    return;
+    for (std::size_t i = 0; i < kGroupPoints; ++i)
+      distance[i] = static_cast<float>(std::min(distance_mm(Vec3(p[0][i], p[1][i], p[2][i])), double{kLeftOut_mm}));
+    return distance;
   }
   Lanes x = p[0], y = p[1];
   if (turned)
@@ -141,35 +138,20 @@ void CutShape::distance_mm(const Lanes (&p)[3], Lanes& distance, Lanes (&out)[3]
   for (std::size_t i = 0; i < kGroupPoints; i += kRow) {
     const Row px = load(&x[i]), py = load(&y[i]), pz = load(&p[2][i]);
     Row farthest = Row{} + std::numeric_limits<float>::lowest();
-    RowInt nearest{};
-    for (int plane = 0; plane < count_; ++plane) {
-      const std::array<float, 4>& face = faces_[static_cast<std::size_t>(plane)];
+    for (std::size_t plane = 0; plane < static_cast<std::size_t>(count_); ++plane) {
+      const std::array<float, 4>& face = faces_[plane];
       const Row to_plane = ((px * face[0] + py * face[1]) + pz * face[2]) - face[3];
-      const RowInt farther = to_plane > farthest;
-      farthest = farther ? to_plane : farthest;
-      nearest = farther ? RowInt{} + plane : nearest;
+      farthest = to_plane > farthest ? to_plane : farthest;
     }
     store(&distance[i], farthest);
-    for (std::size_t lane = 0; lane < kRow; ++lane) {
-      const std::array<float, 4>& face = faces_[static_cast<std::size_t>(nearest[lane])];
-      for (std::size_t k = 0; k < 3; ++k) out[k][i + lane] = face[k];
-    }
   }
-  if (!turned) return;
   const float dome = static_cast<float>(radius_mm_);
-  if (dome > 0.0f)
+  if (turned && dome > 0.0f)
     for (std::size_t i = 0; i < kGroupPoints; ++i) {
-      const float up = p[2][i] + dome, length = std::sqrt(x[i] * x[i] + up * up), to_dome = length - dome;
-      const bool farther = up > 0.0f && to_dome > distance[i];
-      distance[i] = farther ? to_dome : distance[i];
-      out[0][i] = farther ? x[i] / length : out[0][i];
-      out[2][i] = farther ? up / length : out[2][i];
+      const float up = p[2][i] + dome, to_dome = std::sqrt(x[i] * x[i] + up * up) - dome;
+      distance[i] = up > 0.0f && to_dome > distance[i] ? to_dome : distance[i];
     }
-  for (std::size_t i = 0; i < kGroupPoints; ++i) {
-    const float across = out[0][i], r = x[i];
-    out[0][i] = r > 0.0f ? across * p[0][i] / r : across;
-    out[1][i] = r > 0.0f ? across * p[1][i] / r : 0.0f;
-  }
+  return distance;
 }
 
 }  // namespace osteon::haptic

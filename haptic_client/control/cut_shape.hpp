@@ -24,8 +24,8 @@ class CutShape {
   }
   // [haptic] `out`: its gradient, a unit vector out of the body.
   [[nodiscard]] double distance_mm(const Vec3& point_mm, Vec3& out) const noexcept;
-  // [haptic] The same of a group of points at once, in single precision; `p` and `out`: x, y, z.
-  void distance_mm(const Lanes (&p)[3], Lanes& distance, Lanes (&out)[3]) const noexcept;
+  // [haptic] Of a group of points at once, in single precision; `p`: x, y, z.
+  [[nodiscard]] Lanes distance_mm(const Lanes (&p)[3]) const noexcept;
   [[nodiscard]] bool open_behind() const noexcept { return open_behind_; }
   // How far behind its tip it cuts.
   [[nodiscard]] double behind_mm() const noexcept { return behind_mm_; }

@@ -114,9 +114,7 @@ FreeHandSession::FreeHandSession(ReadyPlan plan, HapticDevice& device, double fo
     : plan_(std::move(plan)),
       device_(device),
       limits_(shown(device.limits())),
-      loop_(
-          loop_params(limits_.peak_n, limits_.continuous_n, limits_.stiffness_n_per_mm, force_scale, limits_.peak_nmm),
-          plan_.tools) {}
+      loop_(loop_params(limits_, force_scale), plan_.tools) {}
 
 void FreeHandSession::take_up(const DeviceReading& reading, SurgeonOrder& order) noexcept {
   const ReadyStep& step = plan_.steps[0];

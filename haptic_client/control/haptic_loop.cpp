@@ -8,14 +8,15 @@
 
 namespace osteon::haptic {
 
-LoopParams loop_params(double peak_n, double continuous_n, double stiffness_n_per_mm, double force_scale, double peak_nmm) {
+LoopParams loop_params(const DeviceLimits& limits, double force_scale) {
   constexpr double kFullScale_n = 30.0;
   LoopParams params;
-  params.peak_n = peak_n;
-  params.continuous_n = continuous_n;
-  params.force_scale = force_scale > 0.0 ? force_scale : std::min(1.0, continuous_n / kFullScale_n);
-  params.device_n_per_mm = stiffness_n_per_mm;
-  params.peak_nmm = peak_nmm;
+  params.peak_n = limits.peak_n;
+  params.continuous_n = limits.continuous_n;
+  params.force_scale = force_scale > 0.0 ? force_scale : std::min(1.0, limits.continuous_n / kFullScale_n);
+  params.device_n_per_mm = limits.stiffness_n_per_mm;
+  params.peak_nmm = limits.peak_nmm;
+  params.continuous_nmm = limits.continuous_nmm;
   return params;
 }
 
@@ -120,6 +121,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   report.pose_bone_device = pose_bone_device;
   report.cutting_force_n = step.cutting_force_n;
   report.cutting_work_mj = step.cutting_work_mj;
+  report.pushed_back_mj = step.pushed_back_mj;
   report.moved_mm = step.moved_mm;
   report.spindle_rpm = spindle_.rpm;
   report.feed_mm_per_s = step.feed_mm_per_s;
@@ -148,7 +150,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   // A torque goes to the handle as the work of a force does, so that one store holds both: where the workspace is larger than
   // the bone, levers seem longer.
   moment.stiffness_nmm_per_rad = turn_arm_mm_ * turn_arm_mm_ * coupling_n_per_mm_;
-  moment.limit_nmm = params_.peak_nmm / moment.energy_scale;
+  moment.limit_nmm = (input.device_warm ? params_.continuous_nmm : params_.peak_nmm) / moment.energy_scale;
   if (step.contact) {
     moment.turn_before_rad = between(proxy_before, pose_bone_wanted).turn_rad;
     moment.turn_rad = step.turn_rad;
@@ -200,7 +202,7 @@ double HapticLoop::load_nmm(const ProxyStep& step, double pressed_n) noexcept {
 
 void HapticLoop::show(const LoopInput& input, const ToolModel& model, const CouplingForce& coupling, const CouplingMoment& moment,
                       const Vec3& cut_nmm, LoopReport& report) noexcept {
-  const double s = params_.force_scale, limit_n = s * moment.limit_n, limit_nmm = params_.peak_nmm;
+  const double s = params_.force_scale, limit_n = s * moment.limit_n, limit_nmm = moment.energy_scale * moment.limit_nmm;
   const bool safe = input.device_ok && input.link_ok && input.periods <= 3;
   ramp_ = std::min(1.0, ramp_ + params_.dt_s / params_.ramp_s);
   if (ramp_ < 1.0) report.events |= kRamping;

@@ -19,14 +19,17 @@
 
 namespace osteon::haptic {
 
+struct DeviceLimits;
+
 struct LoopParams {
   double dt_s = 1e-3;
   double force_scale = 1.0;               // s: rendered = s · physical
   double stiffness_n_per_mm = 50.0;       // K_c of the coupling, physical, where the device is stiff enough for it
   double device_n_per_mm = 60.0;          // k of the device
   double peak_n = 60.0;                   // of the device
-  double peak_nmm = 0;                    // of the device, torque; 0: it shows none
   double continuous_n = 30.0;             // of the device; the limit while it is warm
+  double peak_nmm = 0;                    // of the device, torque; 0: it shows none
+  double continuous_nmm = 0;
   double slew_n_per_ms = 0.5;             // growth of force that the hand did not cause; on the device
   double smooth_s = 2e-3;                 // tau of (7.15), on the cutting force alone
   double ramp_s = 0.3;                    // after a device came or was calibrated: from no force to all of it
@@ -35,8 +38,7 @@ struct LoopParams {
 };
 
 // For a device: s = continuous force / 30 N unless given.
-[[nodiscard]] LoopParams loop_params(double peak_n, double continuous_n, double stiffness_n_per_mm, double force_scale,
-                                     double peak_nmm = 0.0);
+[[nodiscard]] LoopParams loop_params(const DeviceLimits& limits, double force_scale);
 
 struct LoopInput {
   Pose pose_device_tool;      // the handle, device frame
@@ -69,6 +71,7 @@ struct LoopReport {
   Vec3 force_physical_n = Vec3::Zero();  // of the bone on the tool, bone frame; not scaled, within the device's limit
   Vec3 cutting_force_n = Vec3::Zero();   // of the tool on the bone, the law's part, bone frame
   double cutting_work_mj = 0;            // of that force over the way cut in this tick, physical
+  double pushed_back_mj = 0;             // that a cut's force would have given the tool in a tick that turning undid; not shown
   Vec3 coupling_device_n = Vec3::Zero(); // what of force_device_n is the coupling's: passive
   Vec3 motor_device_n = Vec3::Zero();    // the rest, the motor's: active, within s · mu · normal force
   Vec3 torque_physical_nmm = Vec3::Zero();  // of the bone on the tool about its tip, bone frame; not scaled

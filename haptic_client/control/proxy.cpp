@@ -29,6 +29,7 @@ constexpr double kMostSkive_mm = 3.0;
 // Play of a tool in its own hole, in insets: points that stand round it some millimetres apart let it go a little farther
 // between them.
 constexpr double kPlay = 1.5;
+constexpr std::int32_t kNoSweep = -1;
 constexpr double kDrawnOut_mm = 1.0;   // in a tick, of a tool that is locked in bone
 
 const ContactPoint& point_at(const ToolModel& model, int i) noexcept {
@@ -76,6 +77,8 @@ Proxy::Proxy() : conditions_(std::make_unique<Conditions>()) {
   for (Sight* sight : {&here_, &there_, &ahead_}) {
     sight->values.make_room(kMostContactPoints);
     sight->hard = std::make_unique<std::uint8_t[]>(kMostContactPoints);
+    sight->by = std::make_unique<std::int32_t[]>(kMostContactPoints);
+    sight->sweeps = std::make_unique<SweepViews>();
   }
 }
 
@@ -87,23 +90,27 @@ void Proxy::place(const Pose& pose_bone_tool) noexcept {
   skive_to_mm_.setZero();
 }
 
-void Proxy::see_sweeps(const ToolModel& model, const Pose& pose) noexcept {
+void Proxy::see_sweeps(const ToolModel& model, const Pose& pose, SweepViews& views) const noexcept {
   const double short_mm = 0.5 * model.inset;
-  for (int s = 0; s < sweep_count_; ++s)
-    views_[static_cast<std::size_t>(s)] = SweepView(sweeps_[static_cast<std::size_t>(s)], pose, short_mm);
+  for (std::size_t s = 0; s < static_cast<std::size_t>(sweep_count_); ++s) views[s] = SweepView(sweeps_[s], pose, short_mm);
 }
 
-void Proxy::swept(const Lanes (&p)[3], Lanes& left, Lanes (&out)[3]) const noexcept {
-  views_[0].left_mm(p, left, out);
+void Proxy::swept(const SweepViews& views, const Lanes (&p)[3], Lanes& left, Parts& by) const noexcept {
+  views[0].left_mm(p, left, by);
   for (int s = 1; s < sweep_count_; ++s) {
-    Lanes there, way[3];
-    views_[static_cast<std::size_t>(s)].left_mm(p, there, way);
+    Lanes there;
+    Parts part;
+    views[static_cast<std::size_t>(s)].left_mm(p, there, part);
     for (std::size_t i = 0; i < kGroupPoints; ++i) {
       const bool more = there[i] > left[i];
       left[i] = more ? there[i] : left[i];
-      for (int k = 0; k < 3; ++k) out[k][i] = more ? way[k][i] : out[k][i];
+      by[i] = more ? SweepView::kParts * s + part[i] : by[i];
     }
   }
+}
+
+Vec3 Proxy::way_out(const SweepViews& views, const Vec3& p, int by) noexcept {
+  return views[static_cast<std::size_t>(by / SweepView::kParts)].way_out(p, by % SweepView::kParts);
 }
 
 bool Proxy::begin_sweep(const ToolModel& model) noexcept {
@@ -189,14 +196,15 @@ void Proxy::look(const Tick& tick, const Pose& pose, Against against, Sight& sig
   }
   // What was cut since the patch was built is gone.
   const float near_mm = static_cast<float>(0.75 * model.fine_pitch_mm);
-  if (sweep_count_ > 0) see_sweeps(model, pose);
-  const Eigen::Matrix3f rotation = pose.rotation.toRotationMatrix().cast<float>();
+  if (sweep_count_ > 0) see_sweeps(model, pose, *sight.sweeps);
+  std::fill_n(sight.by.get(), groups * kGroupPoints, kNoSweep);
   for (int group = first; group < groups; ++group) {
     float& nearest = values.nearest_mm[static_cast<std::size_t>(group)];
     if (sweep_count_ > 0 && nearest < near_mm) {
-      Lanes p[3], left, out[3];
+      Lanes p[3], left;
+      Parts by;
       places_of(set, group, group < set.active_groups ? static_cast<float>(tick.lift_mm) : 0.0f, p);
-      swept(p, left, out);
+      swept(*sight.sweeps, p, left, by);
       nearest = kLeftOut_mm;
       for (std::size_t i = 0; i < kGroupPoints; ++i) {
         const std::size_t at = static_cast<std::size_t>(group * kGroupPoints) + i;
@@ -205,10 +213,7 @@ void Proxy::look(const Tick& tick, const Pose& pose, Against against, Sight& sig
           distance = kLeftOut_mm;
         } else if (distance < near_mm && left[i] > distance) {
           distance = left[i];
-          const Eigen::Vector3f way = rotation * Eigen::Vector3f(out[0][i], out[1][i], out[2][i]);
-          values.gx[at] = way.x();
-          values.gy[at] = way.y();
-          values.gz[at] = way.z();
+          sight.by[at] = by[i];
         }
         nearest = std::min(nearest, distance);
       }
@@ -248,6 +253,7 @@ void Proxy::see_scene(const Tick& tick, const Pose& pose, Against, Sight& sight)
           values.gx[at] = static_cast<float>(out.x());
           values.gy[at] = static_cast<float>(out.y());
           values.gz[at] = static_cast<float>(out.z());
+          sight.by[at] = kNoSweep;
           sight.hard[at] = 1;
           values.nearest_mm[static_cast<std::size_t>(group)] =
               std::min(values.nearest_mm[static_cast<std::size_t>(group)], distance);
@@ -291,8 +297,13 @@ void Proxy::add_conditions(const Tick& tick, const Sight& sight, const Pose& pos
     const auto p = static_cast<std::size_t>(i);
     const ContactPoint& point = point_at(model, i);
     Condition condition;
-    condition.n = Vec3(sight.values.gx[p], sight.values.gy[p], sight.values.gz[p]);
-    if (condition.n.norm() < kFlatField) condition.n = -pose.direction(point.outward);
+    if (const int by = sight.by[p]; by != kNoSweep) {
+      const double lift_mm = i < model.contact.first_passive() ? tick.lift_mm : 0.0;
+      condition.n = pose.direction(way_out(*sight.sweeps, point.inset_mm + lift_mm * point.outward, by));
+    } else {
+      condition.n = Vec3(sight.values.gx[p], sight.values.gy[p], sight.values.gz[p]);
+      if (condition.n.norm() < kFlatField) condition.n = -pose.direction(point.outward);
+    }
     condition.m = pose.direction(point.inset_mm).cross(condition.n);
     condition.least_mm = floor_mm(i) - static_cast<double>(sight.values.distance_mm[p]) + condition.n.dot(at.move_mm) +
                          condition.m.dot(at.turn_rad);
@@ -394,10 +405,11 @@ Proxy::Engagement Proxy::engagement(const Tick& tick, const Vec3& direction) noe
   if (sweep_count_ > 0 && sums.engaged_mm2 > 0.0) {
     const Vec3 toward = pose_.rotation.conjugate() * direction;
     bool any = false;
-    see_sweeps(model, pose_);
+    see_sweeps(model, pose_, *ahead_.sweeps);
     for (int group = 0; group < set.active_groups; ++group) {
       if (values.nearest_mm[static_cast<std::size_t>(group)] >= 0.0f) continue;
-      Lanes probe[3], left, out[3];
+      Lanes probe[3], left;
+      Parts by;
       places_of(set, group, static_cast<float>(query.lift_mm), probe);
       for (std::size_t i = 0; i < kGroupPoints; ++i) {
         const std::size_t p = static_cast<std::size_t>(group * kGroupPoints) + i;
@@ -406,7 +418,7 @@ Proxy::Engagement Proxy::engagement(const Tick& tick, const Vec3& direction) noe
         const double reach_mm = std::min(query.ahead_mm / facing, query.most_mm);
         for (int k = 0; k < 3; ++k) probe[k][i] += static_cast<float>(reach_mm * toward[k]);
       }
-      swept(probe, left, out);
+      swept(*ahead_.sweeps, probe, left, by);
       for (int i = group * kGroupPoints; i < (group + 1) * kGroupPoints; ++i) {
         const auto p = static_cast<std::size_t>(i);
         if (values.distance_mm[p] >= 0.0f || !is_real(model, i)) continue;
@@ -654,13 +666,14 @@ bool Proxy::near_bone(const Tick& tick) noexcept {
   query.lift_mm = model.inset;
   ContactValues& values = ahead_.values;
   evaluate_contact(tick.patch, model.contact, query, values);
-  see_sweeps(model, pose_);
+  see_sweeps(model, pose_, *ahead_.sweeps);
   for (int group = 0; group < model.contact.active_groups; ++group) {
     if (values.nearest_mm[static_cast<std::size_t>(group)] >= near_mm) continue;
     if (sweep_count_ == 0) return true;
-    Lanes p[3], left, out[3];
+    Lanes p[3], left;
+    Parts by;
     places_of(model.contact, group, static_cast<float>(model.inset), p);
-    swept(p, left, out);
+    swept(*ahead_.sweeps, p, left, by);
     for (std::size_t i = 0; i < kGroupPoints; ++i) {
       const std::size_t at = static_cast<std::size_t>(group * kGroupPoints) + i;
       if (is_real(model, static_cast<int>(at)) && std::max(values.distance_mm[at], left[i]) < near_mm) return true;

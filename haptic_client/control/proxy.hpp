@@ -105,9 +105,14 @@ class Proxy {
     scene,    // bone gives way
   };
   // What the points find at a pose.
+  static constexpr int kMostSweeps = 48;
+  using SweepViews = std::array<SweepView, kMostSweeps>;
   struct Sight {
     ContactValues values;
     std::unique_ptr<std::uint8_t[]> hard;  // of each point: the scene, not bone
+    // Of each point: by which part of which sweep its distance is what it is, or kNoSweep. The way out is asked of few.
+    std::unique_ptr<std::int32_t[]> by;
+    std::unique_ptr<SweepViews> sweeps;
     float deepest_in_bone_mm = 0;          // least distance, over blocking points
   };
   struct Engagement {
@@ -137,15 +142,15 @@ class Proxy {
   [[nodiscard]] bool near_bone(const Tick& tick) noexcept;
   void note_pushed_back(ProxyStep& report) noexcept;
   void update_sweep(const ToolModel& model) noexcept;
-  // The sweeps as they are seen from a pose, and what they leave at a group of the tool's points; way out: tool frame.
-  void see_sweeps(const ToolModel& model, const Pose& pose) noexcept;
-  void swept(const Lanes (&p)[3], Lanes& left, Lanes (&out)[3]) const noexcept;
+  // The sweeps as they are seen from a pose, what they leave at a group of the tool's points, and the way out there: tool
+  // frame.
+  void see_sweeps(const ToolModel& model, const Pose& pose, SweepViews& views) const noexcept;
+  void swept(const SweepViews& views, const Lanes (&p)[3], Lanes& left, Parts& by) const noexcept;
+  [[nodiscard]] static Vec3 way_out(const SweepViews& views, const Vec3& p, int by) noexcept;
   void forget_contained(const Patch& patch) noexcept;
 
-  static constexpr int kMostSweeps = 48;
   Pose pose_, cut_pose_;
   std::array<Sweep, kMostSweeps> sweeps_;
-  std::array<SweepView, kMostSweeps> views_;
   int sweep_count_ = 0;
   bool sweeping_ = false;
   bool cut_before_ = false;  // the last step ended cutting

@@ -4,7 +4,7 @@ namespace osteon::haptic {
 
 namespace {
 LoopParams params_of(const DeviceLimits& limits, double force_scale, double dt_s) {
-  LoopParams params = loop_params(limits.peak_n, limits.continuous_n, limits.stiffness_n_per_mm, force_scale, limits.peak_nmm);
+  LoopParams params = loop_params(limits, force_scale);
   params.dt_s = dt_s;
   return params;
 }

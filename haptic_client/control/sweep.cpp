@@ -19,12 +19,7 @@ SweepView::SweepView(const Sweep& sweep, const Pose& pose_bone_tool, double shor
   }
   const auto add = [&](const Pose& there) {
     const Pose relative = there.inverse() * pose_bone_tool;
-    const Eigen::Matrix3d rotation = relative.rotation.toRotationMatrix();
-    Place& place = places_[count_++];
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) place.rotation[3 * i + j] = static_cast<float>(rotation(i, j));
-      place.at[i] = static_cast<float>(relative.position_mm[i]);
-    }
+    places_[count_++] = {relative.rotation.toRotationMatrix().cast<float>(), relative.position_mm.cast<float>()};
   };
   add(sweep.to);
   if (shape_->open_behind()) {
@@ -40,63 +35,66 @@ SweepView::SweepView(const Sweep& sweep, const Pose& pose_bone_tool, double shor
   add(sweep.from);
 }
 
-void SweepView::Place::distance_mm(const CutShape& shape, const Lanes (&p)[3], Lanes& distance, Lanes (&out)[3]) const noexcept {
-  const float(&r)[9] = rotation;
-  Lanes q[3], way[3];
-  for (int k = 0; k < 3; ++k)
-    for (std::size_t i = 0; i < kGroupPoints; ++i)
-      q[k][i] = ((p[0][i] * r[3 * k] + p[1][i] * r[3 * k + 1]) + p[2][i] * r[3 * k + 2]) + at[k];
-  shape.distance_mm(q, distance, way);
-  for (int k = 0; k < 3; ++k)
-    for (std::size_t i = 0; i < kGroupPoints; ++i)
-      out[k][i] = -((way[0][i] * r[k] + way[1][i] * r[3 + k]) + way[2][i] * r[6 + k]);
+Lanes SweepView::Place::distance_mm(const CutShape& shape, const Lanes (&p)[3]) const noexcept {
+  Lanes q[3];
+  for (int k = 0; k < 3; ++k) {
+    const float x = rotation(k, 0), y = rotation(k, 1), z = rotation(k, 2), from = at[k];
+    for (std::size_t i = 0; i < kGroupPoints; ++i) q[k][i] = ((p[0][i] * x + p[1][i] * y) + p[2][i] * z) + from;
+  }
+  return shape.distance_mm(q);
 }
 
-void SweepView::left_mm(const Lanes (&p)[3], Lanes& left, Lanes (&out)[3]) const noexcept {
+void SweepView::left_mm(const Lanes (&p)[3], Lanes& left, Parts& by) const noexcept {
+  by.fill(0);
   if (shape_->is_ball()) {
     const Vec3 way = ball_to_ - ball_from_;
     const double length2 = way.squaredNorm();
     const float radius = static_cast<float>(shape_->radius_mm());
     const float inverse = length2 > 1e-12 ? static_cast<float>(1.0 / length2) : 0.0f;
-    float a[3], ab[3];
-    for (int k = 0; k < 3; ++k) {
-      a[k] = static_cast<float>(ball_from_[k]);
-      ab[k] = static_cast<float>(way[k]);
-    }
+    const Eigen::Vector3f a = ball_from_.cast<float>(), ab = way.cast<float>();
     for (std::size_t i = 0; i < kGroupPoints; ++i) {
       const float x = a[0] - p[0][i], y = a[1] - p[1][i], z = a[2] - p[2][i];
       const float t = std::min(1.0f, std::max(0.0f, -((x * ab[0] + y * ab[1]) + z * ab[2]) * inverse));
-      const float dx = x + t * ab[0], dy = y + t * ab[1], dz = z + t * ab[2], distance = std::sqrt(dx * dx + dy * dy + dz * dz);
-      const float scale = distance > 0.0f ? 1.0f / distance : 0.0f;
-      left[i] = radius - distance;
-      out[0][i] = dx * scale;
-      out[1][i] = dy * scale;
-      out[2][i] = dz * scale;
+      const float dx = x + t * ab[0], dy = y + t * ab[1], dz = z + t * ab[2];
+      left[i] = radius - std::sqrt(dx * dx + dy * dy + dz * dz);
     }
     return;
   }
-  Lanes distance;
-  places_[0].distance_mm(*shape_, p, distance, out);
-  if (shape_->open_behind()) {
-    const float(&r)[9] = places_[0].rotation;
-    for (std::size_t i = 0; i < kGroupPoints; ++i) {
-      const float along = ((p[0][i] * r[6] + p[1][i] * r[7]) + p[2][i] * r[8]) + places_[0].at[2] - began_mm_;
-      const bool behind = along < -distance[i];
-      left[i] = behind ? along : -distance[i];
-      for (int k = 0; k < 3; ++k) out[k][i] = behind ? r[6 + k] : out[k][i];
-    }
-    return;
-  }
+  Lanes distance = places_[0].distance_mm(*shape_, p);
   for (int other = 1; other < count_; ++other) {
-    Lanes there, way[3];
-    places_[other].distance_mm(*shape_, p, there, way);
+    const Lanes there = places_[other].distance_mm(*shape_, p);
     for (std::size_t i = 0; i < kGroupPoints; ++i) {
       const bool nearer = there[i] < distance[i];
       distance[i] = nearer ? there[i] : distance[i];
-      for (int k = 0; k < 3; ++k) out[k][i] = nearer ? way[k][i] : out[k][i];
+      by[i] = nearer ? other : by[i];
     }
   }
   for (std::size_t i = 0; i < kGroupPoints; ++i) left[i] = -distance[i];
+  if (!shape_->open_behind()) return;
+  const Eigen::Vector3f axis = places_[0].rotation.row(2);
+  const float from = places_[0].at[2] - began_mm_;
+  for (std::size_t i = 0; i < kGroupPoints; ++i) {
+    const float along = ((p[0][i] * axis[0] + p[1][i] * axis[1]) + p[2][i] * axis[2]) + from;
+    const bool behind = along < left[i];
+    left[i] = behind ? along : left[i];
+    by[i] = behind ? kBehind : by[i];
+  }
+}
+
+Vec3 SweepView::way_out(const Vec3& p, int by) const noexcept {
+  if (shape_->is_ball()) {
+    const Vec3 way = ball_to_ - ball_from_;
+    const double length2 = way.squaredNorm(), along = length2 > 0.0 ? std::clamp((p - ball_from_).dot(way) / length2, 0.0, 1.0) : 0.0;
+    const Vec3 inwards = ball_from_ + along * way - p;
+    const double distance = inwards.norm();
+    return distance > 0.0 ? Vec3(inwards / distance) : Vec3(Vec3::UnitZ());
+  }
+  if (by == kBehind) return places_[0].rotation.row(2).cast<double>();
+  const Place& place = places_[by];
+  const Eigen::Matrix3d rotation = place.rotation.cast<double>();
+  Vec3 out;
+  static_cast<void>(shape_->distance_mm(rotation * p + place.at.cast<double>(), out));
+  return -(rotation.transpose() * out);
 }
 
 }  // namespace osteon::haptic

@@ -18,22 +18,30 @@ struct Sweep {
   void reach(const Pose& pose) noexcept;
 };
 
+// Of each of a group's points: which part of a sweep.
+using Parts = std::array<std::int32_t, kGroupPoints>;
+
 // A sweep as the tool sees it from where it is: for many points of it at once. [haptic]
 class SweepView {
  public:
   SweepView() = default;
   // Of a sweep that is shorter than `short_mm` only the end counts.
   SweepView(const Sweep& sweep, const Pose& pose_bone_tool, double short_mm) noexcept;
-  // f that the sweep leaves at a group of the tool's points, at least, and the way out of bone there: `p` and `out` in the
-  // tool's frame, single precision, which tells hundred-thousandths of a millimetre near the tip.
-  void left_mm(const Lanes (&p)[3], Lanes& left, Lanes (&out)[3]) const noexcept;
+  // f that the sweep leaves at a group of the tool's points, at least: tool frame, single precision, which tells
+  // hundred-thousandths of a millimetre near the tip. `by`: what of the sweep it is that leaves it.
+  void left_mm(const Lanes (&p)[3], Lanes& left, Parts& by) const noexcept;
+  // The way out of bone at a point of which left_mm said by what it is left; tool frame, a unit vector.
+  [[nodiscard]] Vec3 way_out(const Vec3& p, int by) const noexcept;
+  static constexpr int kParts = 4;
 
  private:
   // From the tool where it is to the tool where it was.
   struct Place {
-    float rotation[9], at[3];
-    void distance_mm(const CutShape& shape, const Lanes (&p)[3], Lanes& distance, Lanes (&out)[3]) const noexcept;
+    Eigen::Matrix3f rotation;
+    Eigen::Vector3f at;
+    [[nodiscard]] Lanes distance_mm(const CutShape& shape, const Lanes (&p)[3]) const noexcept;
   };
+  static constexpr int kBehind = 3;  // as a part: the hole's beginning; before it places, by number
   const CutShape* shape_ = nullptr;
   Place places_[3];
   int count_ = 0;

@@ -3,6 +3,7 @@
 // that show torque to a hand that turns. Takes the number of ticks of each and prints JSON.
 #include <cstdio>
 #include <cstdlib>
+#include <utility>
 
 #include "tests/support/stability/stability.hpp"
 
@@ -41,20 +42,43 @@ StabilityResult all_scenes(long ticks, bool six_axes) {
 }
 
 void print(const char* key, const StabilityResult& all) {
-  std::printf(
-      ", \"%s\": {\"ticks\": %lld, \"touching\": %lld, \"cutting\": %lld, \"uncovered\": %lld, \"episodes\": %llu, \"undone\": "
-      "%llu, \"others_cuts\": %llu, \"generated_mj\": %.6f, \"worst_mj\": %.6f, \"net_mj\": %.3f, \"cutting_mj\": %.3f, "
-      "\"least_cutting_n_mm\": %.9f, \"step_over_n\": %.6f, \"still_step_n\": %.6f, \"fall_n\": %.6f, \"late\": %lld, \"motor_over_n\": %.9f, \"motor_late_n\": "
-      "%.9f, \"motor_most_n\": %.4f, \"force_most_n\": %.3f, \"thin_wall_deepest_mm\": %.4f, \"allocations\": %lld, "
-      "\"turned_mj\": %.3f, \"torque_most_nmm\": %.3f, \"torque_over_nmm\": %.9f, \"turn_step_over_n\": %.6f, "
-      "\"cut_step_over_n\": %.6f, \"cut_over_nmm\": %.9f, \"cut_late_nmm\": %.9f, \"cut_most_nmm\": %.3f}",
-      key, static_cast<long long>(all.ticks), static_cast<long long>(all.touching), static_cast<long long>(all.cutting),
-      static_cast<long long>(all.uncovered), static_cast<unsigned long long>(all.episodes),
-      static_cast<unsigned long long>(all.undone), static_cast<unsigned long long>(all.others_cuts), all.generated_mj,
-      all.worst_mj, all.net_mj, all.cutting_mj, all.least_cutting_n_mm, all.step_over_n, all.still_step_n, all.fall_n, static_cast<long long>(all.late), all.motor_over_n,
-      all.motor_late_n, all.motor_most_n, all.force_most_n, all.deepest_mm, static_cast<long long>(all.allocations),
-      all.turned_mj, all.torque_most_nmm, all.torque_over_nmm, all.turn_step_over_n, all.cut_step_over_n, all.cut_over_nmm,
-      all.cut_late_nmm, all.cut_most_nmm);
+  const std::pair<const char*, double> values[] = {
+      {"ticks", static_cast<double>(all.ticks)},
+      {"touching", static_cast<double>(all.touching)},
+      {"cutting", static_cast<double>(all.cutting)},
+      {"uncovered", static_cast<double>(all.uncovered)},
+      {"late", static_cast<double>(all.late)},
+      {"episodes", static_cast<double>(all.episodes)},
+      {"undone", static_cast<double>(all.undone)},
+      {"others_cuts", static_cast<double>(all.others_cuts)},
+      {"allocations", static_cast<double>(all.allocations)},
+      {"generated_mj", all.generated_mj},
+      {"worst_mj", all.worst_mj},
+      {"net_mj", all.net_mj},
+      {"cutting_mj", all.cutting_mj},
+      {"turned_mj", all.turned_mj},
+      {"least_cutting_n_mm", all.least_cutting_n_mm},
+      {"pushed_back", static_cast<double>(all.pushed_back)},
+      {"pushed_back_most_mj", all.pushed_back_most_mj},
+      {"step_over_n", all.step_over_n},
+      {"still_step_n", all.still_step_n},
+      {"fall_n", all.fall_n},
+      {"force_most_n", all.force_most_n},
+      {"motor_over_n", all.motor_over_n},
+      {"motor_late_n", all.motor_late_n},
+      {"motor_most_n", all.motor_most_n},
+      {"thin_wall_deepest_mm", all.deepest_mm},
+      {"torque_most_nmm", all.torque_most_nmm},
+      {"torque_over_nmm", all.torque_over_nmm},
+      {"turn_step_over_n", all.turn_step_over_n},
+      {"cut_step_over_n", all.cut_step_over_n},
+      {"cut_over_nmm", all.cut_over_nmm},
+      {"cut_late_nmm", all.cut_late_nmm},
+      {"cut_most_nmm", all.cut_most_nmm},
+  };
+  std::printf(", \"%s\": {", key);
+  for (const auto& [name, value] : values) std::printf("%s\"%s\": %.10g", name == values[0].first ? "" : ", ", name, value);
+  std::printf("}");
 }
 
 }  // namespace

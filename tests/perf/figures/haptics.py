@@ -5,6 +5,7 @@ import json
 from registry import Measured
 
 TICK_BUDGET_US = 60.0
+PERIOD_US = 1000.0
 
 
 def stability(run):
@@ -28,6 +29,8 @@ def stability(run):
             f"{prefix}_generated": Measured(all_["generated_mj"]),
             f"{prefix}_net": Measured(all_["net_mj"], -all_["cutting_mj"]),
             f"{prefix}_cutting_power": Measured(all_["least_cutting_n_mm"]),
+            f"{prefix}_pushed_back": Measured(100.0 * all_["pushed_back"] / all_["cutting"]),
+            f"{prefix}_pushed_back_most": Measured(all_["pushed_back_most_mj"]),
             f"{prefix}_step": Measured(max(0.0, all_["step_over_n"])),
             f"{prefix}_step_still": Measured(all_["still_step_n"]),
             f"{prefix}_fall": Measured(max(0.0, all_["fall_n"])),
@@ -57,6 +60,8 @@ def tick(run):
         values[f"tick_{work}"] = Measured(p50 / TICK_BUDGET_US, None, None, None, 1)
         values[f"tick_{work}_p50"] = Measured(p50, None, None, None, 1)
         values[f"tick_{work}_p99"] = Measured(p99, None, None, None, 1)
+        if work.endswith("_wedged"):
+            values[f"tick_{work}_late"] = Measured(p99 / PERIOD_US, None, None, None, 1)
     return values
 
 

@@ -116,6 +116,8 @@ class Observer {
     episode_mj_ += force_n_.dot(moved_mm) + turned_mj + cut_mj;
     result_.cutting_mj += cut_mj;
     result_.least_cutting_n_mm = std::min(result_.least_cutting_n_mm, report.cutting_force_n.dot(report.moved_mm));
+    result_.pushed_back_most_mj = std::max(result_.pushed_back_most_mj, report.pushed_back_mj);
+    result_.pushed_back += report.pushed_back_mj > 0.0;
 
     const Vec3& force_n = report.coupling_device_n;
     const Vec3& torque_nmm = report.coupling_device_nmm;
@@ -215,7 +217,7 @@ class Round {
         replica_(bone_, BodyId{}),
         room_(bone_, static_cast<int>(std::lround(1e-3 * run.delay_ms / run.dt_s))) {
     const SimulatedDeviceParams device = number / 2 % 2 ? *find_simulated_device("simulated-3.3N") : SimulatedDeviceParams{};
-    LoopParams params = loop_params(device.limits.peak_n, device.limits.continuous_n, device.limits.stiffness_n_per_mm, 0.0);
+    LoopParams params = loop_params(device.limits, 0.0);
     params.dt_s = run.dt_s;
     // Fifty millimetres for each newton that it can hold, as sigma.7 and omega.7 have it.
     if (run.six_axes) params.peak_nmm = kTorqueArm_mm * device.limits.continuous_n;
@@ -352,8 +354,9 @@ void StabilityResult::add(const StabilityResult& other) {
   generated_mj += other.generated_mj, net_mj += other.net_mj, cutting_mj += other.cutting_mj, turned_mj += other.turned_mj;
   worst_mj = std::max(worst_mj, other.worst_mj);
   least_cutting_n_mm = std::min(least_cutting_n_mm, other.least_cutting_n_mm);
+  pushed_back += other.pushed_back;
   for (double StabilityResult::*most :
-       {&StabilityResult::step_over_n, &StabilityResult::still_step_n, &StabilityResult::fall_n, &StabilityResult::motor_over_n,
+       {&StabilityResult::pushed_back_most_mj, &StabilityResult::step_over_n, &StabilityResult::still_step_n, &StabilityResult::fall_n, &StabilityResult::motor_over_n,
         &StabilityResult::motor_late_n, &StabilityResult::motor_most_n, &StabilityResult::force_most_n,
         &StabilityResult::deepest_mm, &StabilityResult::turn_step_over_n, &StabilityResult::cut_step_over_n,
         &StabilityResult::cut_over_nmm, &StabilityResult::cut_late_nmm, &StabilityResult::cut_most_nmm,

@@ -31,6 +31,9 @@ struct StabilityResult {
   double net_mj = 0;           // over all contacts: negative, what the coupling took
   double cutting_mj = 0;       // work of the cutting forces, at the handle
   double least_cutting_n_mm = 0;  // of all ticks' F_cut · dx
+  // Ticks that had to be made rubbing for that, as turning pushed back what was cut, and the most that one would have given.
+  std::int64_t pushed_back = 0;
+  double pushed_back_most_mj = 0;
   double step_over_n = 0;      // growth of force in a tick that neither the hand's motion nor the slew limit explains; 0: none
   // Fall of force in a tick beyond the slew limit and what the hand's and the tool's motion explain, breakthroughs and
   // safety zeros left out: the monitor's doing.

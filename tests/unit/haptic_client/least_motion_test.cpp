@@ -114,19 +114,19 @@ TEST(CutShape, AGroupOfPointsIsItsPoints) {
       const SweepView view(sweep, now, 0.1);
       double most_off = 0.0;
       for (int round = 0; round < 50; ++round) {
-        Lanes p[3], distance, left, out[3], way[3];
+        Lanes p[3], left;
+        Parts by;
         for (std::size_t i = 0; i < kGroupPoints; ++i) {
           p[0][i] = static_cast<float>(12.0 * even(random));
           p[1][i] = static_cast<float>(12.0 * even(random));
           p[2][i] = static_cast<float>(15.0 * even(random) - 10.0);
         }
-        shape.distance_mm(p, distance, out);
-        view.left_mm(p, left, way);
+        const Lanes distance = shape.distance_mm(p);
+        view.left_mm(p, left, by);
         for (std::size_t i = 0; i < kGroupPoints; ++i) {
           const Vec3 at(p[0][i], p[1][i], p[2][i]);
-          Vec3 one;
-          most_off = std::max(most_off, std::abs(shape.distance_mm(at, one) - static_cast<double>(distance[i])));
-          EXPECT_NEAR(Vec3(way[0][i], way[1][i], way[2][i]).norm(), 1.0, 1e-4);
+          most_off = std::max(most_off, std::abs(shape.distance_mm(at) - static_cast<double>(distance[i])));
+          EXPECT_NEAR(view.way_out(at, by[i]).norm(), 1.0, 1e-4);
           // Where it was at either end it has taken the bone away.
           const Vec3 bone = now.point(at);
           double deepest = std::min(shape.distance_mm(sweep.to.inverse().point(bone)), 1e6);

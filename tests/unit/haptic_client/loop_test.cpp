@@ -238,7 +238,7 @@ TEST(SimulatedDevice, IsChosenByName) {
   EXPECT_EQ(find_simulated_device("simulated")->limits.continuous_n, 30.0);
   const SimulatedDevice desktop(*find_simulated_device("simulated-3.3N"));
   EXPECT_EQ(desktop.name(), "simulated-3.3N");
-  EXPECT_NEAR(loop_params(desktop.limits().peak_n, desktop.limits().continuous_n, desktop.limits().stiffness_n_per_mm, 0.0).force_scale, 0.11, 1e-12);
+  EXPECT_NEAR(loop_params(desktop.limits(), 0.0).force_scale, 0.11, 1e-12);
   const auto none = find_simulated_device("phantom");
   ASSERT_FALSE(none);
   EXPECT_NE(none.error().message.find("simulated"), std::string::npos);
