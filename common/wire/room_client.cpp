@@ -17,11 +17,12 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kMaxReceiveBytes = 4 * 1024 * 1024;  // a piece of a case is 1 MiB, a mesh message about 256 kB
 constexpr auto kAnswerTime = 5s;                   // for one request to a server that was reached
-// A server that is silent so long is asked whether it lives, and gone if it has not answered in kPingAnswerMs. The server
-// allows pings from kShortestPingMs on (server/net/room_server.cpp).
-constexpr int kPingMs = 2000, kPingAnswerMs = 3000;
+// A server that is silent so long is asked whether it lives, and gone if it has not answered for some time. The server allows
+// pings from kShortestPingMs on (server/net/room_server.cpp). A hand goes on feeling its own replica of the bone: it waits
+// longer than its RoomWatch does.
+constexpr int kPingMs = 2000, kPingAnswerMs = 3000, kHandsPingAnswerMs = 25'000;
 
-std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
+std::shared_ptr<grpc::Channel> make_channel(const std::string& address, ClientKind kind) {
   // What fails is told in one sentence by the program, not in gRPC's own lines.
   gpr_set_log_function([](gpr_log_func_args*) {});
   grpc::ChannelArguments arguments;
@@ -30,7 +31,7 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 200);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 200);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kPingMs);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kPingAnswerMs);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kind == ClientKind::haptic ? kHandsPingAnswerMs : kPingAnswerMs);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
@@ -72,7 +73,7 @@ Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const 
     return failure(ErrorCode::invalid_input, "the server's address " + address +
                                                  " is not HOST:PORT; give the one that osteon-server prints, such as 127.0.0.1:50151");
   JoinedRoom room;
-  room.channel = make_channel(address);
+  room.channel = make_channel(address, kind);
 
   // In short waits, so that a person who gives up is heard.
   const auto until = Clock::now() + patience;

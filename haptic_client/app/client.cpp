@@ -84,7 +84,7 @@ class Client {
   }
 
   Result<ClientOutcome> run() {
-    if (Result<void> opened = log_.open(options_.session_log); !opened) return tl::unexpected(opened.error());
+    if (Result<void> opened = log_.open(options_.session_log, session_.device().info()); !opened) return tl::unexpected(opened.error());
     if (Result<void> opened = recorder_.open(options_.record, recording_info()); !opened) return tl::unexpected(opened.error());
     open_room();
     std::thread replica([this] { replica_thread(); });
@@ -165,7 +165,7 @@ class Client {
     room_.open(std::move(events));
   }
 
-  // Force and spindle go down and the client ends with this.
+  // Spindle and force run down and the client ends with this.
   void give_up(const Error& why) {
     const std::lock_guard lock(mutex_);
     if (!lost_why_) lost_why_ = why;
@@ -185,18 +185,20 @@ class Client {
   // [haptic] Nothing here allocates, locks, logs or waits, its own sleep apart.
   void haptic_thread() {
     outcome_.realtime = try_realtime(kPriority);
+    realtime_refused_ = !outcome_.realtime;
     PeriodicTimer timer(kTick, kSpin);
-    constexpr int kRunDownTicks = 500;  // after the link is lost
+    constexpr int kRunDownTicks = 500;  // after the link is lost or a stop was asked for
     int down = 0;
-    while (!session_.done() && !stop_.requested() && down < kRunDownTicks) {
+    while (!session_.done() && down < kRunDownTicks) {
       const int periods = timer.wait(outcome_.ticks);
-      const bool link_ok = link_ok_.load(std::memory_order_relaxed);
-      if (!link_ok) ++down;
+      const bool over = !link_ok_.load(std::memory_order_relaxed) || stop_.requested();
+      if (over) ++down;
       patches_.refresh();
-      const bool room_follows = room_health_.load(std::memory_order_relaxed) == RoomHealth::follows;
-      if (!room_follows) ++outcome_.held_for_room_ticks;
+      const bool follows = room_health_.load(std::memory_order_relaxed) == RoomHealth::follows;
+      if (!follows) ++outcome_.held_for_room_ticks;
       guides_.refresh();
-      const SessionTick now = session_.tick(patches_.value(), link_ok && room_follows, periods, &guides_.value());
+      const RoomLink room = over ? RoomLink::over : follows ? RoomLink::follows : RoomLink::held;
+      const SessionTick now = session_.tick(patches_.value(), room, periods, &guides_.value());
       items_left_.store(session_.left().size(), std::memory_order_release);
 
       const std::int64_t woke_ns = ns(timer.woke());
@@ -238,7 +240,7 @@ class Client {
   // [watchdog] Said at most every five seconds.
   void stalled() {
     const auto now = Clock::now();
-    if (now - stall_told_ < 5s) return;
+    if (stall_told_ && now - *stall_told_ < 5s) return;
     stall_told_ = now;
     log::warn("the haptic loop stands", {{"longer_than_ms", kStall.count()}, {"remedy", "see osteon-haptic check"}});
   }
@@ -403,6 +405,8 @@ class Client {
         note_range(row);
         recorder_.push(row);
       }
+      if (realtime_refused_.exchange(false))
+        log::warn("the haptic loop has no real-time priority", {{"remedy", "see osteon-haptic check"}});
       if (any && link_ok_) room_.send(state_of(row));
       set_items();
       if (over) break;
@@ -492,7 +496,7 @@ class Client {
   EventQueue<TickRow, 2048> rows_; // haptic → reporter
   LatestValue<TickStats> live_;    // haptic → reporter, once a second
   TickStats told_;                 // reporter: of the last line
-  Clock::time_point stall_told_ = Clock::time_point::min() + 1h;  // watchdog
+  std::optional<Clock::time_point> stall_told_;  // watchdog
   std::array<std::atomic<std::int64_t>, kTickTimes> tick_times_;
 
   std::mutex mutex_;               // guards the three below; never taken by the haptic thread
@@ -505,7 +509,7 @@ class Client {
   std::atomic<std::size_t> unconfirmed_{0};
   std::atomic<std::size_t> items_left_{0};  // by the plan
   std::size_t items_set_ = 0;               // in the room; reporter thread
-  std::atomic<bool> link_ok_{true}, joined_{false}, touching_over_{false}, all_over_{false};
+  std::atomic<bool> link_ok_{true}, realtime_refused_{false}, joined_{false}, touching_over_{false}, all_over_{false};
 
   // Haptic thread.
   TickRow row_;

@@ -35,7 +35,7 @@ struct ClientOutcome {
   RoomSeq room_seq;
   double removed_total_mm3 = 0;
   std::uint64_t rejected = 0, patches = 0, uncovered_ticks = 0, cuts_waiting_ticks = 0, rows_dropped = 0;
-  std::uint64_t held_for_room_ticks = 0;  // in which spindle and force were down because the room did not follow
+  std::uint64_t held_for_room_ticks = 0;  // in which the spindle was held because the room did not follow
   double patch_p50_us = 0, patch_p99_us = 0;
   Recorder::Outcome recording;
   std::vector<RangeWatch::Use> outside_range;  // of force laws

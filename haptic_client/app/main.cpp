@@ -178,12 +178,18 @@ void tell_depths(const ReadyPlan& plan, const ClientOutcome& outcome) {
   }
 }
 
-// Error unavailable: the first step whose time ran out. One that a signal stopped is as it should be.
+// Error unavailable: the first step whose time, or whose recording, ran out. One that a signal stopped is as it should be.
 Result<void> all_finished(const ReadyPlan& plan, const ClientOutcome& outcome) {
   for (std::size_t i = 0; i < plan.steps.size(); ++i)
     if (const auto gave_up = outcome.steps[i].gave_up)
       return failure(ErrorCode::unavailable, "step " + std::to_string(i + 1) + " (" + name(plan.steps[i].plan.action) +
                                                  ") did not finish: " + given_up_words(*gave_up));
+  // Without a stop nothing else leaves a step of a plan undone.
+  if (outcome.stopped) return {};
+  for (std::size_t i = 0; i < plan.steps.size(); ++i)
+    if (!outcome.steps[i].completed && plan.steps[i].plan.action != Action::free_hand)
+      return failure(ErrorCode::unavailable, "step " + std::to_string(i + 1) + " (" + name(plan.steps[i].plan.action) +
+                                                 ") did not finish: the recording ends here; play one that was made to its end");
   return {};
 }
 
@@ -203,6 +209,9 @@ Result<void> run(Options& options, const StopSignal& stop) {
   log::info("joined", {{"case", room->bone().info().title}, {"author", room->room().author.value}});
   Result<std::unique_ptr<Session>> session = hand->on(room->bone(), *room->tools(), options.force_scale.value_or(0.0));
   if (!session) return tl::unexpected(session.error());
+  const LoopParams& shown = (*session)->loop().params();
+  log::info("in hand", {{"device", hand->device_name()}, {"peak_n", shown.peak_n}, {"continuous_n", shown.continuous_n},
+                        {"force_scale", shown.force_scale}});
 
   const Result<ClientOutcome> outcome = run_client(*room, **session, options.client, stop);
   const int losses = hand->losses();
@@ -217,10 +226,13 @@ Result<void> run(Options& options, const StopSignal& stop) {
           : write_file(options.summary, summary_of(*outcome, plan, hand->device_name(), losses).dump(2) + "\n");
   tell_depths(plan, *outcome);
   const auto finished = std::ranges::count_if(outcome->steps, &StepResult::completed);
-  std::printf("%s: %s, %lld of %zu steps done, %zu cuts of its own, %.1f mm3 gone from the bone in all, field %.12s at %llu\n",
+  std::printf("%s: %s, %lld of %zu steps done, %zu cuts of its own, %.1f mm3 gone from the bone in all, field %.12s at %llu; "
+              "%llu of %llu ms missed\n",
               kProgram, outcome->lost ? "broken off" : outcome->stopped ? "stopped" : "ended", static_cast<long long>(finished),
               plan.steps.size(), outcome->cuts.size(), outcome->removed_total_mm3, to_hex(outcome->field_hash).c_str(),
-              static_cast<unsigned long long>(outcome->room_seq.value));
+              static_cast<unsigned long long>(outcome->room_seq.value),
+              static_cast<unsigned long long>(outcome->ticks.missed),
+              static_cast<unsigned long long>(outcome->ticks.missed + outcome->ticks.work.count()));
   if (outcome->lost) return tl::unexpected(*outcome->lost);
   if (!cut_log) return cut_log;
   if (!summary) return summary;

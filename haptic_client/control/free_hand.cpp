@@ -135,7 +135,7 @@ void FreeHandSession::take_up(const DeviceReading& reading, SurgeonOrder& order)
   order.rotation = pose_bone_tool.rotation;
 }
 
-SessionTick FreeHandSession::tick(const Patch& patch, bool link_ok, int periods,
+SessionTick FreeHandSession::tick(const Patch& patch, RoomLink room, int periods,
                                   const std::vector<PlacedGuide>* room_guides) noexcept {
   SessionTick result;
   const DeviceReading reading = device_.read();
@@ -149,7 +149,7 @@ SessionTick FreeHandSession::tick(const Patch& patch, bool link_ok, int periods,
   input.spindle_rpm = usable && taken_up_ ? reading.spindle() * plan_.steps[0].spindle_rpm : 0.0;
   input.device_ok = usable;
   input.device_warm = reading.status == DeviceStatus::warm;
-  input.link_ok = link_ok;
+  input.room = room;
   input.periods = periods;
   const std::span<const PlacedGuide> guides = room_guides ? std::span(*room_guides) : std::span<const PlacedGuide>();
   result.reading = reading;

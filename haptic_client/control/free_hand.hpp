@@ -35,7 +35,7 @@ class FreeHandSession final : public Session {
   // all of it, and shown none.
   FreeHandSession(ReadyPlan plan, HapticDevice& device, double force_scale);
 
-  SessionTick tick(const Patch& patch, bool link_ok, int periods = 1,
+  SessionTick tick(const Patch& patch, RoomLink room, int periods = 1,
                    const std::vector<PlacedGuide>* room_guides = nullptr) noexcept override;
   // When its device is over; a person goes on until asked to stop.
   [[nodiscard]] bool done() const noexcept override { return device_.over(); }

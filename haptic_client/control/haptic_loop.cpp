@@ -55,6 +55,8 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   if (tools_.empty()) return report;  // a plan that only waits
   const ToolModel& model = tools_[static_cast<std::size_t>(tool_)];
   if (input.periods > 3) report.events |= kMissedTicks;
+  const bool follows = input.room == RoomLink::follows;
+  if (!follows) report.events |= kRoomHeld;
 
   // While the clutch is held the tool stays; letting go ties the handle to the tool where it now is, without force.
   if (clutched_ && !input.clutch) mapping_.anchor(input.pose_device_tool.position_mm, proxy_.pose().position_mm);
@@ -87,7 +89,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
     report.events |= kGuided;
   }
 
-  spindle_.step(model.spindle, input.link_ok && placed_ ? input.spindle_rpm : 0.0, torque_nmm_, params_.dt_s);
+  spindle_.step(model.spindle, follows && placed_ ? input.spindle_rpm : 0.0, torque_nmm_, params_.dt_s);
   if (spindle_.stalled) report.events |= kStalled;
 
   const Pose proxy_before = proxy_.pose();
@@ -102,7 +104,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
     const double stretch_mm = (pose_bone_wanted.position_mm - proxy_before.position_mm).norm();
     paid_n_per_mm = ledger_.paid_n_per_mm(at_handle * coupling_n_per_mm_, stretch_mm) / at_handle;
     step = proxy_.step(model, patch, pose_bone_wanted, spindle_.rpm, paid_n_per_mm,
-                       input.link_ok && !input.clutch && !cuts_waiting, params_.dt_s,
+                       follows && !input.clutch && !cuts_waiting, params_.dt_s,
                        {guides, guiding_.held() ? guiding_.guide_id() : 0u,
                         params_.tool_effects ? &effects_[static_cast<std::size_t>(tool_)] : nullptr});
   }
@@ -203,8 +205,9 @@ double HapticLoop::load_nmm(const ProxyStep& step, double pressed_n) noexcept {
 void HapticLoop::show(const LoopInput& input, const ToolModel& model, const CouplingForce& coupling, const CouplingMoment& moment,
                       const Vec3& cut_nmm, LoopReport& report) noexcept {
   const double s = params_.force_scale, limit_n = s * moment.limit_n, limit_nmm = moment.energy_scale * moment.limit_nmm;
-  const bool safe = input.device_ok && input.link_ok && input.periods <= 3;
-  ramp_ = std::min(1.0, ramp_ + params_.dt_s / params_.ramp_s);
+  const bool safe = input.device_ok && input.periods <= 3;
+  const double ramp = params_.dt_s / params_.ramp_s;
+  ramp_ = std::clamp(input.room == RoomLink::over ? ramp_ - ramp : ramp_ + ramp, 0.0, 1.0);
   if (ramp_ < 1.0) report.events |= kRamping;
 
   // The hand's own movement may raise the force as fast as it moves, spring and damping; everything else only slowly. Of a
@@ -235,7 +238,7 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
 
   // The motor's port, beside the ledger, in what the limit leaves.
   MotorMoment motor;
-  motor.pedal = input.spindle_rpm > 0.0 && safe;
+  motor.pedal = input.spindle_rpm > 0.0 && input.room == RoomLink::follows && safe;
   motor.spindle_rpm = spindle_.rpm;
   motor.teeth = model.tool.teeth;
   motor.normal_n = shown_.force_n / s;

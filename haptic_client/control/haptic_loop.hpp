@@ -32,7 +32,7 @@ struct LoopParams {
   double continuous_nmm = 0;
   double slew_n_per_ms = 0.5;             // growth of force that the hand did not cause; on the device
   double smooth_s = 2e-3;                 // tau of (7.15), on the cutting force alone
-  double ramp_s = 0.3;                    // after a device came or was calibrated: from no force to all of it
+  double ramp_s = 0.3;                    // after a device came or was calibrated: from no force to all of it; at the end back
   bool motor_effects = true;
   bool tool_effects = true;               // bluntness, clogging, grab, binding, blows
 };
@@ -40,13 +40,20 @@ struct LoopParams {
 // For a device: s = continuous force / 30 N unless given.
 [[nodiscard]] LoopParams loop_params(const DeviceLimits& limits, double force_scale);
 
+// How the room stands to the hand.
+enum class RoomLink : std::uint8_t {
+  follows,  // it takes cuts
+  held,     // silent or far behind: the bone is felt on as it is known, nothing is cut and the spindle runs down
+  over,     // gone for good: as held, and the force goes down to none over the ramp
+};
+
 struct LoopInput {
   Pose pose_device_tool;      // the handle, device frame
   bool clutch = false;        // held: the tool stays, no force, the handle moves freely
   double spindle_rpm = 0;     // commanded
   bool device_ok = true;      // there, working and calibrated; false: no force
   bool device_warm = false;   // no more than the continuous force
-  bool link_ok = true;        // false: the server has gone; no force, no spindle
+  RoomLink room = RoomLink::follows;
   int periods = 1;            // since the last tick; 1 when on time
 };
 
@@ -63,7 +70,8 @@ enum LoopEvent : std::uint32_t {
   kBreakthrough = 256,   // what was cut has ended: the coupling's stretch was let go
   kPushedAway = 512,     // bone that came back, or what turned it, moved the tool from the handle: that became offset
   kEnergyLimited = 1024, // the passivity monitor cut the force
-  kRamping = 2048,       // after connecting
+  kRamping = 2048,       // after connecting, or as the room is over
+  kRoomHeld = 4096,      // the room takes no cuts: the spindle stands
 };
 
 struct LoopReport {

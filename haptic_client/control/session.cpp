@@ -13,10 +13,17 @@ LoopParams params_of(const DeviceLimits& limits, double force_scale, double dt_s
 SimulatedSession::SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale, double dt_s)
     : surgeon_(std::move(plan)), device_(device), loop_(params_of(device.limits, force_scale, dt_s), surgeon_.plan().tools) {}
 
-SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok, int periods, const std::vector<PlacedGuide>* room_guides) noexcept {
+bool SimulatedSession::done() const noexcept {
+  if (surgeon_.done() || !played_ || !played_->over()) return surgeon_.done();
+  return phase_ != SurgeonPhase::retract && phase_ != SurgeonPhase::lift && phase_ != SurgeonPhase::wait;
+}
+
+SessionTick SimulatedSession::tick(const Patch& patch, RoomLink room, int periods,
+                                   const std::vector<PlacedGuide>* room_guides) noexcept {
   const double dt_s = loop_.params().dt_s;
   SessionTick result;
   result.order = surgeon_.act(last_, dt_s);
+  phase_ = result.order.phase;
   if (result.order.phase != SurgeonPhase::done && result.order.phase != SurgeonPhase::wait) {
     const ReadyStep& step = surgeon_.plan().steps[result.order.step];
     if (result.order.take_up) {
@@ -47,7 +54,7 @@ SessionTick SimulatedSession::tick(const Patch& patch, bool link_ok, int periods
   input.spindle_rpm = reading.buttons & kSpindlePedal ? result.order.spindle_rpm : 0.0;
   input.device_ok = reading.usable();
   input.device_warm = reading.status == DeviceStatus::warm;
-  input.link_ok = link_ok;
+  input.room = room;
   input.periods = periods;
   const std::vector<PlacedGuide>& own = surgeon_.plan().guides;
   const std::span<const PlacedGuide> guides = room_guides ? std::span(*room_guides) : std::span(own).first(surgeon_.guides_placed());

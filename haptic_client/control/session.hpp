@@ -16,9 +16,10 @@ struct SessionTick {
 class Session {
  public:
   virtual ~Session() = default;
-  // [haptic] `link_ok` false ends force and spindle; `periods`: of 1 ms since the last tick, 1 when on time.
-  // `room_guides`: those of the room's scene. Null: the plan's own, from the step on that places them.
-  virtual SessionTick tick(const Patch& patch, bool link_ok, int periods = 1, const std::vector<PlacedGuide>* room_guides = nullptr) noexcept = 0;
+  // [haptic] `periods`: of 1 ms since the last tick, 1 when on time. `room_guides`: those of the room's scene. Null: the
+  // plan's own, from the step on that places them.
+  virtual SessionTick tick(const Patch& patch, RoomLink room, int periods = 1,
+                           const std::vector<PlacedGuide>* room_guides = nullptr) noexcept = 0;
   [[nodiscard]] virtual bool done() const noexcept = 0;
   [[nodiscard]] virtual bool endless() const noexcept { return false; }  // goes on until it is asked to stop
   [[nodiscard]] virtual HapticLoop& loop() noexcept = 0;
@@ -36,8 +37,11 @@ class SimulatedSession final : public Session {
   SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale, double dt_s = 1e-3);
 
   // [haptic] The simulated hand lives on these ticks: while none comes, as when the machine stalls, no time passes for it.
-  SessionTick tick(const Patch& patch, bool link_ok, int periods = 1, const std::vector<PlacedGuide>* room_guides = nullptr) noexcept override;
-  [[nodiscard]] bool done() const noexcept override { return surgeon_.done(); }
+  SessionTick tick(const Patch& patch, RoomLink room, int periods = 1,
+                   const std::vector<PlacedGuide>* room_guides = nullptr) noexcept override;
+  // When the plan is done, or what is played is over: nobody moves the handle any more. What needs no handle (the way out
+  // of the bone, the spindle's end, a wait) is gone through first.
+  [[nodiscard]] bool done() const noexcept override;
   // Before the first tick: the handle moves as this device says, and the simulated hand lets go. The plan still says
   // which tools are taken up when. The same cuts and forces come again, bit for bit, with a recording of the same plan at
   // the same force scale on bone that is as it was then, if patches, confirmed cuts and late ticks come in the ticks in
@@ -57,6 +61,7 @@ class SimulatedSession final : public Session {
   HapticLoop loop_;
   LoopReport last_;
   HapticDevice* played_ = nullptr;
+  SurgeonPhase phase_ = SurgeonPhase::take_up;  // of the last tick
 };
 
 }  // namespace osteon::haptic

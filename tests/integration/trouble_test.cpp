@@ -291,6 +291,45 @@ TEST(Trouble, AKilledServerIsNoticedByAllItsClients) { expect_all_notice(SIGKILL
 // Its connections stay open, as those of a machine that lost its network do.
 TEST(Trouble, AServerThatHangsIsNoticedByAllItsClients) { expect_all_notice(SIGSTOP); }
 
+// A room that is silent for ten seconds is felt on as it was, nothing is cut meanwhile, and then the work goes on.
+TEST(Trouble, TenSecondsOfSilenceAreSatOut) {
+  Stage stage(16.0);
+  Process haptic = stage.start_haptic("silent", {{"steps", nlohmann::json::array({drill_at(0, 0, "expert")})}});
+  std::this_thread::sleep_for(4s);
+  ASSERT_TRUE(haptic.running()) << haptic.err();
+  stage.server().signal(SIGSTOP);
+  std::this_thread::sleep_for(10s);
+  EXPECT_TRUE(haptic.running()) << haptic.err();
+  stage.server().signal(SIGCONT);
+  ASSERT_EQ(haptic.wait(60s), 0) << haptic.err();
+  EXPECT_NE(haptic.err().find("the server follows again"), std::string::npos) << haptic.err();
+  auto summary = read_json(stage / "silent.json");
+  EXPECT_EQ(summary["steps"][0]["completed"], true);
+  EXPECT_GT(summary["held_for_room_ticks"].get<int>(), 5000);
+  // The hand never went through bone: no farther from the tool than the expert's push stretches the coupling, and then some.
+  std::ifstream log(stage / "silent.csv");
+  std::string line;
+  std::getline(log, line);
+  const auto column = [&](const std::string& name) {
+    const std::size_t at = line.find("," + name + ",");
+    EXPECT_NE(at, std::string::npos) << name;
+    return std::count(line.begin(), line.begin() + static_cast<std::ptrdiff_t>(at), ',') + 1;
+  };
+  const auto depth = column("depth_mm"), handle = column("device_depth_mm");
+  double most_mm = 0.0;
+  for (std::string row; std::getline(log, row);) {
+    std::vector<std::string> cells;
+    std::istringstream in(row);
+    for (std::string cell; std::getline(in, cell, ',');) cells.push_back(cell);
+    const auto number = [&](auto i) { return std::stod(cells.at(static_cast<std::size_t>(i))); };
+    most_mm = std::max(most_mm, number(handle) - number(depth));
+  }
+  EXPECT_GT(most_mm, 0.1);
+  EXPECT_LT(most_mm, 3.0);
+  EXPECT_EQ(stage.server().terminate(), 0);
+  EXPECT_EQ(summary["field_hash"], read_json(stage / "server.json")["field_hash"]);
+}
+
 TEST(Trouble, AServerStopsCleanlyInTheMiddleOfWork) {
   Stage stage(16.0);
   Process haptic = stage.start_haptic("work", {{"steps", nlohmann::json::array({drill_at(0, 0, "rig")})}});
@@ -306,7 +345,15 @@ TEST(Trouble, AHapticClientStopsCleanlyInTheMiddleOfWork) {
   Process haptic = stage.start_haptic("work", {{"steps", nlohmann::json::array({drill_at(0, 0, "rig")})}});
   std::this_thread::sleep_for(4s);
   ASSERT_TRUE(haptic.running()) << haptic.err();
+  // A machine that stops it is told of, whatever else comes.
+  for (int i = 0; i < 5; ++i) {
+    haptic.signal(SIGSTOP);
+    std::this_thread::sleep_for(50ms);
+    haptic.signal(SIGCONT);
+    std::this_thread::sleep_for(50ms);
+  }
   EXPECT_EQ(haptic.terminate(), 0);
+  EXPECT_NE(haptic.err().find("the haptic loop stands"), std::string::npos) << haptic.err();
   // What it had cut is in the bone, and its own record agrees with the server's.
   EXPECT_EQ(stage.server().terminate(), 0);
   auto work = read_json(stage / "work.json");

@@ -167,7 +167,7 @@ class Blackout {
         const int periods = timer.wait(stats_[part]);
         patches_.refresh();
         const bool follows = follows_.load(std::memory_order_relaxed);
-        const SessionTick tick = session_.tick(patches_.value(), follows, periods);
+        const SessionTick tick = session_.tick(patches_.value(), follows ? RoomLink::follows : RoomLink::held, periods);
         cutting_[part] += tick.report.phase == CuttingPhase::cutting;
         held_[part] += !follows;
         places_.store({tick.report.pose_bone_proxy, tick.report.tool});

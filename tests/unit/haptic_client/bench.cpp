@@ -46,7 +46,7 @@ Bench::Bench(const Case& bone, ReadyPlan plan, const SimulatedDeviceParams& devi
     : delays_(delays), session_(std::move(plan), device, force_scale, dt_s), replica_(bone, BodyId{}) {}
 
 SessionTick Bench::tick(int periods) {
-  last_ = session_.tick(patch_, true, periods);
+  last_ = session_.tick(patch_, RoomLink::follows, periods);
   ++ticks_;
   return last_;
 }

@@ -39,7 +39,7 @@ class FreeHand : public ::testing::Test {
   SessionTick tick() {
     if (session_->loop().mapping().scale() > 0.0 && taken_)
       builder_.build(field_, session_->loop().tool(0), last_.report.pose_bone_proxy, patch_);
-    last_ = session_->tick(patch_, true);
+    last_ = session_->tick(patch_, RoomLink::follows);
     taken_ |= last_.order.take_up;
     return last_;
   }
@@ -185,7 +185,7 @@ TEST_F(FreeHand, DoesNotAllocate) {
     handle_.reading.pose_device_tool.position_mm.z() -= 0.01;
     handle_.reading.buttons = i / 50 == 2 ? kClutchButton : 0u;
     handle_.reading.status = i / 50 == 1 ? DeviceStatus::absent : DeviceStatus::ok;
-    (void)session_->tick(patch_, true);
+    (void)session_->tick(patch_, RoomLink::follows);
   }
   EXPECT_EQ(heap.count(), 0);
 }

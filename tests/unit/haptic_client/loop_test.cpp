@@ -93,17 +93,16 @@ TEST_F(LoopOnBlock, TheClutchIsForcelessAndMovesNothing) {
 }
 
 TEST_F(LoopOnBlock, SafetyZerosComeAtOnce) {
-  for (int fault = 0; fault < 4; ++fault) {
+  for (int fault = 0; fault < 3; ++fault) {
     loop_->take_up(0, {{0, 0, -1}, Eigen::Quaterniond::Identity()}, WorkspaceMapping{});
     input_ = {};
     input_.pose_device_tool.position_mm = {0, 0, -1};
     move_to({0, 0, 0.3});
     ASSERT_GT(tick().force_device_n.norm(), 8.0);
     if (fault == 0) input_.device_ok = false;
-    if (fault == 1) input_.link_ok = false;
-    if (fault == 2) input_.periods = 4;
+    if (fault == 1) input_.periods = 4;
     Patch nothing;
-    const LoopReport report = fault == 3 ? loop_->tick(input_, nothing) : tick();
+    const LoopReport report = fault == 2 ? loop_->tick(input_, nothing) : tick();
     EXPECT_EQ(report.force_device_n.norm(), 0.0) << fault;
   }
 }
@@ -149,9 +148,9 @@ TEST_F(LoopOnBlock, ForceReturnsGradually) {
   move_to({0, 0, 0.5});
   const double full = tick().force_device_n.norm();
   ASSERT_GT(full, 15.0);
-  input_.link_ok = false;
-  tick();
-  input_.link_ok = true;
+  input_.periods = 4;
+  ASSERT_EQ(tick().force_device_n.norm(), 0.0);
+  input_.periods = 1;
   double before = 0.0;
   for (int i = 0; i < 100; ++i) {
     const double now = tick().force_device_n.norm();
@@ -161,13 +160,41 @@ TEST_F(LoopOnBlock, ForceReturnsGradually) {
   EXPECT_NEAR(before, full, 0.01);
 }
 
-TEST_F(LoopOnBlock, WithoutALinkTheSpindleRunsDown) {
+TEST_F(LoopOnBlock, WhileTheRoomIsSilentTheSpindleRunsDownAndBoneStaysHard) {
   input_.spindle_rpm = 1000;
   for (int i = 0; i < 400; ++i) tick();
   EXPECT_EQ(tick().spindle_rpm, 1000.0);
-  input_.link_ok = false;
+  input_.room = RoomLink::held;
   for (int i = 0; i < 400; ++i) tick();
-  EXPECT_EQ(tick().spindle_rpm, 0.0);
+  move_to({0, 0, 0.3});
+  for (int i = 0; i < 2000; ++i) {
+    const LoopReport report = tick();
+    ASSERT_EQ(report.spindle_rpm, 0.0);
+    ASSERT_NE(report.phase, CuttingPhase::cutting);
+    ASSERT_TRUE(report.events & kRoomHeld);
+    // The spring of what the hand is within the bone, its point a little before it.
+    ASSERT_NEAR(report.force_device_n.norm(), 50.0 * 0.3, 50.0 * 0.1) << i;
+  }
+}
+
+// When it has gone for good the hand is let go over the ramp, not at once.
+TEST_F(LoopOnBlock, AtTheEndTheHandIsLetGoOverTheRamp) {
+  LoopParams params;
+  params.ramp_s = 0.2;
+  loop_ = std::make_unique<HapticLoop>(params, std::vector<ToolModel>{ToolModel(*find_tool("drill-3.2"), bone_.pitch_mm())});
+  loop_->take_up(0, {{0, 0, -1}, Eigen::Quaterniond::Identity()}, WorkspaceMapping{});
+  for (int i = 0; i < 300; ++i) tick();
+  move_to({0, 0, 0.3});
+  const double full_n = tick().force_device_n.norm();
+  ASSERT_GT(full_n, 8.0);
+  input_.room = RoomLink::over;
+  for (int i = 1; i <= 200; ++i) {
+    const LoopReport report = tick();
+    EXPECT_LE(report.force_device_n.norm(), full_n * (1.0 - i / 200.0) + 1e-9) << i;
+    EXPECT_TRUE(report.events & kRamping);
+    if (i == 100) { EXPECT_GT(report.force_device_n.norm(), 0.2 * full_n); }
+  }
+  EXPECT_EQ(tick().force_device_n.norm(), 0.0);
 }
 
 // k of the device is never exceeded, however far the tool moves for each millimetre of the handle.
@@ -200,8 +227,8 @@ TEST(Session, LateTicksReachTheLoop) {
     bench.follow();
   }
   ASSERT_GT(bench.tick().report.force_device_n.norm(), 5.0);
-  EXPECT_GT(bench.session().tick(bench.patch(), true, 3).report.force_device_n.norm(), 5.0);
-  const LoopReport late = bench.session().tick(bench.patch(), true, 4).report;
+  EXPECT_GT(bench.session().tick(bench.patch(), RoomLink::follows, 3).report.force_device_n.norm(), 5.0);
+  const LoopReport late = bench.session().tick(bench.patch(), RoomLink::follows, 4).report;
   EXPECT_EQ(late.force_device_n.norm(), 0.0);
   EXPECT_TRUE(late.events & kMissedTicks);
 }

@@ -44,7 +44,7 @@ class Before {
   }
   const LoopReport& tick() {
     if (taken_ && ticks_++ % 12 == 0) builder_.build(field_, session_->loop().tool(0), last_.report.pose_bone_proxy, patch_);
-    last_ = session_->tick(patch_, true);
+    last_ = session_->tick(patch_, RoomLink::follows);
     taken_ |= last_.order.take_up;
     return last_.report;
   }
