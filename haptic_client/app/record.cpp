@@ -21,7 +21,7 @@ std::string law_name(const ToolModel& model) { return std::string(model.law->nam
 
 std::vector<std::string> event_names() {
   return {"uncovered", "force limited", "slew limited", "cuts waiting", "missed ticks", "heel contact", "guided",
-          "stalled", "breakthrough", "bone returned", "energy limited", "ramping"};
+          "stalled", "breakthrough", "pushed away", "energy limited", "ramping"};
 }
 
 std::vector<std::string> range_names() {
@@ -39,8 +39,9 @@ std::string RangeWatch::note(const ToolModel& model, const LoopReport& report) {
   return first ? out_of_range_sentence(*model.law, report.out_of_range) : std::string();
 }
 
-Result<void> SessionLog::open(const std::filesystem::path& file) {
+Result<void> SessionLog::open(const std::filesystem::path& file, const DeviceInfo& device) {
   path_ = file;
+  shows_force_ = device.force_axes > 0;
   if (file.empty()) return {};
   file_.open(file, std::ios::trunc);
   if (!file_)
@@ -55,12 +56,13 @@ void SessionLog::write(const TickRow& row, const std::string& tool) {
   if (first_mono_ns_ == 0) first_mono_ns_ = row.mono_ns;
   const LoopReport& r = row.report;
   const Vec3& tip = r.pose_bone_proxy.position_mm;
+  const double rendered_n = shows_force_ ? row.force_rendered_n : 0.0;
   char line[384];
   const int size =
       std::snprintf(line, sizeof line, "%.3f,%lld,%llu,%s,%s,%.5f,%.5f,%.5f,%.5f,%.5f,%.4f,%.4f,%.5f,%.4f,%.4f,%.2f,%.3f,%u\n",
                     1e-9 * static_cast<double>(row.mono_ns - first_mono_ns_), static_cast<long long>(row.mono_ns),
                     static_cast<unsigned long long>(r.state_seq), name(r.phase), tool.c_str(), tip.x(), tip.y(), tip.z(),
-                    row.depth_mm, row.device_depth_mm, r.force_physical_n.norm(), row.force_rendered_n, r.feed_mm_per_s,
+                    row.depth_mm, row.device_depth_mm, r.force_physical_n.norm(), rendered_n, r.feed_mm_per_s,
                     r.density_g_cm3, r.engaged, r.spindle_rpm, r.torque_nmm, r.out_of_range);
   file_.write(line, size);
 }

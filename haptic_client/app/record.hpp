@@ -61,14 +61,16 @@ class RangeWatch {
 // Rows are written as they come; a disk that is full shows at finish().
 class SessionLog {
  public:
-  // Without a path everything is dropped. Error internal: the file cannot be made.
-  [[nodiscard]] Result<void> open(const std::filesystem::path& file);
+  // Without a path everything is dropped. `device`: in the hand; one without motors shows no force. Error internal: the
+  // file cannot be made.
+  [[nodiscard]] Result<void> open(const std::filesystem::path& file, const DeviceInfo& device);
   void write(const TickRow& row, const std::string& tool);
   [[nodiscard]] Result<void> finish();
 
  private:
   std::filesystem::path path_;
   std::ofstream file_;
+  bool shows_force_ = true;
   std::int64_t first_mono_ns_ = 0;  // of the first row; 0: none yet
 };
 

@@ -27,9 +27,10 @@ constexpr const char* kReadme =
     "patient's (DICOM LPS: x to the left, y to the back, z to the head); frame `device` has x to the right, y up, z to the user. "
     "drill_pose is the tool as the bone lets it be (the proxy), device_pose the tool as the hand holds it, handle_pose the "
     "device's handle. Wrenches are [fx, fy, fz, tx, ty, tz] at the tip: `physical` of the bone on the tool, not scaled; "
-    "`wrench` in drill_force_feedback as it was shown by the device, s times as strong (data/force_scale). burr_change has a "
-    "row for each time that a tool was taken up: which, at which row, and how the device's frame lay in the bone's from then on. "
-    "Enumerations carry their names. Bone that was removed is named by metadata/field_hash and kept in the room's journal.";
+    "`wrench` in drill_force_feedback as it was shown by the device, s times as strong (data/force_scale), zero where it shows "
+    "none. burr_change has a row for each time that a tool was taken up: which, at which row, and how the device's frame lay in "
+    "the bone's from then on. Enumerations carry their names. Bone that was removed is named by metadata/field_hash and kept in "
+    "the room's journal.";
 
 // The frames and units of columns.
 constexpr const char* kBone = "bone";
@@ -286,6 +287,8 @@ tl::unexpected<Error> RecordFile::Impl::failed(const char* what) {
 void RecordFile::Impl::make_columns() {
   using R = TickRow;
   const double s = info.loop.force_scale;
+  // What the loop would show on a device that has no motors for it is shown by nobody.
+  const bool forces = info.device_info.force_axes > 0, torques = info.device_info.torque_axes > 0;
   const auto add = [this](auto&& made) { columns.push_back(std::forward<decltype(made)>(made)); };
   add(column<double, R>(recording::kHandlePose, "mm, mm, mm, 1, 1, 1, 1", kDevice, "the device's handle",
                         [](const R& r) { return numbers(r.reading.pose_device_tool); }));
@@ -295,9 +298,12 @@ void RecordFile::Impl::make_columns() {
                         "the tool as the bone lets it be: the proxy",
                         [](const R& r) { return numbers(r.report.pose_bone_proxy); }));
   add(column<float, R>("drill_force_feedback/wrench", "N, N, N, N.mm, N.mm, N.mm", kDevice, "shown by the device to the hand",
-                       [](const R& r) { return wrench(r.rendered.force_n, r.rendered.torque_nmm); }));
+                       [forces, torques](const R& r) {
+                         return wrench(forces ? r.rendered.force_n : Vec3(Vec3::Zero()),
+                                       torques ? r.rendered.torque_nmm : Vec3(Vec3::Zero()));
+                       }));
   add(column<float, R>("drill_force_feedback/motor_force", "N, N, N", kDevice, "what of it is the motor's: drag, kick, vibration",
-                       [](const R& r) { return numbers(r.report.motor_device_n); }));
+                       [forces](const R& r) { return numbers(forces ? r.report.motor_device_n : Vec3(Vec3::Zero())); }));
   add(column<float, R>("drill_force_physical/wrench", "N, N, N, N.mm, N.mm, N.mm", kBone, "of the bone on the tool, not scaled",
                        [](const R& r) { return wrench(r.report.force_physical_n, r.report.torque_physical_nmm); }));
   add(column<float, R>("drill_force_physical/cutting_force", "N, N, N", kBone, "of the tool on the bone, by the law alone",
@@ -322,7 +328,7 @@ void RecordFile::Impl::make_columns() {
   add(column<float, R>("data/coupling_energy", "mJ", "", "given out by the coupling in this contact, less what the hand put in",
                        [](const R& r) { return r.report.energy.episode_mj; }));
   add(column<float, R>("data/offset", "mm, mm, mm", kBone,
-                       "of the hand's place: slack and what returned bone would have stretched",
+                       "of the hand's place: slack, and what pushing the tool away would have stretched",
                        [](const R& r) { return numbers(r.report.offset_mm); }));
   add(column<float, R>("data/depth", "mm", "", "of the tip below the entry of the step under way",
                        [](const R& r) { return r.depth_mm; }));

@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <bit>
 #include <csignal>
 #include <fstream>
 #include <thread>
@@ -262,6 +263,52 @@ print("%.6f,%.6f,%.6f,%.6f,%.6f" % (f["high_frequency_poses/drill_pose/pose"][i,
   ASSERT_EQ(std::sscanf(read.out.c_str(), "%lf,%lf,%lf,%lf,%lf", &got[0], &got[1], &got[2], &got[3], &got[4]), 5);
   ASSERT_EQ(std::sscanf(expected, "%lf,%lf,%lf,%lf,%lf", &want[0], &want[1], &want[2], &want[3], &want[4]), 5);
   for (int i = 0; i < 5; ++i) EXPECT_NEAR(got[i], want[i], i < 2 ? 1e-6 : 4e-6) << i;  // poses are doubles, forces floats
+}
+
+// What the loop would have shown on a stronger device is shown by no motor: neither recording nor log says that it was.
+TEST(Recording, ADeviceWithoutMotorsShowsNothing) {
+  const TempDir temp;
+  struct Device {
+    const char* name;
+    int force_axes, torque_axes;
+  };
+  for (const Device& device : {Device{"spacemouse", 0, 0}, {"falcon", 3, 0}, {"sigma", 3, 3}}) {
+    RecordingInfo info = info_of_a_session();
+    info.device_info.force_axes = device.force_axes;
+    info.device_info.torque_axes = device.torque_axes;
+    TickRow one = row(0);
+    one.rendered = {Vec3(1, 2, 2), Vec3(4, 5, 6)};
+    one.force_rendered_n = 3.0;
+    one.report.motor_device_n = {0.5, 0, 0};
+    const auto file = temp / (std::string(device.name) + ".h5"), log = temp / (std::string(device.name) + ".csv");
+    Result<RecordFile> recording = RecordFile::create(file, info);
+    ASSERT_TRUE(recording);
+    ASSERT_TRUE(recording->append({&one, 1}));
+    ASSERT_TRUE(recording->finish({}));
+    SessionLog lines;
+    ASSERT_TRUE(lines.open(log, info.device_info));
+    lines.write(one, "drill-3.2");
+    ASSERT_TRUE(lines.finish());
+    const auto read = python("import sys, csv, h5py; f = h5py.File(sys.argv[1], 'r'); g = f['drill_force_feedback']\n"
+                             "log = next(csv.DictReader(open(sys.argv[1][:-2] + 'csv')))\n"
+                             "print(g['wrench'][0].tolist(), g['motor_force'][0, 0], float(log['force_rendered_n']))", file);
+    EXPECT_EQ(read.out, device.torque_axes  ? "[1.0, 2.0, 2.0, 4.0, 5.0, 6.0] 0.5 3.0\n"
+                        : device.force_axes ? "[1.0, 2.0, 2.0, 0.0, 0.0, 0.0] 0.5 3.0\n"
+                                            : "[0.0, 0.0, 0.0, 0.0, 0.0, 0.0] 0.0 0.0\n")
+        << device.name << read.err;
+  }
+}
+
+// The bits of a recording mean what the loop sets them for.
+TEST(Recording, NamesItsEvents) {
+  const std::vector<std::string> names = event_names();
+  const auto named = [&](unsigned bit) { return names.at(static_cast<std::size_t>(std::countr_zero(bit))); };
+  EXPECT_EQ(named(kUncovered), "uncovered");
+  EXPECT_EQ(named(kStalled), "stalled");
+  EXPECT_EQ(named(kBreakthrough), "breakthrough");
+  EXPECT_EQ(named(kPushedAway), "pushed away");
+  EXPECT_EQ(named(kRamping), "ramping");
+  EXPECT_EQ(names.size(), static_cast<std::size_t>(std::bit_width(static_cast<unsigned>(kRamping))));
 }
 
 // Each law is told of once in a session, with what it was first outside of; all that follows is counted.
