@@ -111,6 +111,35 @@ TEST(Replay, MakesTheSameCutsAndForces) {
   }
 }
 
+// A recording that was broken off ends the session that it is played in, and nothing is said of the bone.
+TEST(Replay, EndsWithARecordingThatWasBrokenOff) {
+  const osteon::test::TempDir temp;
+  const Case bone = block_case();
+  const std::vector<PlanStep> plan{drill(HandKind::expert, {0.1, -0.2, 0}), drill(HandKind::expert, {3.4, 1.2, 0})};
+  record(bone, plan, {}, temp / "a.h5");
+  for (const double share : {0.02, 0.25, 0.6}) {
+    Result<RecordedSession> session = read_recording(temp / "a.h5");
+    ASSERT_TRUE(session) << session.error().message;
+    const auto rows = static_cast<std::size_t>(share * static_cast<double>(session->readings.size()));
+    session->readings.resize(rows);
+    RecordedDevice recorded("broken off", std::move(*session));
+    Bench bench(bone, plan, {std::string(recorded.name()), recorded.limits()}, recorded.session().force_scale);
+    bench.session().play(recorded);
+    SurgeonPhase phase{};
+    for (std::size_t i = 0; i < rows; ++i) {
+      ASSERT_FALSE(bench.session().done()) << share;
+      phase = bench.tick().order.phase;
+      bench.follow();
+    }
+    ASSERT_NE(phase, SurgeonPhase::retract);  // that is gone through without a hand
+    EXPECT_TRUE(bench.session().done()) << share << ' ' << name(phase);
+    const std::vector<StepResult>& results = bench.session().results();
+    EXPECT_EQ(results[0].completed, share > 0.5);
+    EXPECT_FALSE(results[1].completed);
+    for (const StepResult& result : results) EXPECT_FALSE(result.gave_up) << share;
+  }
+}
+
 // The hash is of what the hand did: another hand leaves another bone.
 TEST(Replay, AnotherRecordingMakesAnotherBone) {
   const osteon::test::TempDir temp;
