@@ -166,18 +166,6 @@ Result<void> check_outputs(const Options& options) {
   return check_writable(options.summary, "the summary", "--summary");
 }
 
-// A line for each step whose tool stayed well above where it was sent: hand and device are springs, bone pushes back.
-void tell_depths(const ReadyPlan& plan, const ClientOutcome& outcome) {
-  for (std::size_t i = 0; i < plan.steps.size(); ++i) {
-    const ReadyStep& step = plan.steps[i];
-    if (!outcome.steps[i].completed || step.plan.action != Action::burr) continue;
-    const double asked_mm = step.asked_mm(), reached_mm = outcome.steps[i].deepest_mm;
-    if (reached_mm < 0.9 * asked_mm)
-      std::printf("%s: step %zu (%s) reached %.2f mm of the %.2f mm asked: bone pushes hand and handle back\n", kProgram, i + 1,
-                  name(step.plan.action), reached_mm, asked_mm);
-  }
-}
-
 // Error unavailable: the first step whose time, or whose recording, ran out. One that a signal stopped is as it should be.
 Result<void> all_finished(const ReadyPlan& plan, const ClientOutcome& outcome) {
   for (std::size_t i = 0; i < plan.steps.size(); ++i)
@@ -213,6 +201,7 @@ Result<void> run(Options& options, const StopSignal& stop) {
   log::info("in hand", {{"device", hand->device_name()}, {"peak_n", shown.peak_n}, {"continuous_n", shown.continuous_n},
                         {"force_scale", shown.force_scale}});
 
+  options.client.played = hand->recorded();
   const Result<ClientOutcome> outcome = run_client(*room, **session, options.client, stop);
   const int losses = hand->losses();
   hand->disconnect();
@@ -224,7 +213,6 @@ Result<void> run(Options& options, const StopSignal& stop) {
       options.summary.empty()
           ? Result<void>()
           : write_file(options.summary, summary_of(*outcome, plan, hand->device_name(), losses).dump(2) + "\n");
-  tell_depths(plan, *outcome);
   const auto finished = std::ranges::count_if(outcome->steps, &StepResult::completed);
   std::printf("%s: %s, %lld of %zu steps done, %zu cuts of its own, %.1f mm3 gone from the bone in all, field %.12s at %llu; "
               "%llu of %llu ms missed\n",

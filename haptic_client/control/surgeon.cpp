@@ -16,6 +16,10 @@ constexpr double kBeyondGone_mm = 1.0;       // sought so far past the far side 
 constexpr double kCorticalDensity = 1.1;     // g/cm³; what is denser counts as cortex in the means
 constexpr double kBurrTilt_rad = 30.0 * std::numbers::pi / 180.0;  // the pole of a burr does not cut
 constexpr double kPass_mm = 0.6;             // depth of a burr's pass
+constexpr double kFollows_s = 0.25;          // a hand is where it should be after some of its time constants, B/K of 0.04 to 0.07 s
+constexpr double kLastDwell_s = 1.0;         // and at the end it presses on until bone hardly gives way any more
+constexpr double kGrown_mm = 0.01;           // a tip that comes less deeper than this in such a time comes no deeper
+constexpr double kEnough = 0.9;              // part of the depth asked with which a window counts as done
 
 double depth_mm(const ReadyStep& step, const Vec3& tip_mm) { return (tip_mm - step.site.entry_mm).dot(step.site.axis); }
 
@@ -59,7 +63,11 @@ double most_s(const ReadyStep& step, SurgeonPhase phase) {
     case SurgeonPhase::seek: return kMargin_s + 2.0 * step.site.thickness_mm / kSeekSpeed_mm_per_s;
     case SurgeonPhase::push: return kMostPush_s;
     case SurgeonPhase::feed: return kMargin_s + 2.0 * feed_end_mm(step) / step.plan.feed_mm_per_s;
-    case SurgeonPhase::sweep: return kMargin_s + 2.0 * step.sweep_length_mm / step.plan.sweep_mm_per_s;
+    case SurgeonPhase::sweep: {
+      constexpr double kMostDwell_s = 3.0;
+      const double dwells = step.dwells ? static_cast<double>(step.sweep_mm.size() / step.line_places) : 1.0;
+      return kMargin_s + 2.0 * step.sweep_length_mm / step.plan.sweep_mm_per_s + kMostDwell_s * dwells;
+    }
     default: return kMargin_s;
   }
 }
@@ -77,6 +85,8 @@ void plan_sweep(const Case& bone, const Tool& tool, ReadyStep& step) {
   const int passes = std::max(1, static_cast<int>(std::ceil(step.plan.depth_mm / kPass_mm)));
   const int lines = 1 + static_cast<int>(std::ceil(2.0 * half_v / (0.4 * tool.diameter_mm)));
   const int places = 1 + static_cast<int>(std::ceil(2.0 * half_u));
+  step.line_places = static_cast<std::size_t>(places);
+  step.dwells = 2.0 * half_u < kFollows_s * step.plan.sweep_mm_per_s;
   const auto surface_height = [&](double u, double v) {
     const Vec3 from = site.entry_mm + u * site.across_u + v * site.across_v - 10.0 * site.axis;
     const double distance = distance_to_bone_mm(bone, from, site.axis, 20.0);
@@ -246,7 +256,8 @@ const char* given_up_words(SurgeonPhase phase) {
     case SurgeonPhase::push: return "the bone did not give way; press harder (\"push_n\"), or take another tool or a sharper one";
     case SurgeonPhase::feed:
       return "the tool did not come as deep as asked; feed it more slowly (\"feed_mm_per_s\"), or take a device that shows more force";
-    case SurgeonPhase::sweep: return "the window was not swept in time";
+    case SurgeonPhase::sweep:
+      return "the bur did not come as deep as asked; take a sharper one, or hold it more stiffly (\"hand_stiffness_n_per_mm\")";
     case SurgeonPhase::retract: return "the tool did not come out of the bone";
     case SurgeonPhase::lift: return "the spindle did not stop";
     default: return "the hand did not get there in time";
@@ -401,27 +412,44 @@ void Surgeon::finish_feed(const ReadyStep& step, const LoopReport& report) noexc
   enter(SurgeonPhase::lift);
 }
 
-void Surgeon::burr(const ReadyStep& step, const LoopReport&, double dt_s) noexcept {
+bool Surgeon::dwelt(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept {
+  const double depth = depth_mm(step, report.pose_bone_proxy.position_mm);
+  still_s_ += dt_s;
+  if (depth > dwell_mm_ + kGrown_mm) {
+    dwell_mm_ = depth;
+    still_s_ = 0.0;
+  }
+  const bool last = knot_ == step.sweep_mm.size();
+  return depth > depth_mm(step, hand_.target_mm) - kGrown_mm || still_s_ > (last ? kLastDwell_s : kFollows_s);
+}
+
+void Surgeon::burr(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept {
   if (phase_ == SurgeonPhase::seek) {
     hand_.target_mm = step.sweep_mm.front() - kNear_mm * step.site.axis;
     knot_ = 0;
+    dwelling_ = false;
     enter(SurgeonPhase::sweep);
     return;
   }
   if (phase_ != SurgeonPhase::sweep) return;
   hand_.mode = step.plan.hand == HandKind::rig ? HandMode::rig : HandMode::carry;
+  if (dwelling_) dwelling_ = !dwelt(step, report, dt_s);
   double left_mm = step.plan.sweep_mm_per_s * dt_s;
-  while (left_mm > 0.0 && knot_ < step.sweep_mm.size()) {
+  while (!dwelling_ && left_mm > 0.0 && knot_ < step.sweep_mm.size()) {
     const Vec3 away = step.sweep_mm[knot_] - hand_.target_mm;
     const double distance = away.norm();
     if (distance <= left_mm) {
       hand_.target_mm = step.sweep_mm[knot_++];
+      dwelling_ = knot_ == step.sweep_mm.size() || (step.dwells && knot_ % step.line_places == 0);
+      dwell_mm_ = depth_mm(step, report.pose_bone_proxy.position_mm);
+      still_s_ = 0.0;
     } else {
       hand_.target_mm += away * (left_mm / distance);
     }
     left_mm -= distance;
   }
-  if (knot_ == step.sweep_mm.size()) {
+  if (!dwelling_ && knot_ == step.sweep_mm.size()) {
+    if (results_[step_].deepest_mm < kEnough * step.asked_mm()) results_[step_].gave_up = phase_;
     target_depth_mm_ = depth_mm(step, hand_.target_mm);
     enter(SurgeonPhase::retract);
   }

@@ -57,6 +57,8 @@ struct ReadyStep {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // of the tool, bone frame
   std::vector<Vec3> sweep_mm;         // places of the tip, burr
   double sweep_length_mm = 0;         // from the first to the last of them
+  std::size_t line_places = 1;        // of them, in each of the lines to and fro
+  bool dwells = false;                // at the end of each line, which is too short for the hand to follow; else of the last only
   [[nodiscard]] bool takes_tool() const { return plan.action != Action::wait && plan.action != Action::place; }
   [[nodiscard]] bool feeds() const { return plan.action == Action::drill || plan.action == Action::screw; }
   // How deep the tip is to come below the entry, mm: through the bone, to_mm, or the lowest place of a sweep. What a device
@@ -151,6 +153,8 @@ class Surgeon {
   void tremble(const ReadyStep& step, SurgeonOrder& order) const noexcept;
   void drill(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept;
   void burr(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept;
+  // The target waits for the tip; true when that is there, or gets no deeper.
+  bool dwelt(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept;
 
   ReadyPlan plan_;
   std::vector<StepResult> results_;
@@ -163,6 +167,9 @@ class Surgeon {
   double target_depth_mm_ = 0;
   double last_engaged_mm_ = -1;   // depth of the tip when the cone was last in bone, beyond the far side
   std::size_t knot_ = 0;          // next place of a sweep
+  bool dwelling_ = false;
+  double dwell_mm_ = 0;           // depth of the tip, dwelling, when it last got deeper
+  double still_s_ = 0;            // and how long ago that is
 };
 
 }  // namespace osteon::haptic

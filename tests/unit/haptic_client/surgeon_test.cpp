@@ -86,6 +86,46 @@ TEST(Surgeon, SaysHowDeepAStepIsToCome) {
   EXPECT_NEAR(ready->steps[2].asked_mm(), 2.0 - 2.5 * (1.0 - std::cos(std::numbers::pi / 6.0)), 0.05);
 }
 
+// A window hardly wider than the bur is a place, or a few close together: the hand is given the time to follow there, and
+// what is gone is at least the cap of the bur's sphere as deep as it came.
+TEST(Surgeon, BursASmallWindowAsDeepAsAsked) {
+  for (const double window_mm : {2.0, 4.0, 5.5, 6.0})
+    for (const double deep_mm : {1.0, 2.0}) {
+      PlanStep step = burr_window();
+      step.hand = HandKind::expert;
+      step.window_u_mm = step.window_v_mm = window_mm;
+      step.depth_mm = deep_mm;
+      Bench bench(block_case(), {step});
+      bench.run();
+      const StepResult& result = bench.session().results()[0];
+      const double asked_mm = bench.session().plan().steps[0].asked_mm();
+      std::printf("  window of %.1f mm: %.2f of %.2f mm in %.1f s\n", window_mm, result.deepest_mm, asked_mm, result.duration_s);
+      EXPECT_TRUE(result.completed) << window_mm;
+      EXPECT_GE(result.deepest_mm, 0.9 * asked_mm) << window_mm;
+      const double sphere_mm = 2.5, cap_mm = result.deepest_mm + sphere_mm * (1.0 - std::cos(std::numbers::pi / 6.0));
+      const double cap_mm3 = std::numbers::pi * cap_mm * cap_mm * (sphere_mm - cap_mm / 3.0);
+      EXPECT_GT(bench.replica().committed().removed_mm3(), 0.95 * cap_mm3) << window_mm;
+    }
+}
+
+// Bone holds a loose hand back: what did not come as deep as asked is not done, and the bur is drawn out all the same.
+TEST(Surgeon, AWindowThatIsTooShallowIsNotCompleted) {
+  PlanStep step = burr_window();
+  step.hand = HandKind::expert;
+  step.hand_stiffness_n_per_mm = 0.3;
+  Bench bench(block_case(), {step});
+  SurgeonPhase last = SurgeonPhase::take_up;
+  bench.run([&](const SessionTick& tick) {
+    if (!bench.session().done()) last = tick.order.phase;
+  });
+  const StepResult& result = bench.session().results()[0];
+  EXPECT_LT(result.deepest_mm, 0.9 * bench.session().plan().steps[0].asked_mm());
+  EXPECT_FALSE(result.completed);
+  ASSERT_TRUE(result.gave_up);
+  EXPECT_EQ(*result.gave_up, SurgeonPhase::sweep);
+  EXPECT_EQ(last, SurgeonPhase::lift);
+}
+
 TEST(Plan, HasADigestOfItsOwn) {
   const Case bone = block_case();
   const auto digest = [&](const std::vector<PlanStep>& steps, const ToolFinder& find = find_tool) {
