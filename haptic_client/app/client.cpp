@@ -84,7 +84,8 @@ class Client {
   }
 
   Result<ClientOutcome> run() {
-    if (Result<void> opened = log_.open(options_.session_log, session_.device().info()); !opened) return tl::unexpected(opened.error());
+    if (Result<void> opened = log_.open(options_.session_log, session_.device().info()); !opened)
+      return tl::unexpected(opened.error());
     if (Result<void> opened = recorder_.open(options_.record, recording_info()); !opened) return tl::unexpected(opened.error());
     open_room();
     std::thread replica([this] { replica_thread(); });
@@ -310,6 +311,12 @@ class Client {
     replica_.joined(room.contained);
     lease_epoch_ = room.lease_epoch;
     noted_mm3_ = replica_.removed_mm3();  // by others, before the first step
+    if (recorder_.recording() || options_.played) {
+      const std::string found = to_hex(replica_.hash());
+      recorder_.begin_on(found);
+      if (options_.played)
+        if (const Result<void> fits = check_played_on(*options_.played, found); !fits) return give_up(fits.error());
+    }
     joined_ = true;
   }
   void take(const BonePart& part) {

@@ -11,6 +11,7 @@
 #include "common/runtime/tick_stats.hpp"
 #include "haptic_client/app/record.hpp"
 #include "haptic_client/app/recorder.hpp"
+#include "haptic_client/device/recorded_device.hpp"
 #include "haptic_client/net/room_session.hpp"
 
 namespace osteon::haptic {
@@ -18,6 +19,7 @@ namespace osteon::haptic {
 struct ClientOptions {
   std::filesystem::path session_log;
   std::filesystem::path record;  // HDF5
+  const RecordedDevice* played = nullptr;  // in the hand; the room's bone must be as it was when it began
   bool status = false;     // a line each second on standard output
 };
 

@@ -1,5 +1,6 @@
 #include "haptic_client/app/hand.hpp"
 
+#include "common/runtime/log.hpp"
 #include "haptic_client/app/plan_file.hpp"
 
 namespace osteon::haptic {
@@ -113,6 +114,8 @@ Result<std::unique_ptr<Session>> HandChoice::on(const Case& bone, const ToolBox&
                                            to_hex(plan_digest(*ready)));
         !played)
       return tl::unexpected(played.error());
+    if (recorded_->session().start_hash.empty())
+      log::warn("the recording does not say what bone it began on", {{"remedy", "see that the room's is as it was then"}});
     // What a hand did against one force it would not have done against another.
     if (force_scale == 0.0) force_scale = recorded_->session().force_scale;
   }

@@ -36,6 +36,8 @@ class HandChoice {
   // not suit the bone, the recording is of another bone, tool or plan.
   [[nodiscard]] Result<std::unique_ptr<Session>> on(const Case& bone, const ToolBox& tools, double force_scale);
 
+  // What moves the handle, where that is a recording; else none.
+  [[nodiscard]] const RecordedDevice* recorded() const { return recorded_.get(); }
   [[nodiscard]] std::string_view device_name() const;
   // How often devices were lost.
   [[nodiscard]] int losses() const;

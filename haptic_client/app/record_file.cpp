@@ -245,7 +245,7 @@ struct RecordFile::Impl {
   std::filesystem::path path;
   RecordingInfo info;
   Hdf5Handle file;
-  Hdf5Handle hash, room_seq, rows_dropped, finished;
+  Hdf5Handle start_hash, hash, room_seq, rows_dropped, finished;
   std::vector<Column<TickRow>> columns;  // the last is the time
   std::vector<Column<TakeUp>> take_ups;
   std::vector<std::string> laws;  // each once
@@ -260,6 +260,7 @@ struct RecordFile::Impl {
   bool make_metadata();
   bool make_links();
   bool write_all();
+  bool set_hash(const Hdf5Handle& dataset, std::string digits);
   tl::unexpected<Error> failed(const char* what);
 
   ~Impl() {
@@ -269,7 +270,7 @@ struct RecordFile::Impl {
   void abandon() {
     for (auto& c : columns) c.dataset.abandon();
     for (auto& c : take_ups) c.dataset.abandon();
-    for (Hdf5Handle* h : {&hash, &room_seq, &rows_dropped, &finished, &file}) h->abandon();
+    for (Hdf5Handle* h : {&start_hash, &hash, &room_seq, &rows_dropped, &finished, &file}) h->abandon();
   }
   bool abandoned = false;  // the disk has failed
 };
@@ -430,15 +431,17 @@ bool RecordFile::Impl::make_metadata() {
   ok = ok && voxel.ok() && readme.ok() && set_text(voxel.id(), "units", "mm3") &&
        make_texts(file.id(), recording::kTools, tools) && make_texts(file.id(), "metadata/laws", laws) &&
        make_texts(file.id(), "metadata/event_bits", event_names()) && make_texts(file.id(), "metadata/range_bits", range_names());
-  // What only the end can say: there from the start, because nothing new may appear while others read.
+  // What is known later only: there from the start, because nothing new may appear while others read.
   const std::string nothing(64, '\0');
   const std::uint64_t zero = 0;
   const Hdf5Handle hash_type = text_type(64);
+  start_hash = make_value(file.id(), recording::kStartHash, hash_type.id(), nothing.data());
   hash = make_value(file.id(), recording::kFieldHash, hash_type.id(), nothing.data());
   room_seq = make_value(file.id(), "metadata/room_seq", H5T_NATIVE_UINT64, &zero);
   rows_dropped = make_value(file.id(), "metadata/rows_dropped", H5T_NATIVE_UINT64, &zero);
   finished = make_value(file.id(), "metadata/finished", H5T_NATIVE_UINT64, &zero);
-  return ok && hash.ok() && room_seq.ok() && rows_dropped.ok() && finished.ok() &&
+  return ok && start_hash.ok() && hash.ok() && room_seq.ok() && rows_dropped.ok() && finished.ok() &&
+         set_text(start_hash.id(), "meaning", "of the whole bone as the room was joined, SHA-256 in hexadecimal digits") &&
          set_text(hash.id(), "meaning", "of the whole bone at room_seq, SHA-256 in hexadecimal digits") &&
          set_text(finished.id(), "meaning",
                   "1: the session ended as it should; 0: it goes on, its room was lost, or its writer was killed");
@@ -493,6 +496,12 @@ bool RecordFile::Impl::write_all() {
   return true;
 }
 
+bool RecordFile::Impl::set_hash(const Hdf5Handle& dataset, std::string digits) {
+  digits.resize(64, '\0');
+  const Hdf5Handle type = text_type(64);
+  return H5Dwrite(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, digits.data()) >= 0;
+}
+
 RecordFile::RecordFile(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 RecordFile::~RecordFile() = default;
 RecordFile::RecordFile(RecordFile&&) noexcept = default;
@@ -507,6 +516,13 @@ Result<RecordFile> RecordFile::create(const std::filesystem::path& file, const R
   impl->keep_free_bytes = keep_free_bytes;
   if (Result<void> made = impl->create(); !made) return tl::unexpected(made.error());
   return RecordFile(std::move(impl));
+}
+
+Result<void> RecordFile::begin_on(const std::string& field_hash) {
+  be_quiet();
+  errno = 0;
+  if (!impl_->set_hash(impl_->start_hash, field_hash) || H5Dflush(impl_->start_hash.id()) < 0) return impl_->failed("begun");
+  return {};
 }
 
 Result<void> RecordFile::append(std::span<const TickRow> rows) {
@@ -534,11 +550,8 @@ Result<void> RecordFile::append(std::span<const TickRow> rows) {
 Result<void> RecordFile::finish(const RecordingEnd& end) {
   Impl& impl = *impl_;
   if (!impl.write_all()) return impl.failed("written whole");
-  std::string text = end.field_hash;
-  text.resize(64, '\0');
   const std::uint64_t as_it_should = end.lost ? 0 : 1;
-  const Hdf5Handle hash_type = text_type(64);
-  const bool ok = H5Dwrite(impl.hash.id(), hash_type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()) >= 0 &&
+  const bool ok = impl.set_hash(impl.hash, end.field_hash) &&
                   H5Dwrite(impl.room_seq.id(), H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &end.room_seq) >= 0 &&
                   H5Dwrite(impl.rows_dropped.id(), H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &end.rows_dropped) >= 0 &&
                   H5Dwrite(impl.finished.id(), H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &as_it_should) >= 0 &&
@@ -546,7 +559,7 @@ Result<void> RecordFile::finish(const RecordingEnd& end) {
   if (!ok) return impl.failed("written whole");
   impl.take_ups.clear();
   impl.columns.clear();
-  for (Hdf5Handle* handle : {&impl.hash, &impl.room_seq, &impl.rows_dropped, &impl.finished, &impl.file})
+  for (Hdf5Handle* handle : {&impl.start_hash, &impl.hash, &impl.room_seq, &impl.rows_dropped, &impl.finished, &impl.file})
     if (!handle->reset()) return impl.failed("closed");
   return {};
 }

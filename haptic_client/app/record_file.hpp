@@ -51,6 +51,8 @@ class RecordFile {
   RecordFile(RecordFile&&) noexcept;
   RecordFile& operator=(RecordFile&&) noexcept;
 
+  // The field's hash of the room as it was joined, in hexadecimal digits; once, as soon as it is known. Error internal.
+  [[nodiscard]] Result<void> begin_on(const std::string& field_hash);
   // Rows in order. After an error there is nothing more to be done: the file stays readable up to its last whole chunk.
   // Error internal: the disk is full or fails, with the system's reason.
   [[nodiscard]] Result<void> append(std::span<const TickRow> rows);

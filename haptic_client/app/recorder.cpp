@@ -1,5 +1,7 @@
 #include "haptic_client/app/recorder.hpp"
 
+#include <utility>
+
 #include "common/runtime/log.hpp"
 
 namespace osteon::haptic {
@@ -11,6 +13,13 @@ Result<void> Recorder::open(const std::filesystem::path& file, const RecordingIn
   file_ = std::move(*made);
   thread_ = std::thread([this] { run(); });
   return {};
+}
+
+void Recorder::begin_on(const std::string& field_hash) {
+  if (!recording()) return;
+  const std::lock_guard lock(mutex_);
+  start_hash_ = field_hash;
+  wake_.notify_one();
 }
 
 void Recorder::push(const TickRow& row) {
@@ -26,16 +35,20 @@ void Recorder::push(const TickRow& row) {
 
 void Recorder::run() {
   std::vector<TickRow> rows;
+  std::string start_hash;
   bool over = false;
   while (!over) {
     {
       std::unique_lock lock(mutex_);
-      wake_.wait(lock, [this] { return over_ || waiting_.size() >= RecordFile::kChunkRows / 2; });
+      wake_.wait(lock, [this] { return over_ || !start_hash_.empty() || waiting_.size() >= RecordFile::kChunkRows / 2; });
       over = over_;
+      start_hash = std::exchange(start_hash_, {});
       rows.swap(waiting_);
     }
     if (outcome_.trouble.empty()) {
-      if (Result<void> written = file_->append(rows); !written) {
+      Result<void> written = start_hash.empty() ? Result<void>() : file_->begin_on(start_hash);
+      if (written) written = file_->append(rows);
+      if (!written) {
         outcome_.trouble = written.error().message;
         outcome_.rows = file_->rows_written();
         file_.reset();

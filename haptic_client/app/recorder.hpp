@@ -33,6 +33,8 @@ class Recorder {
   // Without a path nothing is recorded. Error internal: the file cannot be made.
   [[nodiscard]] Result<void> open(const std::filesystem::path& file, const RecordingInfo& info);
   [[nodiscard]] bool recording() const { return thread_.joinable(); }
+  // Any thread but the haptic one: the field's hash of the room as it was joined, in hexadecimal digits.
+  void begin_on(const std::string& field_hash);
   // Any thread but the haptic one, one at a time.
   void push(const TickRow& row);
   // Waits until what was pushed is written, and closes the file; again: does nothing. A disk that fails ends the
@@ -48,6 +50,7 @@ class Recorder {
 
   std::mutex mutex_;  // guards the rest
   std::condition_variable wake_;
+  std::string start_hash_;  // to be written
   std::vector<TickRow> waiting_;
   std::uint64_t dropped_ = 0;
   bool over_ = false;

@@ -84,6 +84,17 @@ class Reader {
     return texts;
   }
 
+  // A hash; empty where it is not there, or was not set.
+  [[nodiscard]] std::string digits(const char* path) const {
+    const Hdf5Handle dataset(H5Dopen2(file_.id(), path, H5P_DEFAULT), H5Dclose), type(H5Tcopy(H5T_C_S1), H5Tclose);
+    char digits[65] = {};
+    H5Tset_size(type.id(), 64);
+    H5Tset_strpad(type.id(), H5T_STR_NULLPAD);
+    H5Tset_cset(type.id(), H5T_CSET_UTF8);
+    if (!dataset.ok() || H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, digits) < 0) return {};
+    return digits;
+  }
+
   // The rows that are complete: as many as have their time.
   std::size_t rows() {
     const Hdf5Handle dataset = find_dataset(recording::kTime);
@@ -132,7 +143,6 @@ class Reader {
   [[nodiscard]] bool ok() const { return !error_; }
   [[nodiscard]] const Error& error() const { return *error_; }
   [[nodiscard]] const std::string& name() const { return name_; }
-  [[nodiscard]] hid_t file() const { return file_.id(); }
 
  private:
   Hdf5Handle find(const char* group, const char* name) {
@@ -238,13 +248,8 @@ Result<RecordedSession> read_recording(const std::filesystem::path& file) {
   session.readings = readings_of(reader);
   if (!reader.ok()) return tl::unexpected(reader.error());
 
-  const Hdf5Handle hash(H5Dopen2(reader.file(), recording::kFieldHash, H5P_DEFAULT), H5Dclose);
-  const Hdf5Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
-  char digits[65] = {};
-  H5Tset_size(type.id(), 64);
-  H5Tset_strpad(type.id(), H5T_STR_NULLPAD);
-  H5Tset_cset(type.id(), H5T_CSET_UTF8);
-  if (hash.ok() && H5Dread(hash.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, digits) >= 0) session.field_hash = digits;
+  session.start_hash = reader.digits(recording::kStartHash);
+  session.field_hash = reader.digits(recording::kFieldHash);
   return session;
 }
 
@@ -279,6 +284,15 @@ DeviceReading RecordedDevice::read() noexcept {
   last.buttons = 0;
   last.pedal = 0.0;
   return last;
+}
+
+Result<void> check_played_on(const RecordedDevice& recorded, std::string_view field_hash) {
+  const std::string& began_on = recorded.session().start_hash;
+  if (began_on.empty() || began_on == field_hash) return {};
+  return failure(ErrorCode::invalid_input,
+                 "--device " + std::string(recorded.name()) + " began on bone in another state (field " + began_on.substr(0, 12) +
+                     ") than the room's (field " + std::string(field_hash.substr(0, 12)) +
+                     "); start osteon-server anew on the case, or with the --resume that it then had");
 }
 
 Result<std::unique_ptr<RecordedDevice>> make_recorded_device(const std::filesystem::path& file) {

@@ -17,6 +17,7 @@ struct RecordedSession {
   std::string case_hash, case_title;  // of the bone; the hash in hexadecimal digits
   std::string plan_digest;            // of what was done with which tools, likewise; empty: the recording does not say
   std::vector<std::string> tools;     // names, by their place in the session
+  std::string start_hash;  // of the bone as it was found; empty: the recording does not say
   std::string field_hash;  // of the bone as it was left; empty: the recording has no end
   double force_scale = 0;  // s
   DeviceLimits limits;
@@ -53,6 +54,11 @@ class RecordedDevice final : public HapticDevice {
   RecordedSession session_;
   std::size_t next_ = 0;  // haptic thread
 };
+
+// Whether the room's bone is as it was when the recording began: a handle that cut bone goes through air where it was cut
+// before, and is pushed out of bone that was not yet. `field_hash`: of the room as it was joined, in hexadecimal digits.
+// Error invalid_input. A recording that does not say plays on any.
+[[nodiscard]] Result<void> check_played_on(const RecordedDevice& recorded, std::string_view field_hash);
 
 // `recorded:FILE` after its colon. Errors: those of read_recording().
 [[nodiscard]] Result<std::unique_ptr<RecordedDevice>> make_recorded_device(const std::filesystem::path& file);

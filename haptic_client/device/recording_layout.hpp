@@ -46,6 +46,8 @@ inline constexpr const char* kForceAxes = "device_force_axes";
 inline constexpr const char* kTorqueAxes = "device_torque_axes";
 // Names of the tools that the session had, by their place in it.
 inline constexpr const char* kTools = "metadata/tools";
+// Set when the room was joined; recordings of before it was written have none.
+inline constexpr const char* kStartHash = "metadata/field_hash_at_start";
 // Set at the end.
 inline constexpr const char* kFieldHash = "metadata/field_hash";
 

@@ -75,10 +75,20 @@ TEST_F(RecordedRoom, HoldsEveryTickAndIsPlayedAgainInAnotherRoom) {
   EXPECT_NEAR(replayed["removed_mm3"].get<double>(), summary["removed_mm3"].get<double>(),
               0.01 * summary["removed_mm3"].get<double>());
   EXPECT_GT(summary["removed_mm3"].get<double>(), 200.0);
+
+  // That room's bone is cut now: the handle would go through the hole that is there.
+  EXPECT_EQ(ask(stage / "again.h5", "f['metadata/field_hash_at_start'][()].decode()"),
+            ask(file, "f['metadata/field_hash_at_start'][()].decode()"));
+  std::vector<std::string> third = arguments(stage, "third", 0.0);
+  third.insert(third.end(), {"--device", "recorded:" + file.string()});
+  Process refused = stage.start("osteon-haptic", third);
+  ASSERT_EQ(refused.wait(60s), 1) << refused.out();
+  EXPECT_THAT(refused.err(), testing::HasSubstr("made.h5 began on bone in another state"));
+  EXPECT_EQ(read_json(stage / "third.json")["cuts"], 0);
 }
 
-TEST_F(RecordedRoom, OfAKilledClientCanBeRead) {
-  const Stage stage(24.0);
+TEST_F(RecordedRoom, OfAKilledClientCanBeReadAndPlayedToWhereItEnds) {
+  Stage stage(24.0);
   Process haptic = stage.start("osteon-haptic", arguments(stage, "killed", 0.0));
   const auto deadline = std::chrono::steady_clock::now() + 60s;
   while (std::chrono::steady_clock::now() < deadline && !std::filesystem::exists(stage / "killed.h5"))
@@ -93,6 +103,18 @@ TEST_F(RecordedRoom, OfAKilledClientCanBeRead) {
   EXPECT_EQ(ask(file, "int(f['metadata/finished'][()])"), 0);
   EXPECT_EQ(ask(file, "int((f['data/state_seq'][:n] == np.arange(1, n + 1)).all())"), 1);
   EXPECT_EQ(ask(file, "int((f['data/state'][:n] == h5py.check_enum_dtype(f['data/state'].dtype)['cutting']).any())"), 1);
+  EXPECT_EQ(stage.server().terminate(), 0);
+
+  stage.start_server({});
+  std::vector<std::string> again = arguments(stage, "again", 0.0);
+  again.insert(again.end(), {"--device", "recorded:" + file.string()});
+  Process replay = stage.start("osteon-haptic", again);
+  ASSERT_EQ(replay.wait(60s), 1) << replay.out();
+  EXPECT_THAT(replay.err(), testing::HasSubstr("step 1 (drill) did not finish: the recording ends here"));
+  const json summary = read_json(stage / "again.json");
+  EXPECT_EQ(summary["steps"][0]["completed"], false);
+  EXPECT_GT(summary["cuts"].get<int>(), 0);
+  EXPECT_EQ(summary["loop"]["ticks"], ask(file, "n"));
 }
 
 // Whoever plays or plots it later can tell it from one that was done to its end.

@@ -153,6 +153,36 @@ TEST(Recording, IsOfOneBoneToolAndPlan) {
   EXPECT_THAT(said(info.case_hash, tools, std::string(64, 'q')), HasSubstr("another plan"));
 }
 
+// And with the bone in the state that the recording began on; one that does not say plays on any.
+TEST(Recording, BeganOnBoneInOneState) {
+  const TempDir temp;
+  const std::string uncut(64, 'a'), cut(64, 'b');
+  {
+    Recorder recorder;
+    ASSERT_TRUE(recorder.open(temp / "a.h5", info_of_a_session()));
+    recorder.begin_on(uncut);
+    recorder.push(row(0));
+    EXPECT_EQ(recorder.finish({cut, 5, 0}).trouble, "");
+  }
+  const auto recorded = make_recorded_device(temp / "a.h5");
+  ASSERT_TRUE(recorded) << recorded.error().message;
+  EXPECT_EQ((*recorded)->session().start_hash, uncut);
+  EXPECT_EQ((*recorded)->session().field_hash, cut);
+  EXPECT_TRUE(check_played_on(**recorded, uncut));
+  const Result<void> refused = check_played_on(**recorded, cut);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, testing::HasSubstr("a.h5 began on bone in another state (field aaaaaaaaaaaa) than the "
+                                                          "room's (field bbbbbbbbbbbb); start osteon-server anew"));
+  const auto done = python("import sys, h5py\nf = h5py.File(sys.argv[1], 'r+')\n"
+                           "assert f['metadata/field_hash_at_start'].attrs['meaning']\n"
+                           "del f['metadata/field_hash_at_start']\nf.close()", temp / "a.h5");
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  const auto old = make_recorded_device(temp / "a.h5");
+  ASSERT_TRUE(old) << old.error().message;
+  EXPECT_EQ((*old)->session().start_hash, "");
+  EXPECT_TRUE(check_played_on(**old, cut));
+}
+
 // Only a session that ended as it should says so; the numbers of one that lost its room are there all the same.
 TEST(Recording, SaysWhetherItsRoomWasLost) {
   const TempDir temp;
