@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
+#include <cstring>
 #include <cwchar>
 #include <filesystem>
 #include <fstream>
@@ -51,6 +53,23 @@ std::vector<HidFound> list_hid_devices() {
   return found;
 }
 
+Error hid_open_error(const std::string& what, const std::string& path, int number) {
+  const auto say = [](std::string sentence) { return Error{ErrorCode::unavailable, std::move(sentence)}; };
+  switch (number) {
+    case EACCES:
+    case EPERM:
+      return say("no permission to use " + what + " at " + path +
+                 "; install deploy/udev/70-osteon-devices.rules and plug it in again");
+    case ENOENT:
+    case ENODEV:
+    case ENXIO: return say(what + " at " + path + " was unplugged; plug it in again");
+    case EBUSY: return say("another program uses " + what + " at " + path + "; end it");
+    default:
+      return say(what + " at " + path + " cannot be opened (" + (number != 0 ? std::strerror(number) : "hidapi gives no reason") +
+                 "); unplug it and plug it in again");
+  }
+}
+
 HidPort::HidPort(std::unique_ptr<Handle> handle) noexcept : handle_(std::move(handle)) {}
 HidPort::HidPort(HidPort&&) noexcept = default;
 HidPort& HidPort::operator=(HidPort&&) noexcept = default;
@@ -61,10 +80,9 @@ Result<HidPort> HidPort::open(const HidFound& found, std::string what) {
   auto handle = std::make_unique<Handle>();
   handle->path = found.path;
   handle->what = std::move(what);
+  errno = 0;
   handle->device = hid_open_path(found.path.c_str());
-  if (handle->device == nullptr)
-    return failure(ErrorCode::unavailable, "no permission to use " + handle->what + " at " + found.path +
-                                               "; install deploy/udev/70-osteon-devices.rules and plug it in again");
+  if (handle->device == nullptr) return tl::unexpected(hid_open_error(handle->what, found.path, errno));
   return HidPort(std::move(handle));
 }
 

@@ -24,6 +24,9 @@ struct HidFound {
 // Any thread.
 [[nodiscard]] std::vector<HidFound> list_hid_devices();
 
+// Why a device could not be opened, by the system's error number (errno); `what` and `path` name it. Unavailable.
+[[nodiscard]] Error hid_open_error(const std::string& what, const std::string& path, int number);
+
 class HidPort {
  public:
   // `what` names the device in sentences, e.g. "the SpaceMouse". Error: unavailable.
