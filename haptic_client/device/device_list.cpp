@@ -40,6 +40,11 @@ Made make_recorded(const std::string& argument, const DeviceOptions&) {
   return Made(std::move(*device));
 }
 
+Made make_pedal(const Result<FootPedalOptions>& options) {
+  if (!options) return tl::unexpected(options.error());
+  return make_foot_pedal(*options);
+}
+
 constexpr std::array<Kind, 7> kKinds{{
     {"phantom", "PHANToM Omni, Touch, Desktop, Premium (OpenHaptics)", "NAME of the vendor's setup",
      [](const std::string& argument, const DeviceOptions& options) -> Made {
@@ -58,15 +63,14 @@ constexpr std::array<Kind, 7> kKinds{{
     {"spacemouse", "SpaceMouse: six degrees of freedom without force, or the rotation for another", "",
      [](const std::string&, const DeviceOptions&) -> Made { return make_space_mouse(); },
      [](const DeviceOptions&) { return look_for_space_mouse(); }},
-    {"pedal", "foot pedal, a switch for the spindle", "",
-     [](const std::string&, const DeviceOptions&) -> Made { return make_foot_pedal(); },
+    {"pedal", "foot pedal, a switch for the spindle; pedal:left, :middle or :right for one of three", "left, middle or right",
+     [](const std::string& argument, const DeviceOptions&) { return make_pedal(read_pedal_switch(argument)); },
      [](const DeviceOptions&) { return look_for_foot_pedals(false); }},
-    {"pedal-axis", "a joystick's axis as a proportional pedal for the spindle", "",
-     [](const std::string&, const DeviceOptions&) -> Made {
-       FootPedalOptions pedal;
-       pedal.proportional = true;
-       return make_foot_pedal(pedal);
-     },
+    {"pedal-axis",
+     "a joystick's axis as a proportional pedal for the spindle; pedal-axis:inverted where it rests at its upper end, "
+     "pedal-axis:z for another axis",
+     "AXIS, inverted or both",
+     [](const std::string& argument, const DeviceOptions&) { return make_pedal(read_pedal_axis(argument)); },
      [](const DeviceOptions&) { return look_for_foot_pedals(true); }},
     {"recorded", "a recording that --record wrote, played again: recorded:FILE", "FILE", make_recorded,
      [](const DeviceOptions&) { return DeviceFinding{{"always there"}, ""}; }},

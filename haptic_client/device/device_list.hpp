@@ -16,8 +16,8 @@ struct DeviceOptions {
 };
 
 // `names`: one device for the hand, and what is to be added to it, joined by "+": "phantom", "falcon+spacemouse+pedal",
-// "phantom:NAME" (as in the vendor's setup), "force-dimension:1", "recorded:FILE". Nothing is opened. Errors:
-// not_found, invalid_input; each tells what may be named.
+// "phantom:NAME" (as in the vendor's setup), "force-dimension:1", "pedal-axis:z:inverted", "recorded:FILE". Nothing is opened.
+// Errors: not_found, invalid_input; each tells what may be named.
 [[nodiscard]] Result<std::unique_ptr<CombinedDevice>> make_devices(std::string_view names, const DeviceOptions& options);
 
 struct DeviceLine {

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <charconv>
 #include <chrono>
+#include <iterator>
 
 #include "common/input/hid_port.hpp"
 #include "haptic_client/device/device_exchange.hpp"
@@ -18,20 +20,34 @@ constexpr std::uint16_t kDesktop = 1, kSimulation = 2, kJoystick = 4;
 constexpr std::size_t kSwitchReport = 2;
 constexpr std::uint8_t kSwitches = 7;
 constexpr auto kPause = 5ms;  // the haptic thread wants to hear from the device more often than it reports
-// As pedals are wired: accelerator, brake, throttle, slider, z, its rotation, x, y and theirs.
-constexpr std::array<HidUsage, 10> kAxes{{{kSimulation, 0xc4},
-                                          {kSimulation, 0xc5},
-                                          {kSimulation, 0xbb},
-                                          {kDesktop, 0x36},
-                                          {kDesktop, 0x32},
-                                          {kDesktop, 0x35},
-                                          {kDesktop, 0x30},
-                                          {kDesktop, 0x31},
-                                          {kDesktop, 0x33},
-                                          {kDesktop, 0x34}}};
+struct Axis {
+  std::string_view name;
+  HidUsage usage;
+};
+// As pedals are wired.
+constexpr std::array<Axis, 10> kAxes{{{"accelerator", {kSimulation, 0xc4}},
+                                      {"brake", {kSimulation, 0xc5}},
+                                      {"throttle", {kSimulation, 0xbb}},
+                                      {"slider", {kDesktop, 0x36}},
+                                      {"z", {kDesktop, 0x32}},
+                                      {"rz", {kDesktop, 0x35}},
+                                      {"x", {kDesktop, 0x30}},
+                                      {"y", {kDesktop, 0x31}},
+                                      {"rx", {kDesktop, 0x33}},
+                                      {"ry", {kDesktop, 0x34}}}};
 
 bool is_switch(const HidFound& device) { return device.vendor == kSwitchVendor && device.model == kSwitchModel; }
 bool is_joystick(const HidFound& device) { return device.usage_page == kDesktop && device.usage == kJoystick; }
+
+std::optional<HidUsage> read_axis(std::string_view word) {
+  if (const auto known = std::ranges::find(kAxes, word, &Axis::name); known != kAxes.end()) return known->usage;
+  const bool hexadecimal = word.starts_with("0x");
+  if (hexadecimal) word.remove_prefix(2);
+  std::uint16_t usage = 0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), usage, hexadecimal ? 16 : 10);
+  if (error != std::errc{} || end != word.data() + word.size() || usage == 0) return std::nullopt;
+  return HidUsage{kDesktop, usage};
+}
 
 std::string described(const HidFound& device, const std::string& kind) {
   return (device.product.empty() ? kind : device.product + " (" + kind + ")") + ", " + device.path;
@@ -57,16 +73,19 @@ class FootPedal final : public HapticDevice {
     if (!port) return tl::unexpected(port.error());
     if (options_.proportional) {
       const std::vector<HidField> fields = hid_input_fields(port->descriptor());
-      const HidUsage wanted{kDesktop, options_.axis_usage};
-      const auto field = options_.axis_usage != 0 ? find_field(fields, {&wanted, 1}) : find_field(fields, kAxes);
+      std::vector<HidUsage> wanted;
+      if (options_.axis_usage) wanted.push_back(*options_.axis_usage);
+      else std::ranges::transform(kAxes, std::back_inserter(wanted), &Axis::usage);
+      const auto field = find_field(fields, wanted);
       if (!field)
         return failure(ErrorCode::unsupported,
-                       found->product + " at " + found->path + " has no such axis; choose another joystick");
+                       found->product + " at " + found->path + " has no such axis; name another (pedal-axis:z) or choose another joystick");
       field_ = *field;
     }
     info_.model = found->product.empty() ? "foot pedal" : found->product;
     info_.serial = found->serial;
     axis_.forget();
+    elsewhere_ = false;
     armed_ = !options_.proportional;
     down_ = 0;
     reader_.start(std::move(*port), kPause,
@@ -81,7 +100,12 @@ class FootPedal final : public HapticDevice {
   }
   Result<void> tend() override { return reader_.health(); }
   [[nodiscard]] std::string advice() const override {
-    return armed_ ? "" : "let the foot pedal go once; until then it turns nothing";
+    if (armed_) return "";
+    if (!elsewhere_) return "let the foot pedal go once; until then it turns nothing";
+    return std::string("the foot pedal was down when it was first heard of and turns nothing; if nobody pressed it, it rests at "
+                       "the other end of its axis: ") +
+           (options_.axis.inverted ? "leave out \"inverted\"" : "name it pedal-axis:inverted") +
+           "; else let it go and plug it in again";
   }
 
   DeviceReading read() noexcept override { return exchange_.read(); }
@@ -94,6 +118,7 @@ class FootPedal final : public HapticDevice {
     if (options_.proportional) {
       if (const std::optional<double> share = field_.share(report)) axis_.take(*share);
       armed_ = axis_.armed();
+      elsewhere_ = axis_.elsewhere();
       reading.pedal = axis_.value();
     } else {
       if (const std::optional<std::uint8_t> down = take_pedal_report(report)) down_ = *down;
@@ -106,7 +131,7 @@ class FootPedal final : public HapticDevice {
   HidField field_;
   PedalAxis axis_;           // reading thread, while it runs
   std::uint8_t down_ = 0;    // reading thread
-  std::atomic<bool> armed_{true};
+  std::atomic<bool> armed_{true}, elsewhere_{false};
   DeviceInfo info_{.model = "foot pedal",
                    .serial = {},
                    .driver = "hidapi",
@@ -127,9 +152,50 @@ std::optional<std::uint8_t> take_pedal_report(std::span<const std::uint8_t> repo
 
 void PedalAxis::take(double share) noexcept {
   const double way = params_.inverted ? 1.0 - share : share;
+  if (rest_ == Rest::unknown) rest_ = way <= params_.near ? Rest::here : Rest::elsewhere;
   const double value = std::clamp((way - params_.play) / (1.0 - 2.0 * params_.play), 0.0, 1.0);
-  if (value == 0.0) armed_ = true;
+  if (value == 0.0 && rest_ == Rest::here) armed_ = true;
   value_ = armed_ ? value : 0.0;
+}
+
+Result<FootPedalOptions> read_pedal_switch(std::string_view argument) {
+  constexpr std::array<std::string_view, 3> kSides{"left", "middle", "right"};
+  FootPedalOptions options;
+  if (argument.empty()) return options;
+  const auto side = std::ranges::find(kSides, argument);
+  if (side == kSides.end())
+    return failure(ErrorCode::invalid_input, "--device pedal:" + std::string(argument) +
+                                                 ": the pedal must be left, middle or right; without a colon all three turn the "
+                                                 "spindle");
+  options.switches = static_cast<std::uint8_t>(1 << (side - kSides.begin()));
+  return options;
+}
+
+Result<FootPedalOptions> read_pedal_axis(std::string_view argument) {
+  FootPedalOptions options;
+  options.proportional = true;
+  const auto wrong = [&] {
+    std::string names;
+    for (const Axis& axis : kAxes) names += std::string(axis.name) + ", ";
+    return failure(ErrorCode::invalid_input, "--device pedal-axis:" + std::string(argument) +
+                                                 ": what follows must be \"inverted\", an axis (" + names +
+                                                 "or a HID usage such as 0x32), or both joined by \":\"");
+  };
+  std::string_view left = argument;
+  while (!left.empty()) {
+    const std::size_t colon = left.find(':');
+    const std::string_view word = left.substr(0, colon);
+    left = colon == std::string_view::npos ? std::string_view() : left.substr(colon + 1);
+    if (colon != std::string_view::npos && left.empty()) return wrong();
+    if (word == "inverted" && !options.axis.inverted) {
+      options.axis.inverted = true;
+    } else if (const std::optional<HidUsage> usage = read_axis(word); usage && !options.axis_usage) {
+      options.axis_usage = usage;
+    } else {
+      return wrong();
+    }
+  }
+  return options;
 }
 
 std::unique_ptr<HapticDevice> make_foot_pedal(const FootPedalOptions& options) { return std::make_unique<FootPedal>(options); }

@@ -268,6 +268,10 @@ TEST(DeviceList, NamesArePutTogetherOrRefusedWithTheRemedy) {
   EXPECT_NE(message("phantom+pedal+pedal-axis").find("two devices for the spindle"), std::string::npos);
   EXPECT_NE(message("falcon:1").find("leave out the colon"), std::string::npos);
   EXPECT_NE(message("force-dimension:x").find("0 to 15"), std::string::npos);
+  EXPECT_TRUE(make_devices("falcon+pedal-axis:z:inverted", {}));
+  EXPECT_TRUE(make_devices("falcon+spacemouse+pedal:left", {}));
+  EXPECT_NE(message("falcon+pedal-axis:up").find("--device pedal-axis:up: what follows must be \"inverted\""), std::string::npos);
+  EXPECT_NE(message("falcon+pedal:up").find("--device pedal:up: the pedal must be left, middle or right"), std::string::npos);
 }
 
 // The list names all that --device takes, and tells of a file that the user named whether it can be used.

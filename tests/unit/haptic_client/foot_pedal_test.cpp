@@ -33,17 +33,72 @@ TEST(FootPedal, TheWayHasPlayAtBothEnds) {
 
 TEST(FootPedal, TurnsNothingUntilItWasReleased) {
   PedalAxis axis;
+  axis.take(0.2);
+  EXPECT_EQ(axis.value(), 0.0);
   axis.take(1.0);
-  axis.take(0.5);
   EXPECT_EQ(axis.value(), 0.0);
   EXPECT_FALSE(axis.armed());
+  EXPECT_FALSE(axis.elsewhere());
   axis.take(0.01);
   axis.take(0.5);
-  EXPECT_GT(axis.value(), 0.0);
+  EXPECT_NEAR(axis.value(), 0.5, 1e-12);
   axis.forget();
   EXPECT_EQ(axis.value(), 0.0);
-  axis.take(0.5);
+  axis.take(0.2);
   EXPECT_EQ(axis.value(), 0.0);
+}
+
+// One that rests at the other end, or in the middle, passes its way's beginning when it is pressed: taken for released there,
+// it would turn the spindle as soon as the foot leaves it.
+TEST(FootPedal, TurnsNothingWhereItRestsElsewhere) {
+  for (const bool inverted : {false, true}) {
+    for (const double rest : {1.0, 0.9, 0.5}) {
+      PedalAxis axis({.inverted = inverted});
+      for (int press = 0; press < 3; ++press)
+        for (const double way : {rest, 0.3, 0.0, 0.0, 0.3, rest}) {
+          axis.take(inverted ? 1.0 - way : way);
+          EXPECT_EQ(axis.value(), 0.0) << rest << ' ' << way;
+          EXPECT_FALSE(axis.armed());
+          EXPECT_TRUE(axis.elsewhere());
+        }
+      axis.forget();
+      EXPECT_FALSE(axis.elsewhere());
+    }
+  }
+}
+
+TEST(FootPedal, SwitchAndAxisAreChosenByWords) {
+  for (const auto& [word, switches] : {std::pair{"", 7}, {"left", 1}, {"middle", 2}, {"right", 4}}) {
+    const auto options = read_pedal_switch(word);
+    ASSERT_TRUE(options) << word;
+    EXPECT_FALSE(options->proportional);
+    EXPECT_EQ(options->switches, switches);
+  }
+  EXPECT_FALSE(read_pedal_switch("both"));
+
+  struct Said {
+    std::string_view words;
+    bool inverted;
+    int page, usage;  // 0: none
+  };
+  for (const Said& said : {Said{"", false, 0, 0}, {"inverted", true, 0, 0}, {"z", false, 1, 0x32}, {"rz:inverted", true, 1, 0x35},
+                           {"inverted:0x30", true, 1, 0x30}, {"54", false, 1, 0x36}, {"brake", false, 2, 0xc5}}) {
+    const auto options = read_pedal_axis(said.words);
+    ASSERT_TRUE(options) << said.words;
+    EXPECT_TRUE(options->proportional);
+    EXPECT_EQ(options->axis.inverted, said.inverted) << said.words;
+    ASSERT_EQ(options->axis_usage.has_value(), said.usage != 0) << said.words;
+    if (said.usage == 0) continue;
+    EXPECT_EQ(options->axis_usage->page, said.page) << said.words;
+    EXPECT_EQ(options->axis_usage->usage, said.usage) << said.words;
+  }
+  for (const char* wrong : {"upside-down", "z:x", "inverted:inverted", "z:", ":z", "0x", "0", "0x10000", "z inverted"}) {
+    const auto options = read_pedal_axis(wrong);
+    ASSERT_FALSE(options) << wrong;
+    EXPECT_EQ(options.error().message, std::string("--device pedal-axis:") + wrong +
+                                           ": what follows must be \"inverted\", an axis (accelerator, brake, throttle, slider, z, "
+                                           "rz, x, y, rx, ry, or a HID usage such as 0x32), or both joined by \":\"");
+  }
 }
 
 }  // namespace

@@ -2,11 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <functional>
 #include <thread>
 
+#include "common/input/hid_port.hpp"
 #include "common/input/space_mouse.hpp"
 #include "haptic_client/device/foot_pedal.hpp"
 #include "haptic_client/device/space_mouse.hpp"
@@ -42,6 +44,28 @@ TEST_F(HidOnUsb, NothingIsThere) {
     EXPECT_NE(opened.error().message.find("plug it in"), std::string::npos);
     EXPECT_EQ(device->read().status, DeviceStatus::absent);
   }
+}
+
+// What is said of a device that cannot be opened is what the system says.
+TEST_F(HidOnUsb, WhyADeviceCannotBeOpened) {
+  const auto said = [](int number) {
+    const Error error = hid_open_error("the foot pedal", "/dev/hidraw7", number);
+    EXPECT_EQ(error.code, ErrorCode::unavailable);
+    return error.message;
+  };
+  EXPECT_EQ(said(EACCES), "no permission to use the foot pedal at /dev/hidraw7; install deploy/udev/70-osteon-devices.rules and "
+                          "plug it in again");
+  EXPECT_EQ(said(ENODEV), "the foot pedal at /dev/hidraw7 was unplugged; plug it in again");
+  EXPECT_EQ(said(EBUSY), "another program uses the foot pedal at /dev/hidraw7; end it");
+  EXPECT_EQ(said(EIO), "the foot pedal at /dev/hidraw7 cannot be opened (Input/output error); unplug it and plug it in again");
+  // One that went between the look and the opening.
+  usb_.command("plug switch");
+  const std::vector<HidFound> found = list_hid_devices();
+  ASSERT_EQ(found.size(), 1u);
+  usb_.command("unplug switch");
+  const Result<HidPort> port = HidPort::open(found[0], "the foot pedal");
+  ASSERT_FALSE(port);
+  EXPECT_EQ(port.error().message, "the foot pedal at /dev/hidraw0 was unplugged; plug it in again");
 }
 
 TEST_F(HidOnUsb, EveryKnownSpaceMouseIsFound) {
@@ -147,9 +171,10 @@ TEST_F(HidOnUsb, AJoysticksAxisTurnsItAsFastAsItIsDown) {
   EXPECT_TRUE(look_for_foot_pedals(false).found.empty());
   const auto pedal = make_foot_pedal({.proportional = true, .axis = {.play = 0.0}});
   ASSERT_EQ(why(pedal->open()), "");
-  usb_.report("joystick", {0, 0, 0xff, 0x03});  // down already
+  usb_.report("joystick", {0, 0, 0x80, 0x00});  // a little down already
   ASSERT_TRUE(wait_until([&] { return usb_.command("unread joystick") == "0" && !pedal->advice().empty(); }, kPatience));
   EXPECT_EQ(pedal->read().spindle(), 0.0);
+  EXPECT_EQ(pedal->advice(), "let the foot pedal go once; until then it turns nothing");
   usb_.report("joystick", {0, 0, 0, 0});
   ASSERT_TRUE(wait_until([&] { return pedal->advice().empty(); }, kPatience));
   usb_.report("joystick", {0, 0, 0x00, 0x01});  // 256 of 1023; z comes before x where both are there
@@ -157,10 +182,36 @@ TEST_F(HidOnUsb, AJoysticksAxisTurnsItAsFastAsItIsDown) {
   usb_.report("joystick", {0, 0xff, 0xff, 0x03});
   EXPECT_TRUE(reads(*pedal, [](const DeviceReading& r) { return r.spindle() == 1.0; }));
 
-  const auto other = make_foot_pedal({.proportional = true, .axis_usage = 0x35});  // an axis that it has not
+  const auto other = make_foot_pedal({.proportional = true, .axis_usage = HidUsage{1, 0x35}});  // an axis that it has not
   const Result<void> opened = other->open();
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::unsupported);
+}
+
+// A pedal that rests at its axis' upper end turns the spindle when it is pressed, or never.
+TEST_F(HidOnUsb, AnAxisThatRestsAtItsUpperEndIsInverted) {
+  usb_.command("plug joystick");
+  FootPedalOptions options = *read_pedal_axis("z:inverted");
+  options.axis.play = 0.0;
+  const auto pedal = make_foot_pedal(options), wrong = make_foot_pedal(*read_pedal_axis("z"));
+  const std::vector<std::uint8_t> rest{0, 0, 0xff, 0x03}, pressed{0, 0, 0x00, 0x00};
+  ASSERT_EQ(why(wrong->open()), "");
+  usb_.report("joystick", rest);
+  ASSERT_TRUE(wait_until([&] { return wrong->advice().find("pedal-axis:inverted") != std::string::npos; }, kPatience));
+  for (const auto& report : {pressed, rest}) {
+    usb_.report("joystick", report);
+    ASSERT_TRUE(wait_until([&] { return usb_.command("unread joystick") == "0"; }, kPatience));
+    std::this_thread::sleep_for(20ms);
+    EXPECT_EQ(wrong->read().spindle(), 0.0);
+  }
+  wrong->close();
+  ASSERT_EQ(why(pedal->open()), "");
+  usb_.report("joystick", rest);
+  ASSERT_TRUE(wait_until([&] { return pedal->advice().empty(); }, kPatience));
+  usb_.report("joystick", {0, 0, 0x00, 0x03});  // 768 of 1023 from its lower end
+  EXPECT_TRUE(reads(*pedal, [](const DeviceReading& r) { return std::abs(r.spindle() - 255.0 / 1023.0) < 1e-9; }));
+  usb_.report("joystick", pressed);
+  EXPECT_TRUE(reads(*pedal, [](const DeviceReading& r) { return r.spindle() == 1.0; }));
 }
 
 TEST_F(HidOnUsb, UnpluggedAndPluggedInAgain) {
