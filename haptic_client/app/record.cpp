@@ -31,12 +31,21 @@ std::vector<std::string> range_names() {
 
 std::string RangeWatch::note(const ToolModel& model, const LoopReport& report) {
   if (report.out_of_range == 0) return {};
-  auto use = std::ranges::find(uses_, model.law, &Use::law);
-  const bool first = use == uses_.end();
-  if (first) use = uses_.insert(use, Use{model.law, 0, 0});
-  use->bits |= report.out_of_range;
-  ++use->ticks;
-  return first ? out_of_range_sentence(*model.law, report.out_of_range) : std::string();
+  const auto found = std::ranges::find(uses_, model.law, &Use::law);
+  const auto at = static_cast<std::size_t>(found - uses_.begin());
+  if (found == uses_.end()) {
+    uses_.push_back({model.law, 0, 0});
+    stays_.push_back({report.state_seq - 1});
+  }
+  uses_[at].bits |= report.out_of_range;
+  ++uses_[at].ticks;
+  Stay& stay = stays_[at];
+  const auto since = static_cast<std::int64_t>(report.state_seq - stay.last_seq);
+  stay.ticks = std::max<std::int64_t>(0, stay.ticks - (since - 1)) + 1;
+  stay.last_seq = report.state_seq;
+  if (stay.told || stay.ticks < kLasting_ticks) return {};
+  stay.told = true;
+  return out_of_range_sentence(*model.law, report.out_of_range);
 }
 
 Result<void> SessionLog::open(const std::filesystem::path& file, const DeviceInfo& device) {

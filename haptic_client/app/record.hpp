@@ -45,17 +45,26 @@ struct CutRow {
 // Where a session used force laws outside the range that they were made for. One thread.
 class RangeWatch {
  public:
+  // So many ticks more outside than not are worth a word: as a drill's cone enters, its feed is so for a moment.
+  static constexpr std::int64_t kLasting_ticks = 200;
   struct Use {
     const ForceLaw* law = nullptr;
     unsigned bits = 0;         // of OutOfRange, all that were ever seen
     std::uint64_t ticks = 0;   // spent outside
   };
-  // A sentence when a law is used outside its range for the first time in the session, else nothing.
+  // To be asked of every tick that was outside, in order; it may be asked of others. A sentence when a law stays outside for
+  // the first time in the session, else nothing.
   [[nodiscard]] std::string note(const ToolModel& model, const LoopReport& report);
   [[nodiscard]] const std::vector<Use>& uses() const { return uses_; }  // each law once
 
  private:
+  struct Stay {
+    std::uint64_t last_seq = 0;  // of the last tick outside
+    std::int64_t ticks = 0;      // more outside than not up to then
+    bool told = false;
+  };
   std::vector<Use> uses_;
+  std::vector<Stay> stays_;      // of each use
 };
 
 // Rows are written as they come; a disk that is full shows at finish().

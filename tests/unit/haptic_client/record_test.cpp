@@ -15,6 +15,7 @@
 #include "tests/support/process.hpp"
 #include "tests/support/scenes/random.hpp"
 #include "tests/support/temp_dir.hpp"
+#include "tests/unit/haptic_client/bench.hpp"
 
 namespace osteon::haptic::test {
 namespace {
@@ -341,29 +342,87 @@ TEST(Recording, NamesItsEvents) {
   EXPECT_EQ(names.size(), static_cast<std::size_t>(std::bit_width(static_cast<unsigned>(kRamping))));
 }
 
-// Each law is told of once in a session, with what it was first outside of; all that follows is counted.
+// Ticks of a session as the watch is asked of them: those outside only.
+struct RangeTicks {
+  std::string outside(const ToolModel& model, OutOfRange what, int ticks = 1) {
+    std::string told;
+    for (int i = 0; i < ticks; ++i) {
+      LoopReport report;
+      report.state_seq = ++seq;
+      report.out_of_range = static_cast<unsigned>(what);
+      told += watch.note(model, report);
+    }
+    return told;
+  }
+  void inside(int ticks) { seq += static_cast<std::uint64_t>(ticks); }
+  RangeWatch watch;
+  std::uint64_t seq = 5000;
+};
+
+// Each law is told of once in a session, where it stays outside; all that follows is counted.
 TEST(RangeWatch, TellsOfEachLawOnce) {
   const ToolModel drill(*find_tool("drill-3.2"), 0.5), other(*find_tool("drill-3.5"), 0.5);
   const ToolModel saw(*find_tool("saw-oscillating-1"), 0.5);
-  const auto outside = [](OutOfRange what) {
-    LoopReport report;
-    report.out_of_range = static_cast<unsigned>(what);
-    return report;
-  };
-  RangeWatch watch;
-  EXPECT_EQ(watch.note(drill, LoopReport{}), "");
-  EXPECT_TRUE(watch.uses().empty());
-  const std::string first = watch.note(drill, outside(OutOfRange::feed));
+  RangeTicks ticks;
+  EXPECT_EQ(ticks.watch.note(drill, LoopReport{}), "");
+  EXPECT_TRUE(ticks.watch.uses().empty());
+  const std::string first = ticks.outside(drill, OutOfRange::feed, 500);
   EXPECT_NE(first.find("\"chi\""), std::string::npos) << first;
   EXPECT_NE(first.find("feed"), std::string::npos) << first;
-  EXPECT_EQ(watch.note(drill, outside(OutOfRange::density)), "");
-  EXPECT_EQ(watch.note(other, outside(OutOfRange::feed)), "");  // another tool, the same law
-  EXPECT_NE(watch.note(saw, outside(OutOfRange::depth_of_cut)).find("\"saw\""), std::string::npos);
-  ASSERT_EQ(watch.uses().size(), 2u);
-  EXPECT_EQ(watch.uses()[0].law->name, "chi");
-  EXPECT_EQ(watch.uses()[0].ticks, 3u);
-  EXPECT_EQ(out_of_range_words(watch.uses()[0].bits), "feed, density");
-  EXPECT_EQ(watch.uses()[1].ticks, 1u);
+  EXPECT_EQ(first.find("\"chi\"", first.find("\"chi\"") + 1), std::string::npos) << first;
+  EXPECT_EQ(ticks.outside(drill, OutOfRange::density, 500), "");
+  EXPECT_EQ(ticks.outside(other, OutOfRange::feed, 500), "");  // another tool, the same law
+  EXPECT_NE(ticks.outside(saw, OutOfRange::depth_of_cut, 300).find("\"saw\""), std::string::npos);
+  const std::vector<RangeWatch::Use>& uses = ticks.watch.uses();
+  ASSERT_EQ(uses.size(), 2u);
+  EXPECT_EQ(uses[0].law->name, "chi");
+  EXPECT_EQ(uses[0].ticks, 1500u);
+  EXPECT_EQ(out_of_range_words(uses[0].bits), "feed, density");
+  EXPECT_EQ(uses[1].ticks, 300u);
+}
+
+// A cone that enters is outside for less than 0.2 s: nothing is said, however many holes follow, but each tick is counted. What
+// is outside two ticks of three is not missed: it gains one tick in three.
+TEST(RangeWatch, TellsOnlyOfWhatLasts) {
+  const ToolModel drill(*find_tool("drill-3.2"), 0.5);
+  RangeTicks holes;
+  for (int hole = 0; hole < 30; ++hole) {
+    EXPECT_EQ(holes.outside(drill, OutOfRange::feed, 150), "") << hole;
+    holes.inside(3000);
+  }
+  EXPECT_EQ(holes.watch.uses()[0].ticks, 30u * 150u);
+
+  RangeTicks now_and_then;
+  int told_after = 0;
+  for (int i = 0; i < 1000 && told_after == 0; ++i) {
+    if (!now_and_then.outside(drill, OutOfRange::feed, 2).empty()) told_after = 3 * i;
+    now_and_then.inside(1);
+  }
+  EXPECT_NEAR(told_after, 600, 6);
+}
+
+// A surgeon's drill that enters cortical bone is worth no word; a rig that feeds it more slowly than the law was made for is.
+TEST(RangeWatch, SaysNothingOfAnEnteringDrill) {
+  PlanStep hole;
+  hole.action = Action::drill;
+  hole.tool = "drill-3.2";
+  hole.entry.point_mm = Vec3(0.1, -0.2, 0);
+  hole.entry.axis = Vec3(0, 0, 1);
+  hole.to_mm = 4.0;
+  PlanStep slow = hole;
+  slow.hand = HandKind::rig;
+  slow.feed_mm_per_s = 0.3;
+  for (const PlanStep& step : {hole, slow}) {
+    Bench bench(test::block_case(), {step});
+    RangeWatch watch;
+    std::string told;
+    bench.run([&](const SessionTick& tick) { told += watch.note(bench.session().plan().tools[0], tick.report); });
+    ASSERT_TRUE(bench.session().results()[0].completed);
+    ASSERT_FALSE(watch.uses().empty());
+    std::printf("  %s hand: %llu ticks outside\n", step.hand == HandKind::rig ? "a slow rig's" : "an expert's",
+                static_cast<unsigned long long>(watch.uses()[0].ticks));
+    EXPECT_EQ(told.empty(), step.hand == HandKind::expert) << told;
+  }
 }
 
 // A child that records as fast as it can, saying after each chunk how many rows it has written.
