@@ -112,11 +112,12 @@ constexpr int kLanes = 16;
 struct Rows {
   int lanes;
   void (*evaluate)(const ContactSet&, const Task&, ContactValues&, Totals&);
+  void (*hull_distance)(const float*, const float*, const float*, int, const float* const*, float*);
 };
-constexpr Rows kNarrow{narrow::kLanes, narrow::evaluate};
+constexpr Rows kNarrow{narrow::kLanes, narrow::evaluate, narrow::hull_distance};
 #ifdef OSTEON_WIDE_ROWS
-constexpr Rows kWide{wide::kLanes, wide::evaluate};
-constexpr Rows kWidest{widest::kLanes, widest::evaluate};
+constexpr Rows kWide{wide::kLanes, wide::evaluate, wide::hull_distance};
+constexpr Rows kWidest{widest::kLanes, widest::evaluate, widest::hull_distance};
 #endif
 
 const Rows* widest_rows([[maybe_unused]] int lanes) {
@@ -177,6 +178,7 @@ void append(ContactSet& set, const std::vector<ContactPoint>& points, double lea
       set.arm_mm.push_back(static_cast<float>(std::max({point.axis_distance_mm, least_arm_mm, 1e-3})));
       radius = std::max(radius, (point.inset_mm - centre).norm());
     }
+    set.reach_mm = std::max(set.reach_mm, centre.norm() + radius + 1e-4);
     set.balls.push_back({static_cast<float>(centre.x()), static_cast<float>(centre.y()), static_cast<float>(centre.z()),
                          static_cast<float>(radius + 1e-4)});
   }
@@ -256,6 +258,16 @@ ContactSums evaluate_contact(const Patch& patch, const ContactSet& set, const Co
           sum[6],
           {sum[7], sum[8], sum[9]},
           {sum[10], sum[11], sum[12]}};
+}
+
+Lanes hull_distance_mm(const HullPlace& place, std::span<const HullFace> faces, const Lanes (&p)[3]) noexcept {
+  Lanes distance;
+  const Eigen::Matrix3f by_rows = place.rotation.transpose();  // stored by columns
+  const float* const at[3] = {p[0].data(), p[1].data(), p[2].data()};
+  chosen_rows.load(std::memory_order_relaxed)
+      ->hull_distance(by_rows.data(), place.at.data(), faces.empty() ? nullptr : faces[0].data(), static_cast<int>(faces.size()),
+                      at, distance.data());
+  return distance;
 }
 
 int limit_contact_lanes(int lanes) {

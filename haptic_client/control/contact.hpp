@@ -41,6 +41,7 @@ struct ContactSet {
   std::vector<Ball> balls;
   int active = 0, passive = 0;                 // points; passive ones begin with their group
   int active_groups = 0;
+  double reach_mm = 0;                         // of the farthest of all from the tip, at most
   [[nodiscard]] int groups() const noexcept { return static_cast<int>(balls.size()); }
   [[nodiscard]] int first_passive() const noexcept { return active_groups * kGroupPoints; }
 };
@@ -90,6 +91,18 @@ struct ContactSums {
 // [haptic] Distance, gradient and, if asked for, density of the points; the sums too where `query.ahead` is set.
 ContactSums evaluate_contact(const Patch& patch, const ContactSet& set, const ContactQuery& query,
                              ContactValues& values) noexcept;
+
+// Numbers of a group's points.
+using Lanes = std::array<float, kGroupPoints>;
+// A convex body as the points see it: to each of its own places, rotation · p + at; of each plane, normal and offset, mm.
+struct HullPlace {
+  Eigen::Matrix3f rotation = Eigen::Matrix3f::Identity();
+  Eigen::Vector3f at = Eigen::Vector3f::Zero();
+};
+using HullFace = std::array<float, 4>;
+// [haptic] Distance of a group's points to the farthest of its planes, mm; `p`: x, y, z. Exact inside and before faces, too
+// small before edges, where only the sign counts.
+[[nodiscard]] Lanes hull_distance_mm(const HullPlace& place, std::span<const HullFace> faces, const Lanes (&p)[3]) noexcept;
 
 // For tests and benchmarks: at most so many points at a time from now on. Returns how many.
 int limit_contact_lanes(int lanes);

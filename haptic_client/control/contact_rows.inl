@@ -282,3 +282,20 @@ static void evaluate(const ContactSet& set, const Task& task, ContactValues& val
   for (int lane = 0; lane < kLanes; ++lane)
     if (sums.nearest[lane] < result.nearest) result.nearest = sums.nearest[lane];
 }
+
+static void hull_distance(const float* rotation, const float* at, const float* faces, int count, const float* const* p,
+                          float* distance) {
+  for (int from = 0; from < kGroupPoints; from += kLanes) {
+    Row q[3];
+    const Row x = load(p[0] + from), y = load(p[1] + from), z = load(p[2] + from);
+    for (int k = 0; k < 3; ++k)
+      q[k] = ((x * rotation[3 * k] + y * rotation[3 * k + 1]) + z * rotation[3 * k + 2]) + splat(at[k]);
+    Row farthest = splat(-kLeftOut_mm);
+    for (int i = 0; i < count; ++i) {
+      const float* const face = faces + 4 * i;
+      const Row to_plane = ((q[0] * face[0] + q[1] * face[1]) + q[2] * face[2]) - splat(face[3]);
+      farthest = farthest < to_plane ? to_plane : farthest;
+    }
+    store(distance + from, farthest);
+  }
+}

@@ -2,21 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
+#include <span>
 
 namespace osteon::haptic {
 namespace {
-
-// Registers that every processor has.
-constexpr std::size_t kRow = 4;
-typedef float Row __attribute__((vector_size(kRow * 4)));
-Row load(const float* from) {
-  Row row;
-  std::memcpy(&row, from, sizeof row);
-  return row;
-}
-void store(float* to, const Row& row) { std::memcpy(to, &row, sizeof row); }
 
 double sampled_mm(const SampledDistance& mesh, const Vec3& p) noexcept {
   const double pitch = mesh.pitch * kQuantum_mm;
@@ -121,34 +111,29 @@ double CutShape::distance_mm(const Vec3& p, Vec3& out) const noexcept {
   return distance;
 }
 
-Lanes CutShape::distance_mm(const Lanes (&p)[3]) const noexcept {
-  Lanes distance;
-  const bool turned = kind_ == CutKind::turned;
-  if (!turned && kind_ != CutKind::hull) {
+Lanes CutShape::distance_mm(const HullPlace& place, const Lanes (&p)[3]) const noexcept {
+  const std::span faces(faces_.data(), static_cast<std::size_t>(count_));
+  if (kind_ == CutKind::hull) return hull_distance_mm(place, faces, p);
+  Lanes q[3], distance;
+  for (int k = 0; k < 3; ++k) {
+    const float x = place.rotation(k, 0), y = place.rotation(k, 1), z = place.rotation(k, 2), from = place.at[k];
+    for (std::size_t i = 0; i < kGroupPoints; ++i) q[k][i] = ((p[0][i] * x + p[1][i] * y) + p[2][i] * z) + from;
+  }
+  if (kind_ != CutKind::turned) {
     for (std::size_t i = 0; i < kGroupPoints; ++i)
-      distance[i] = static_cast<float>(std::min(distance_mm(Vec3(p[0][i], p[1][i], p[2][i])), double{kLeftOut_mm}));
+      distance[i] = static_cast<float>(std::min(distance_mm(Vec3(q[0][i], q[1][i], q[2][i])), double{kLeftOut_mm}));
     return distance;
   }
-  Lanes x = p[0], y = p[1];
-  if (turned)
-    for (std::size_t i = 0; i < kGroupPoints; ++i) {
-      x[i] = std::sqrt(p[0][i] * p[0][i] + p[1][i] * p[1][i]);
-      y[i] = 0.0f;
-    }
-  for (std::size_t i = 0; i < kGroupPoints; i += kRow) {
-    const Row px = load(&x[i]), py = load(&y[i]), pz = load(&p[2][i]);
-    Row farthest = Row{} + std::numeric_limits<float>::lowest();
-    for (std::size_t plane = 0; plane < static_cast<std::size_t>(count_); ++plane) {
-      const std::array<float, 4>& face = faces_[plane];
-      const Row to_plane = ((px * face[0] + py * face[1]) + pz * face[2]) - face[3];
-      farthest = to_plane > farthest ? to_plane : farthest;
-    }
-    store(&distance[i], farthest);
+  // In the half plane through the axis.
+  for (std::size_t i = 0; i < kGroupPoints; ++i) {
+    q[0][i] = std::sqrt(q[0][i] * q[0][i] + q[1][i] * q[1][i]);
+    q[1][i] = 0.0f;
   }
+  distance = hull_distance_mm({}, faces, q);
   const float dome = static_cast<float>(radius_mm_);
-  if (turned && dome > 0.0f)
+  if (dome > 0.0f)
     for (std::size_t i = 0; i < kGroupPoints; ++i) {
-      const float up = p[2][i] + dome, to_dome = std::sqrt(x[i] * x[i] + up * up) - dome;
+      const float up = q[2][i] + dome, to_dome = std::sqrt(q[0][i] * q[0][i] + up * up) - dome;
       distance[i] = up > 0.0f && to_dome > distance[i] ? to_dome : distance[i];
     }
   return distance;

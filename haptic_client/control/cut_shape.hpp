@@ -9,9 +9,6 @@
 
 namespace osteon::haptic {
 
-// Numbers of a group's points.
-using Lanes = std::array<float, kGroupPoints>;
-
 class CutShape {
  public:
   CutShape() = default;
@@ -24,8 +21,8 @@ class CutShape {
   }
   // [haptic] `out`: its gradient, a unit vector out of the body.
   [[nodiscard]] double distance_mm(const Vec3& point_mm, Vec3& out) const noexcept;
-  // [haptic] Of a group of points at once, in single precision; `p`: x, y, z.
-  [[nodiscard]] Lanes distance_mm(const Lanes (&p)[3]) const noexcept;
+  // [haptic] Of a group of points at once, in single precision; `place`: from theirs to the tool's frame; `p`: x, y, z.
+  [[nodiscard]] Lanes distance_mm(const HullPlace& place, const Lanes (&p)[3]) const noexcept;
   [[nodiscard]] bool open_behind() const noexcept { return open_behind_; }
   // How far behind its tip it cuts.
   [[nodiscard]] double behind_mm() const noexcept { return behind_mm_; }
@@ -44,7 +41,7 @@ class CutShape {
   bool open_behind_ = false;
   int count_ = 0;
   std::array<Plane, kMostHullPlanes + 4> planes_;
-  std::array<std::array<float, 4>, kMostHullPlanes + 4> faces_;  // the same, single precision
+  std::array<HullFace, kMostHullPlanes + 4> faces_;  // the same, single precision
   double behind_mm_ = 0;
   double radius_mm_ = 0;  // ball, and the dome that rounds a turned body's end
   std::shared_ptr<const SampledDistance> sampled_;  // shared with the tool, immutable

@@ -92,7 +92,8 @@ void Proxy::place(const Pose& pose_bone_tool) noexcept {
 
 void Proxy::see_sweeps(const ToolModel& model, const Pose& pose, SweepViews& views) const noexcept {
   const double short_mm = 0.5 * model.inset;
-  for (std::size_t s = 0; s < static_cast<std::size_t>(sweep_count_); ++s) views[s] = SweepView(sweeps_[s], pose, short_mm);
+  for (std::size_t s = 0; s < static_cast<std::size_t>(sweep_count_); ++s)
+    views[s] = SweepView(sweeps_[s], s > 0 ? &sweeps_[s - 1] : nullptr, pose, short_mm);
 }
 
 void Proxy::swept(const SweepViews& views, const Lanes (&p)[3], Lanes& left, Parts& by) const noexcept {
@@ -314,6 +315,7 @@ void Proxy::add_conditions(const Tick& tick, const Sight& sight, const Pose& pos
 double Proxy::safe_part(const Tick& tick, const Motion& motion, Against against) const noexcept {
   const ContactSet& set = tick.model.contact;
   const double least_mm = 0.5 * tick.model.fine_pitch_mm, turn = motion.turn_rad.norm();
+  if (motion.move_mm.norm() + turn * tick.model.contact.reach_mm <= least_mm) return 1.0;
   double part = 1.0;
   for (int group = against == Against::cutting && !tick.scene ? set.active_groups : 0; group < set.groups(); ++group) {
     const ContactSet::Ball& ball = set.balls[static_cast<std::size_t>(group)];
@@ -549,7 +551,9 @@ bool Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm,
     // Walls and the scene block even where the cutting part goes on.
     bool blocked = false;
     if (walls || tick.scene) {
-      if (!seen) look(tick, pose_, against, here_);
+      // The walls are seen already from the way here.
+      if (!seen && tick.scene) look(tick, pose_, against, here_);
+      else if (!seen) std::fill_n(here_.values.nearest_mm.begin(), model.contact.active_groups, kLeftOut_mm);
       seen = true;
       Motion piece;
       piece.move_mm = step_mm * direction;

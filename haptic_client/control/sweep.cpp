@@ -10,7 +10,8 @@ void Sweep::reach(const Pose& pose) noexcept {
   middle = {0.5 * (from.position_mm + to.position_mm), from.rotation.slerp(0.5, to.rotation)};
 }
 
-SweepView::SweepView(const Sweep& sweep, const Pose& pose_bone_tool, double short_mm) noexcept : shape_(sweep.shape) {
+SweepView::SweepView(const Sweep& sweep, const Sweep* before, const Pose& pose_bone_tool, double short_mm) noexcept
+    : shape_(sweep.shape) {
   const Pose pose_tool_bone = pose_bone_tool.inverse();
   if (shape_->is_ball()) {
     ball_from_ = pose_tool_bone.point(sweep.from.point(shape_->ball_centre_mm()));
@@ -32,16 +33,9 @@ SweepView::SweepView(const Sweep& sweep, const Pose& pose_bone_tool, double shor
   const double turned_mm = shape_->behind_mm() * sweep.from.rotation.angularDistance(sweep.to.rotation);
   if ((sweep.from.position_mm - sweep.to.position_mm).norm() + turned_mm < short_mm) return;
   add(sweep.middle);
-  add(sweep.from);
-}
-
-Lanes SweepView::Place::distance_mm(const CutShape& shape, const Lanes (&p)[3]) const noexcept {
-  Lanes q[3];
-  for (int k = 0; k < 3; ++k) {
-    const float x = rotation(k, 0), y = rotation(k, 1), z = rotation(k, 2), from = at[k];
-    for (std::size_t i = 0; i < kGroupPoints; ++i) q[k][i] = ((p[0][i] * x + p[1][i] * y) + p[2][i] * z) + from;
-  }
-  return shape.distance_mm(q);
+  const bool seen = before && before->to.position_mm == sweep.from.position_mm &&
+                    before->to.rotation.coeffs() == sweep.from.rotation.coeffs();
+  if (!seen) add(sweep.from);
 }
 
 void SweepView::left_mm(const Lanes (&p)[3], Lanes& left, Parts& by) const noexcept {
@@ -60,9 +54,9 @@ void SweepView::left_mm(const Lanes (&p)[3], Lanes& left, Parts& by) const noexc
     }
     return;
   }
-  Lanes distance = places_[0].distance_mm(*shape_, p);
+  Lanes distance = shape_->distance_mm(places_[0], p);
   for (int other = 1; other < count_; ++other) {
-    const Lanes there = places_[other].distance_mm(*shape_, p);
+    const Lanes there = shape_->distance_mm(places_[other], p);
     for (std::size_t i = 0; i < kGroupPoints; ++i) {
       const bool nearer = there[i] < distance[i];
       distance[i] = nearer ? there[i] : distance[i];
@@ -84,13 +78,14 @@ void SweepView::left_mm(const Lanes (&p)[3], Lanes& left, Parts& by) const noexc
 Vec3 SweepView::way_out(const Vec3& p, int by) const noexcept {
   if (shape_->is_ball()) {
     const Vec3 way = ball_to_ - ball_from_;
-    const double length2 = way.squaredNorm(), along = length2 > 0.0 ? std::clamp((p - ball_from_).dot(way) / length2, 0.0, 1.0) : 0.0;
+    const double length2 = way.squaredNorm();
+    const double along = length2 > 0.0 ? std::clamp((p - ball_from_).dot(way) / length2, 0.0, 1.0) : 0.0;
     const Vec3 inwards = ball_from_ + along * way - p;
     const double distance = inwards.norm();
     return distance > 0.0 ? Vec3(inwards / distance) : Vec3(Vec3::UnitZ());
   }
   if (by == kBehind) return places_[0].rotation.row(2).cast<double>();
-  const Place& place = places_[by];
+  const HullPlace& place = places_[by];
   const Eigen::Matrix3d rotation = place.rotation.cast<double>();
   Vec3 out;
   static_cast<void>(shape_->distance_mm(rotation * p + place.at.cast<double>(), out));

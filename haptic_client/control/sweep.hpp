@@ -25,8 +25,9 @@ using Parts = std::array<std::int32_t, kGroupPoints>;
 class SweepView {
  public:
   SweepView() = default;
-  // Of a sweep that is shorter than `short_mm` only the end counts.
-  SweepView(const Sweep& sweep, const Pose& pose_bone_tool, double short_mm) noexcept;
+  // Of a sweep that is shorter than `short_mm` only the end counts. `before`: the one seen before it, or null; where that
+  // ends, this one need not begin.
+  SweepView(const Sweep& sweep, const Sweep* before, const Pose& pose_bone_tool, double short_mm) noexcept;
   // f that the sweep leaves at a group of the tool's points, at least: tool frame, single precision, which tells
   // hundred-thousandths of a millimetre near the tip. `by`: what of the sweep it is that leaves it.
   void left_mm(const Lanes (&p)[3], Lanes& left, Parts& by) const noexcept;
@@ -35,15 +36,9 @@ class SweepView {
   static constexpr int kParts = 4;
 
  private:
-  // From the tool where it is to the tool where it was.
-  struct Place {
-    Eigen::Matrix3f rotation;
-    Eigen::Vector3f at;
-    [[nodiscard]] Lanes distance_mm(const CutShape& shape, const Lanes (&p)[3]) const noexcept;
-  };
   static constexpr int kBehind = 3;  // as a part: the hole's beginning; before it places, by number
   const CutShape* shape_ = nullptr;
-  Place places_[3];
+  HullPlace places_[3];      // from the tool where it is to the tool where it was
   int count_ = 0;
   float began_mm_ = 0;       // along the axis, of a hole that goes on behind the tool
   Vec3 ball_from_, ball_to_; // middles

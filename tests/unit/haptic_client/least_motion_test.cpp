@@ -111,7 +111,7 @@ TEST(CutShape, AGroupOfPointsIsItsPoints) {
       sweep.from = {{0.3, -0.2, 4.0}, Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Vec3(1, 2, 3).normalized()))};
       sweep.reach({sweep.from.position_mm + Vec3(0.4, 0.1, 0.7), sweep.from.rotation});
       const Pose now{sweep.to.position_mm + Vec3(0.05, 0.02, -0.1), sweep.to.rotation};
-      const SweepView view(sweep, now, 0.1);
+      const SweepView view(sweep, nullptr, now, 0.1);
       double most_off = 0.0;
       for (int round = 0; round < 50; ++round) {
         Lanes p[3], left;
@@ -121,7 +121,12 @@ TEST(CutShape, AGroupOfPointsIsItsPoints) {
           p[1][i] = static_cast<float>(12.0 * even(random));
           p[2][i] = static_cast<float>(15.0 * even(random) - 10.0);
         }
-        const Lanes distance = shape.distance_mm(p);
+        const Lanes distance = shape.distance_mm(HullPlace{}, p);
+        for (const int lanes : {4, 8}) {
+          limit_contact_lanes(lanes);
+          EXPECT_EQ(shape.distance_mm(HullPlace{}, p), distance) << tool.name << ", " << lanes << " at a time";
+        }
+        limit_contact_lanes(16);
         view.left_mm(p, left, by);
         for (std::size_t i = 0; i < kGroupPoints; ++i) {
           const Vec3 at(p[0][i], p[1][i], p[2][i]);
