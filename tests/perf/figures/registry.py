@@ -267,12 +267,13 @@ FIGURES = [
                ("<=", 1.0), full=True),
         Figure(f"{prefix}_net", "mj", f"{on}what all contacts gave together; negative: what the coupling took",
                "haptic_stability", ("<=", 0.0), baseline="less the work of cutting", full=True),
-        Figure(f"{prefix}_cutting_power", "n_mm", f"{on}least product of cutting force and way of the tool in any tick",
-               "haptic_stability", (">=", 0.0), full=True),
-        Figure(f"{prefix}_pushed_back", "percent", f"{on}ticks, of those that cut, in which the tool turned back by more than it "
-               "cut, and which were made rubbing for that product's sake", "haptic_stability", full=True),
-        Figure(f"{prefix}_pushed_back_most", "mj", f"{on}the most that the cutting force would have given in one of them",
-               "haptic_stability", full=True),
+        Figure(f"{prefix}_cutting_power", "n_mm", f"{on}least product of cutting force and way of the tool in any tick: never "
+               "negative by construction, as ticks that would make it so count as rubbing", "haptic_stability", (">=", 0.0),
+               full=True),
+        Figure(f"{prefix}_pushed_back", "percent", f"{on}such ticks, in which the tool turned back by more than it cut, to those "
+               "that cut: so few that means over cutting ticks hold to a hundredth", "haptic_stability", ("<=", 1.0), full=True),
+        Figure(f"{prefix}_pushed_back_most", "mj", f"{on}the most that the cutting force would have given in one of them; it is "
+               "not shown", "haptic_stability", full=True),
         Figure(f"{prefix}_step", "n", f"{on}growth of force in a tick beyond the slew limit and what the hand's motion explains",
                "haptic_stability", ("<=", 1e-9), full=True),
         Figure(f"{prefix}_step_still", "n", f"{on}growth of force in a tick while the hand stood still", "haptic_stability",
