@@ -9,6 +9,7 @@
 
 #include "common/runtime/periodic.hpp"
 #include "haptic_client/device/device_exchange.hpp"
+#include "haptic_client/device/emergency_stop.hpp"
 #include "haptic_client/device/falcon_usb.hpp"
 
 namespace osteon::haptic {
@@ -61,6 +62,7 @@ class Falcon final : public HapticDevice {
     if (!runs) return tl::unexpected(runs.error());
     serial_ = usb->serial();
     usb_.emplace(std::move(*usb));
+    emergency_.emplace([](void* wire) { static_cast<FalconUsb*>(wire)->stop_motors(); }, &*usb_);
     exchange_.forget_output();
     stopping_ = false;
     homed_ = false;
@@ -72,6 +74,7 @@ class Falcon final : public HapticDevice {
   void close() noexcept override {
     stopping_ = true;
     if (io_.joinable()) io_.join();
+    emergency_.reset();
     usb_.reset();
     homed_ = false;
     exchange_.go_absent();
@@ -161,6 +164,7 @@ class Falcon final : public HapticDevice {
   const FalconOptions options_;
   std::string serial_;             // connection thread
   std::optional<FalconUsb> usb_;   // connection thread until the I/O thread runs
+  std::optional<EmergencyStop> emergency_;
   std::thread io_;
   Eigen::Vector3d place_m_ = kMiddle_m;  // I/O thread
   DeviceExchange exchange_;

@@ -1,9 +1,13 @@
 #include "haptic_client/device/falcon_usb.hpp"
 
 #include <libusb.h>
+#include <linux/usbdevice_fs.h>
+#include <poll.h>
+#include <sys/ioctl.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstdio>
 #include <cstring>
 
@@ -19,6 +23,7 @@ constexpr std::uint8_t kOut = 0x02, kIn = 0x81, kSettingType = 0x40;
 constexpr int kInterface = 0;
 constexpr std::size_t kPacket = 64;
 constexpr milliseconds kSettingPatience = 500ms, kAnswerPatience = 50ms, kEchoPatience = 1000ms, kCancelPatience = 500ms;
+constexpr milliseconds kStopPatience = 100ms;
 constexpr int kFailuresInARow = 3;  // of transfers, then the device counts as lost
 constexpr const char* kReplug = "unplug it, switch its power off and on, and plug it in again";
 
@@ -95,6 +100,9 @@ int code_of(libusb_transfer_status status) {
 struct FalconUsb::Wire {
   libusb_context* context = nullptr;
   libusb_device_handle* handle = nullptr;
+  int node = -1;                      // the device's file, libusb's own; -1: not known
+  FalconFrame without_force = encode(FalconCommand{});
+  std::atomic<bool> stopped{false};   // no frame goes out any more
   Transfer out, in;
   FalconFrameReader reader;
   std::string serial;
@@ -121,6 +129,14 @@ struct FalconUsb::Wire {
     const auto us = std::chrono::duration_cast<std::chrono::microseconds>(patience).count();
     timeval wait{static_cast<time_t>(us / 1000000), static_cast<suseconds_t>(us % 1000000)};
     libusb_handle_events_timeout_completed(context, &wait, nullptr);
+  }
+
+  // Of the files that libusb waits for, the one device's is the only one that it waits to write to.
+  void find_node() {
+    const libusb_pollfd** files = libusb_get_pollfds(context);
+    for (const libusb_pollfd** file = files; file != nullptr && *file != nullptr; ++file)
+      if ((*file)->events & POLLOUT) node = (*file)->fd;
+    libusb_free_pollfds(files);
   }
 
   // No transfer may be under way when its memory goes.
@@ -190,6 +206,19 @@ FalconUsb::~FalconUsb() = default;
 const std::string& FalconUsb::serial() const noexcept { return wire_->serial; }
 std::uint64_t FalconUsb::broken_frames() const noexcept { return wire_->reader.broken(); }
 
+// Past libusb, whose locks the thread that has crashed may hold: the kernel's own synchronous transfer is one system call,
+// which a handler may make, and queues behind what is under way. A frame that the I/O thread is just submitting may come
+// between the flag and the first transfer; the second is behind that too.
+void FalconUsb::stop_motors() noexcept {
+  Wire& wire = *wire_;
+  wire.stopped = true;
+  for (int i = 0; i < 2 && wire.node >= 0; ++i) {
+    usbdevfs_bulktransfer transfer{kOut, static_cast<unsigned>(wire.without_force.size()), in_ms(kStopPatience),
+                                   wire.without_force.data()};
+    (void)::ioctl(wire.node, USBDEVFS_BULK, &transfer);
+  }
+}
+
 Result<FalconUsb> FalconUsb::open() {
   auto wire = std::make_unique<Wire>();
   if (wire->out.raw == nullptr || wire->in.raw == nullptr)
@@ -215,6 +244,7 @@ Result<FalconUsb> FalconUsb::open() {
     why = libusb_claim_interface(wire->handle, kInterface);
     if (why == 0) {
       wire->serial = serial_of(device, wire->handle);
+      wire->find_node();
       return FalconUsb(std::move(wire));
     }
     libusb_close(wire->handle);
@@ -300,7 +330,7 @@ Result<void> FalconUsb::load(std::span<const std::uint8_t> image) {
 Result<std::optional<FalconState>> FalconUsb::exchange(const FalconCommand& command, milliseconds patience) {
   Wire& wire = *wire_;
   const auto deadline = Clock::now() + patience;
-  if (!wire.out.pending) {
+  if (!wire.out.pending && !wire.stopped) {
     const FalconFrame frame = encode(command);
     std::copy(frame.begin(), frame.end(), wire.out.bytes.begin());
     if (Result<void> ok = wire.check("writing to", wire.out.submit(wire.handle, kOut, frame.size())); !ok)

@@ -37,6 +37,10 @@ class FalconUsb {
   [[nodiscard]] Result<std::optional<FalconState>> exchange(const FalconCommand& command, std::chrono::milliseconds patience);
   [[nodiscard]] std::uint64_t broken_frames() const noexcept;
 
+  // The last of all, for a process that ends: sends a frame without force, and after it none goes out. Any thread, also in a
+  // signal's handler, whatever the other calls are doing.
+  void stop_motors() noexcept;
+
  private:
   struct Wire;
   explicit FalconUsb(std::unique_ptr<Wire> wire) noexcept;

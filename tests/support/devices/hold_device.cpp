@@ -1,5 +1,5 @@
 // A program that holds a haptic device with force on it and then ends in the way it is told: for tests of what becomes
-// of the motors. hold_device phantom|force-dimension LIBRARY wait|exit|abort|crash|check
+// of the motors. hold_device phantom|force-dimension|falcon LIBRARY wait|exit|abort|crash|check (a falcon needs no library)
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -10,6 +10,7 @@
 #include "common/core/check.hpp"
 #include "common/runtime/stop_signal.hpp"
 #include "haptic_client/device/connection.hpp"
+#include "haptic_client/device/falcon.hpp"
 #include "haptic_client/device/force_dimension.hpp"
 #include "haptic_client/device/openhaptics.hpp"
 
@@ -27,6 +28,8 @@ int main(int argc, char** argv) {
   std::unique_ptr<HapticDevice> device;
   if (kind == "phantom")
     device = make_openhaptics({argv[2], {}});
+  else if (kind == "falcon")
+    device = make_falcon({.firmware = {}, .priority = 0});
   else
     device = make_force_dimension({.library = argv[2]});
   const StopSignal stop;

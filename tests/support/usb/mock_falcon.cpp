@@ -41,6 +41,11 @@ std::string description() {
   return text;
 }
 
+// Memory of the client that a place in other memory points to; null where the client has died meanwhile.
+UMockdevIoctlData* resolve(UMockdevIoctlData* data, gsize at, gsize size) {
+  return umockdev_ioctl_data_resolve(data, at, size, nullptr);
+}
+
 usbdevfs_urb* urb_of(UMockdevIoctlData* data) { return reinterpret_cast<usbdevfs_urb*>(data->data); }
 
 }  // namespace
@@ -73,6 +78,7 @@ void MockFalcon::ioctl(Call* call) {
       return;
     }
     case USBDEVFS_SUBMITURB: return submit(call);
+    case static_cast<unsigned>(USBDEVFS_BULK): return bulk(call);
     case USBDEVFS_REAPURB:
     case USBDEVFS_REAPURBNDELAY: return reap(call);
     case USBDEVFS_DISCARDURB: return discard(call);
@@ -89,11 +95,13 @@ void MockFalcon::submit(Call* call) {
   std::uint64_t address = 0;
   UMockdevIoctlData* arg = umockdev_ioctl_client_get_arg(call);
   std::memcpy(&address, arg->data, sizeof(address));
-  Block block{umockdev_ioctl_data_resolve(arg, 0, sizeof(usbdevfs_urb), nullptr), nullptr, address};
+  Block block{resolve(arg, 0, sizeof(usbdevfs_urb)), nullptr, address};
+  if (block.urb == nullptr) return complete(call, -1, ENODEV);
   usbdevfs_urb* urb = urb_of(block.urb);
-  if (urb->buffer_length > 0)
-    block.buffer = umockdev_ioctl_data_resolve(block.urb, offsetof(usbdevfs_urb, buffer),
-                                               static_cast<gsize>(urb->buffer_length), nullptr);
+  if (urb->buffer_length > 0) {
+    block.buffer = resolve(block.urb, offsetof(usbdevfs_urb, buffer), static_cast<gsize>(urb->buffer_length));
+    if (block.buffer == nullptr) return complete(call, -1, ENODEV);
+  }
   complete(call, 0);
   ++transfers;
   if (urb->type == USBDEVFS_URB_TYPE_CONTROL) return control(block);
@@ -107,6 +115,22 @@ void MockFalcon::submit(Call* call) {
     model.take({block.buffer->data, static_cast<std::size_t>(urb->buffer_length)});
     finish(block, 0, static_cast<std::size_t>(urb->buffer_length));
   }
+  answer_reads(false);
+}
+
+// The kernel's synchronous transfer: only out, as the driver uses it.
+void MockFalcon::bulk(Call* call) {
+  UMockdevIoctlData* data = resolve(umockdev_ioctl_client_get_arg(call), 0, sizeof(usbdevfs_bulktransfer));
+  if (data == nullptr) return complete(call, -1, ENODEV);
+  usbdevfs_bulktransfer transfer{};
+  std::memcpy(&transfer, data->data, sizeof(transfer));
+  UMockdevIoctlData* bytes = resolve(data, offsetof(usbdevfs_bulktransfer, data), transfer.len);
+  if (bytes == nullptr) return complete(call, -1, ENODEV);
+  ++transfers;
+  model.take({bytes->data, static_cast<std::size_t>(transfer.len)});
+  complete(call, static_cast<long>(transfer.len));
+  g_object_unref(bytes);
+  g_object_unref(data);
   answer_reads(false);
 }
 
@@ -159,7 +183,8 @@ void MockFalcon::reap(Call* call) {
   const Block block = done_.front();
   done_.pop_front();
   if (done_.empty()) node_->let_write(false);
-  UMockdevIoctlData* place = umockdev_ioctl_data_resolve(umockdev_ioctl_client_get_arg(call), 0, sizeof(void*), nullptr);
+  UMockdevIoctlData* place = resolve(umockdev_ioctl_client_get_arg(call), 0, sizeof(void*));
+  if (place == nullptr) return complete(call, -1, ENODEV);
   umockdev_ioctl_data_set_ptr(place, 0, block.urb);
   complete(call, 0);
   g_object_unref(place);

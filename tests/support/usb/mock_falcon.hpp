@@ -28,6 +28,7 @@ class MockFalcon {
   };
   void ioctl(Call* call);
   void submit(Call* call);
+  void bulk(Call* call);
   void reap(Call* call);
   void discard(Call* call);
   void control(Block& block);

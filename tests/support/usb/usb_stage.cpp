@@ -63,7 +63,8 @@ std::string UsbStage::command(const std::string& line) {
   host_->write(line + "\n");
   std::optional<std::string> answer = host_->read_line(kPatience);
   if (!answer) {
-    std::fprintf(stderr, "osteon-usb-host has died after \"%s\": %s\n", line.c_str(), host_->err().c_str());
+    const int code = host_->wait(kPatience).value_or(-1);
+    std::fprintf(stderr, "osteon-usb-host has died (%d) after \"%s\": %s\n", code, line.c_str(), host_->err().c_str());
     std::abort();
   }
   return *answer;

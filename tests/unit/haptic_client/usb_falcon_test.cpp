@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <fstream>
 #include <functional>
@@ -13,6 +14,7 @@
 #include "haptic_client/device/falcon.hpp"
 #include "haptic_client/device/falcon_frames.hpp"
 #include "tests/support/allocation_counter.hpp"
+#include "tests/support/process.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/support/usb/usb_stage.hpp"
 #include "tests/support/wait.hpp"
@@ -174,6 +176,30 @@ TEST_F(FalconOnUsb, MotorsDoTheWorkOfTheForceAndStopWithTheHapticThread) {
     return now.motors == std::array<int, 3>{} && now.control == kFalconBlue;
   }, kPatience));
 }
+
+struct End {
+  const char* how;
+  int signal;
+};
+class FalconsEnd : public FalconOnUsb, public testing::WithParamInterface<End> {};
+
+// However the program ends, the last that the device hears is a frame without force: it may hold what it heard last.
+TEST_P(FalconsEnd, StopsTheMotors) {
+  plug("loaded");
+  hold_at({0.0, 0.0, 0.15});
+  test::Process child(test::program("hold_device"), {"falcon", "-", GetParam().how});
+  ASSERT_TRUE(child.wait_for_out("holding", kPatience)) << child.err();
+  if (GetParam().signal) child.signal(GetParam().signal);
+  ASSERT_TRUE(child.wait(kPatience));
+  const auto told = usb_.falcon_told();
+  EXPECT_GT(told.with_force, 10u);
+  EXPECT_EQ(told.motors, (std::array<int, 3>{}));
+  EXPECT_EQ(told.bad_frames, 0u);
+}
+INSTANTIATE_TEST_SUITE_P(Ends, FalconsEnd,
+                         testing::Values(End{"wait", SIGTERM}, End{"wait", SIGHUP}, End{"wait", SIGQUIT}, End{"exit", 0},
+                                         End{"abort", 0}, End{"crash", 0}, End{"check", 0}),
+                         [](const auto& end) { return std::string(end.param.how) + std::to_string(end.param.signal); });
 
 TEST_F(FalconOnUsb, AForceBeyondItsLimitKeepsItsDirection) {
   plug("loaded");
