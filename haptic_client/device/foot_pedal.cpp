@@ -79,7 +79,8 @@ class FootPedal final : public HapticDevice {
       const auto field = find_field(fields, wanted);
       if (!field)
         return failure(ErrorCode::unsupported,
-                       found->product + " at " + found->path + " has no such axis; name another (pedal-axis:z) or choose another joystick");
+                       found->product + " at " + found->path +
+                           " has no such axis; name another (pedal-axis:z) or choose another joystick");
       field_ = *field;
     }
     info_.model = found->product.empty() ? "foot pedal" : found->product;

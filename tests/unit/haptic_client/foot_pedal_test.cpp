@@ -96,8 +96,8 @@ TEST(FootPedal, SwitchAndAxisAreChosenByWords) {
     const auto options = read_pedal_axis(wrong);
     ASSERT_FALSE(options) << wrong;
     EXPECT_EQ(options.error().message, std::string("--device pedal-axis:") + wrong +
-                                           ": what follows must be \"inverted\", an axis (accelerator, brake, throttle, slider, z, "
-                                           "rz, x, y, rx, ry, or a HID usage such as 0x32), or both joined by \":\"");
+                                           ": what follows must be \"inverted\", an axis (accelerator, brake, throttle, slider, "
+                                           "z, rz, x, y, rx, ry, or a HID usage such as 0x32), or both joined by \":\"");
   }
 }
 
