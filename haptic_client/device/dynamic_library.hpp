@@ -1,6 +1,8 @@
 // A vendor's library that is loaded when it is needed and never unloaded: some of them cannot be loaded twice.
 #pragma once
 #include <filesystem>
+#include <map>
+#include <mutex>
 #include <span>
 #include <string>
 
@@ -36,5 +38,33 @@ class DynamicLibrary {
   void* handle_ = nullptr;  // never closed
   std::string name_;
 };
+
+// A vendor's library and its functions.
+template <class Api>
+struct VendorLibrary {
+  DynamicLibrary library;
+  Api call{};
+};
+
+// Loads it once for the process and keeps it. `bind(call, need)` asks for each function: need("its name", call.member).
+// Errors: those of DynamicLibrary::load; unsupported, it is another library: `is_not` says than which.
+template <class Api, class Bind>
+[[nodiscard]] Result<const VendorLibrary<Api>*> load_vendor(const LibraryWanted& wanted, const std::string& is_not, Bind bind) {
+  static std::mutex mutex;
+  static std::map<std::filesystem::path, VendorLibrary<Api>> loaded;  // nodes stay where they are
+  const std::lock_guard lock(mutex);
+  if (const auto known = loaded.find(wanted.file); known != loaded.end()) return &known->second;
+  Result<DynamicLibrary> library = DynamicLibrary::load(wanted);
+  if (!library) return tl::unexpected(library.error());
+  VendorLibrary<Api> result{*library, {}};
+  const char* missing = nullptr;
+  bind(result.call, [&](const char* name, auto& function) {
+    if (!result.library.find(name, function) && !missing) missing = name;
+  });
+  if (missing)
+    return failure(ErrorCode::unsupported,
+                   library->name() + " is not " + is_not + ": it has no " + missing + "; " + wanted.remedy);
+  return &(loaded[wanted.file] = result);
+}
 
 }  // namespace osteon::haptic

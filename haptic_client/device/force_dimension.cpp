@@ -3,8 +3,6 @@
 #include <array>
 #include <atomic>
 #include <cmath>
-#include <map>
-#include <mutex>
 #include <optional>
 #include <thread>
 
@@ -25,47 +23,30 @@ constexpr const char* kRemedy = "install the vendor's Force Dimension SDK, or na
 constexpr int kBadCyclesToLose = 20;  // [A]
 constexpr int kPriority = 79;         // below the haptic thread
 
-struct Library {
-  DynamicLibrary library;
-  dhd::Api call{};
-};
+using Library = VendorLibrary<dhd::Api>;
 
 Result<const Library*> load(const std::filesystem::path& file) {
-  static std::mutex mutex;
-  static std::map<std::filesystem::path, Library> loaded;  // nodes stay where they are
-  const std::lock_guard lock(mutex);
-  if (const auto known = loaded.find(file); known != loaded.end()) return &known->second;
-  Result<DynamicLibrary> library = DynamicLibrary::load({"Force Dimension's libdhd", file, kNames, kRemedy});
-  if (!library) return tl::unexpected(library.error());
-  Library result{*library, {}};
-  dhd::Api& c = result.call;
-  const char* missing = nullptr;
-  const auto need = [&](const char* name, auto& function) {
-    if (!result.library.find(name, function) && !missing) missing = name;
+  const auto bind = [](dhd::Api& c, const auto& need) {
+    need("dhdGetDeviceCount", c.device_count);
+    need("dhdOpenID", c.open_id);
+    need("dhdClose", c.close);
+    need("dhdGetSystemType", c.system_type);
+    need("dhdGetSystemName", c.system_name);
+    need("dhdGetSerialNumber", c.serial_number);
+    need("dhdGetSDKVersion", c.sdk_version);
+    need("dhdGetStatus", c.status);
+    need("dhdEnableForce", c.enable_force);
+    need("dhdStop", c.stop);
+    need("dhdHasWrist", c.has_wrist);
+    need("dhdHasActiveWrist", c.has_active_wrist);
+    need("dhdGetPosition", c.position);
+    need("dhdGetPositionAndOrientationFrame", c.position_and_frame);
+    need("dhdSetForceAndTorque", c.set_force_and_torque);
+    need("dhdGetButtonMask", c.button_mask);
+    need("dhdErrorGetLast", c.last_error);
+    need("dhdErrorGetStr", c.error_text);
   };
-  need("dhdGetDeviceCount", c.device_count);
-  need("dhdOpenID", c.open_id);
-  need("dhdClose", c.close);
-  need("dhdGetSystemType", c.system_type);
-  need("dhdGetSystemName", c.system_name);
-  need("dhdGetSerialNumber", c.serial_number);
-  need("dhdGetSDKVersion", c.sdk_version);
-  need("dhdGetStatus", c.status);
-  need("dhdEnableForce", c.enable_force);
-  need("dhdStop", c.stop);
-  need("dhdHasWrist", c.has_wrist);
-  need("dhdHasActiveWrist", c.has_active_wrist);
-  need("dhdGetPosition", c.position);
-  need("dhdGetPositionAndOrientationFrame", c.position_and_frame);
-  need("dhdSetForceAndTorque", c.set_force_and_torque);
-  need("dhdGetButtonMask", c.button_mask);
-  need("dhdErrorGetLast", c.last_error);
-  need("dhdErrorGetStr", c.error_text);
-  if (missing)
-    return failure(
-        ErrorCode::unsupported,
-        library->name() + " is not a Force Dimension library of version 3: it has no " + missing + "; " + kRemedy);
-  return &(loaded[file] = result);
+  return load_vendor<dhd::Api>({"Force Dimension's libdhd", file, kNames, kRemedy}, "a Force Dimension library of version 3", bind);
 }
 
 // The library does not tell a device's limits; these are the vendor's figures for its kinds, as published programs use

@@ -4,8 +4,6 @@
 #include <array>
 #include <atomic>
 #include <cmath>
-#include <map>
-#include <mutex>
 #include <optional>
 #include <thread>
 
@@ -28,48 +26,31 @@ constexpr int kTemperatureSamples = 100;  // between two looks at it
 constexpr int kBadFramesToLose = 50;      // [A] without a good one between them
 constexpr int kMostErrors = 16;           // taken off the library's stack at a time
 
-struct Library {
-  DynamicLibrary library;
-  hd::Api call{};
-};
+using Library = VendorLibrary<hd::Api>;
 
-// Loaded once for the process and kept: the vendor's library must not be unloaded and loaded again.
 Result<const Library*> load(const std::filesystem::path& file) {
-  static std::mutex mutex;
-  static std::map<std::filesystem::path, Library> loaded;  // nodes stay where they are
-  const std::lock_guard lock(mutex);
-  if (const auto known = loaded.find(file); known != loaded.end()) return &known->second;
-  Result<DynamicLibrary> library = DynamicLibrary::load({"OpenHaptics (libHD.so)", file, kNames, kRemedy});
-  if (!library) return tl::unexpected(library.error());
-  Library result{*library, {}};
-  hd::Api& c = result.call;
-  const char* missing = nullptr;
-  const auto need = [&](const char* name, auto& function) {
-    if (!result.library.find(name, function) && !missing) missing = name;
+  const auto bind = [](hd::Api& c, const auto& need) {
+    need("hdInitDevice", c.init_device);
+    need("hdMakeCurrentDevice", c.make_current_device);
+    need("hdDisableDevice", c.disable_device);
+    need("hdBeginFrame", c.begin_frame);
+    need("hdEndFrame", c.end_frame);
+    need("hdGetError", c.get_error);
+    need("hdGetErrorString", c.get_error_string);
+    need("hdEnable", c.enable);
+    need("hdDisable", c.disable);
+    need("hdGetIntegerv", c.get_integers);
+    need("hdGetDoublev", c.get_doubles);
+    need("hdSetDoublev", c.set_doubles);
+    need("hdGetString", c.get_string);
+    need("hdCheckCalibration", c.check_calibration);
+    need("hdUpdateCalibration", c.update_calibration);
+    need("hdStartScheduler", c.start_scheduler);
+    need("hdStopScheduler", c.stop_scheduler);
+    need("hdScheduleAsynchronous", c.schedule_asynchronous);
+    need("hdUnschedule", c.unschedule);
   };
-  need("hdInitDevice", c.init_device);
-  need("hdMakeCurrentDevice", c.make_current_device);
-  need("hdDisableDevice", c.disable_device);
-  need("hdBeginFrame", c.begin_frame);
-  need("hdEndFrame", c.end_frame);
-  need("hdGetError", c.get_error);
-  need("hdGetErrorString", c.get_error_string);
-  need("hdEnable", c.enable);
-  need("hdDisable", c.disable);
-  need("hdGetIntegerv", c.get_integers);
-  need("hdGetDoublev", c.get_doubles);
-  need("hdSetDoublev", c.set_doubles);
-  need("hdGetString", c.get_string);
-  need("hdCheckCalibration", c.check_calibration);
-  need("hdUpdateCalibration", c.update_calibration);
-  need("hdStartScheduler", c.start_scheduler);
-  need("hdStopScheduler", c.stop_scheduler);
-  need("hdScheduleAsynchronous", c.schedule_asynchronous);
-  need("hdUnschedule", c.unschedule);
-  if (missing)
-    return failure(ErrorCode::unsupported,
-                   library->name() + " is not OpenHaptics' libHD: it has no " + missing + "; " + kRemedy);
-  return &(loaded[file] = result);
+  return load_vendor<hd::Api>({"OpenHaptics (libHD.so)", file, kNames, kRemedy}, "OpenHaptics' libHD", bind);
 }
 
 // The library's errors, newest first; the first that is not kNoError is the one to tell.

@@ -2,6 +2,7 @@
 #pragma once
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <mutex>
 
 #include "haptic_client/device/connection.hpp"
@@ -42,6 +43,13 @@ class Heard {
     for (auto i = all_.rbegin(); i != all_.rend(); ++i)
       if (i->first == event) return i->second;
     return {};
+  }
+  // Whether any sentence of a kind had this in it.
+  bool said(DeviceEvent event, std::string_view what) {
+    const std::lock_guard lock(mutex_);
+    return std::any_of(all_.begin(), all_.end(), [&](const auto& one) {
+      return one.first == event && one.second.find(what) != std::string::npos;
+    });
   }
   std::size_t count(DeviceEvent event) {
     const std::lock_guard lock(mutex_);

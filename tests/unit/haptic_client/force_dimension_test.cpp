@@ -167,7 +167,7 @@ TEST_F(ForceDimensionArm, UnpluggedItHasNoForceAndComesBack) {
     ++arm()->closed;
     arm()->plugged = 1;
   }
-  ASSERT_TRUE(wait_until([&] { return heard.count(DeviceEvent::back) == 3; }, kPatience));
+  ASSERT_TRUE(wait_until([&] { return heard.count(DeviceEvent::back) >= 3; }, kPatience));
   arm()->misuse = 0;  // closing one that is gone
   arm()->closed = arm()->opened - 1;
 }

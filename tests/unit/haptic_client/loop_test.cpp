@@ -38,6 +38,16 @@ class LoopOnBlock : public ::testing::Test {
     }
     return report;
   }
+  // A loop whose force comes and goes within 0.2 s, pressed on the surface once it has come. Returns the force.
+  double press_with_ramp() {
+    LoopParams params;
+    params.ramp_s = 0.2;
+    loop_ = std::make_unique<HapticLoop>(params, std::vector<ToolModel>{loop_->tool(0)});
+    loop_->take_up(0, {{0, 0, -1}, Eigen::Quaterniond::Identity()}, WorkspaceMapping{});
+    for (int i = 0; i < 300; ++i) tick();
+    move_to({0, 0, 0.3});
+    return tick().force_device_n.norm();
+  }
 
   Case bone_ = block_case();
   CutField field_;
@@ -110,13 +120,7 @@ TEST_F(LoopOnBlock, SafetyZerosComeAtOnce) {
 // A device that comes back has its handle elsewhere: the tool stays where it was, nothing is felt of the difference, and
 // force comes up over the ramp.
 TEST_F(LoopOnBlock, ADeviceThatComesBackIsTakenUpWithoutForce) {
-  LoopParams params;
-  params.ramp_s = 0.2;
-  loop_ = std::make_unique<HapticLoop>(params, std::vector<ToolModel>{ToolModel(*find_tool("drill-3.2"), bone_.pitch_mm())});
-  loop_->take_up(0, {{0, 0, -1}, Eigen::Quaterniond::Identity()}, WorkspaceMapping{});
-  for (int i = 0; i < 300; ++i) tick();
-  move_to({0, 0, 0.3});
-  ASSERT_GT(tick().force_device_n.norm(), 8.0);
+  ASSERT_GT(press_with_ramp(), 8.0);
   input_.device_ok = false;
   const double held_mm = tick().pose_bone_proxy.position_mm.z();
   input_.pose_device_tool.position_mm.z() = 20.0;  // pushed while nothing held it
@@ -179,13 +183,7 @@ TEST_F(LoopOnBlock, WhileTheRoomIsSilentTheSpindleRunsDownAndBoneStaysHard) {
 
 // When it has gone for good the hand is let go over the ramp, not at once.
 TEST_F(LoopOnBlock, AtTheEndTheHandIsLetGoOverTheRamp) {
-  LoopParams params;
-  params.ramp_s = 0.2;
-  loop_ = std::make_unique<HapticLoop>(params, std::vector<ToolModel>{ToolModel(*find_tool("drill-3.2"), bone_.pitch_mm())});
-  loop_->take_up(0, {{0, 0, -1}, Eigen::Quaterniond::Identity()}, WorkspaceMapping{});
-  for (int i = 0; i < 300; ++i) tick();
-  move_to({0, 0, 0.3});
-  const double full_n = tick().force_device_n.norm();
+  const double full_n = press_with_ramp();
   ASSERT_GT(full_n, 8.0);
   input_.room = RoomLink::over;
   for (int i = 1; i <= 200; ++i) {
