@@ -50,15 +50,6 @@ double BreakthroughGrab::pull_n(const GrabParams& params) const noexcept { retur
 
 double BreakthroughGrab::torque_factor(const GrabParams& params) const noexcept { return 1.0 + params.torque_gain * rim(); }
 
-double kerf_play_rad(double set_mm, double depth_mm) noexcept {
-  return depth_mm > 0.0 ? std::atan(set_mm / depth_mm) : 0.5 * std::numbers::pi;
-}
-
-double kerf_pressure_n(const BindingParams& params, double twist_rad, double set_mm, double depth_mm) noexcept {
-  const double beyond_rad = std::abs(twist_rad) - kerf_play_rad(set_mm, depth_mm);
-  return beyond_rad > 0.0 ? params.side_n_per_mm * depth_mm * beyond_rad : 0.0;
-}
-
 void SawBinding::step(const BindingParams& params, double pressure_n) noexcept {
   pressure_n_ = std::max(0.0, pressure_n);
   jammed_ = jammed_ ? pressure_n_ > params.release * params.jam_n : pressure_n_ >= params.jam_n;

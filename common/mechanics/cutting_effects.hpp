@@ -82,20 +82,17 @@ class BreakthroughGrab {
   double engaged_ = 0, whole_n_ = 0;
 };
 
-// A blade that is turned in its kerf beyond the set of its teeth presses on the walls: friction drags, and from jam_n on
-// it stands until the pressure is down to `release` of that. A kerf that closes does the same.
+// A blade that is pressed aside in its kerf presses on the wall: friction drags, and from jam_n on it stands until the pressure
+// is down to `release` of that. One that is turned beyond its play is no matter of this: the kerf's walls are in its way. No
+// kerf closes by itself here.
 struct BindingParams {
   double friction = 0.3;           // [A]
-  double side_n_per_mm = 40.0;     // plate against the kerf [A]
   double jam_n = 30.0;             // [A]
   double release = 0.5;            // [A]
 };
-// Play of a blade `depth_mm` deep: the angle at which its plate touches both walls.
-[[nodiscard]] double kerf_play_rad(double set_mm, double depth_mm) noexcept;
-// Pressure on the walls, both sides together, at a twist in the kerf.
-[[nodiscard]] double kerf_pressure_n(const BindingParams& params, double twist_rad, double set_mm, double depth_mm) noexcept;
 class SawBinding {
  public:
+  // `pressure_n`: of the plate on the walls.
   void step(const BindingParams& params, double pressure_n) noexcept;
   [[nodiscard]] bool jammed() const noexcept { return jammed_; }
   [[nodiscard]] double drag_n(const BindingParams& params) const noexcept { return params.friction * pressure_n_; }

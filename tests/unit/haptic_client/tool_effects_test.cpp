@@ -61,6 +61,17 @@ class Rig {
     }
     return reports;
   }
+  // Turns the tool about an axis of its own.
+  std::vector<LoopReport> turn(const Vec3& by_rad, double seconds) {
+    const Eigen::Quaterniond from = input_.pose_device_tool.rotation;
+    const int ticks = static_cast<int>(1000 * seconds);
+    std::vector<LoopReport> reports;
+    for (int i = 1; i <= ticks; ++i) {
+      input_.pose_device_tool.rotation = from * Eigen::Quaterniond(Eigen::AngleAxisd(by_rad.norm() * i / ticks, by_rad.normalized()));
+      reports.push_back(tick());
+    }
+    return reports;
+  }
   void spindle(double rpm) { input_.spindle_rpm = rpm; }
 
  private:
@@ -306,6 +317,33 @@ TEST(ToolEffects, ASawThatIsPressedAsideBinds) {
   EXPECT_LT(feed(rig.move({0, 0, 0.5}, 0.5)), 0.1);
   rig.move({0, -0.9, 0}, 0.2);
   EXPECT_GT(feed(rig.move({0, 0, 0.5}, 0.5)), 0.3);
+}
+
+// One that is turned by a degree about its width or its length, more than its play, is wedged between the walls: pushed on with
+// 25 N it stands, and the hand feels the turn's own spring, K times its arm squared. Straight again it goes on.
+TEST(ToolEffects, ASawThatIsTurnedInItsKerfStands) {
+  const Tool saw = *find_tool("saw-oscillating-2");
+  constexpr double kTurn_rad = 0.02;
+  const auto feed = [](const std::vector<LoopReport>& reports) {
+    double way = 0.0;
+    for (const LoopReport& r : reports) way += r.moved_mm.z();
+    return way;
+  };
+  for (const Vec3& axis : {Vec3(Vec3::UnitX()), Vec3(Vec3::UnitZ())}) {
+    Rig rig(slab(12.0, 0.6, 0.5, 30.0), saw);
+    rig.move({0, 0, 6.0}, 3.0);
+    const double torque_nmm = -rig.turn(kTurn_rad * axis, 0.2).back().torque_physical_nmm.dot(axis);
+    const double turned = feed(rig.move({0, 0, 0.5}, 0.5));
+    rig.turn(-kTurn_rad * axis, 0.2);
+    const double straight = feed(rig.move({0, 0, 0.5}, 0.5));
+    const double spring_nmm = LoopParams{}.stiffness_n_per_mm * Proxy::kTurnArm_mm * Proxy::kTurnArm_mm * kTurn_rad;
+    std::printf("  turned about %s: %.0f of %.0f N mm, %.2f mm on, and %.2f mm when it is straight again\n",
+                axis.x() > 0 ? "x" : "z", torque_nmm, spring_nmm, turned, straight);
+    EXPECT_LE(torque_nmm, 1.01 * spring_nmm);
+    EXPECT_GT(torque_nmm, 0.75 * spring_nmm);  // the rest is play
+    EXPECT_LT(turned, 0.1);
+    EXPECT_GT(straight, 0.3);
+  }
 }
 
 // Runs of ticks in which the tool goes on: where each began, how far it went, how long it took.

@@ -139,15 +139,6 @@ TEST(BreakthroughGrab, IsOverWhenTheDrillIsDrawnBackAndBoundedByTheThrust) {
   EXPECT_EQ(idle.pull_n({}), 0.0);
 }
 
-// A plate 20 mm deep in a kerf wider by 0.08 mm: free to 0.08/20 rad.
-TEST(SawBinding, TwistBeyondTheSetPressesOnTheWalls) {
-  EXPECT_NEAR(kerf_play_rad(0.08, 20.0), 0.004, 1e-7);
-  EXPECT_EQ(kerf_pressure_n({}, 0.0039, 0.08, 20.0), 0.0);
-  EXPECT_NEAR(kerf_pressure_n({}, 0.014, 0.08, 20.0), 40.0 * 20.0 * 0.010, 1e-4);
-  EXPECT_EQ(kerf_pressure_n({}, 0.014, 0.08, 20.0), kerf_pressure_n({}, -0.014, 0.08, 20.0));
-  EXPECT_EQ(kerf_pressure_n({}, 0.5, 0.08, 0.0), 0.0);  // not in the bone yet
-}
-
 TEST(SawBinding, DragsJamsAndComesFreeWithHysteresis) {
   SawBinding blade;
   blade.step({}, 20.0);
