@@ -147,7 +147,8 @@ FIGURES = [
         *[figure for suffix, threads in (("", "one thread"), ("_2", "two threads")) for figure in (
             Figure(f"cut_{tool}_cold_p99{suffix}", "of_budget", f"{what}, every cut at a place of its own at least 7 mm from all "
                    f"others, so that each leaf it changes is new, {threads}, 96 MiB written before every cut to empty the "
-                   "caches; memory reserved between cuts as the server does: 99th percentile as a part of 200 us", "cutting", ("<=", 1.0)),
+                   "caches; memory reserved between cuts as the server does: 99th percentile as a part of 200 us", "cutting",
+                   ("<=", 1.0)),
             Figure(f"cut_{tool}_cold_given_p99{suffix}", "of_budget", "the same without that reserve: the system gives the "
                    "memory for new leaves page by page while it cuts", "cutting"),
             Figure(f"cut_{tool}_cold{suffix}", "us", "median of the former", "cutting"))])],
@@ -244,14 +245,14 @@ FIGURES = [
            "collision", (">=", 1.0)),
     Figure("collision_cells_memory", "ratio", "memory of the cells over that of the distance field's samples", "collision"),
     # Contact of a tool of 4096 points in the haptic loop: distances, normals, density, force and torque in one pass.
-    Figure("contact_4096", "us", "one collision and force evaluation of 4096 points with density, median with warm caches", "contact",
-           baseline="OpenVDB's GridSampler through an accessor, with central differences"),
+    Figure("contact_4096", "us", "one collision and force evaluation of 4096 points with density, median with warm caches",
+           "contact", baseline="OpenVDB's GridSampler through an accessor, with central differences"),
     Figure("contact_speedup", "ratio", "OpenVDB's GridSampler (BoxSampler, through an accessor) doing the same with central "
            "differences, over ours, in turns", "contact", (">=", 30.0)),
     Figure("contact_of_budget", "of_budget", "the same evaluation as a part of 25 us", "contact", ("<=", 1.0)),
     Figure("contact_difference", "um", "largest difference of the two in distance near the surface", "contact", ("<=", 1.0)),
-    Figure("contact_force_difference", "ratio", "largest difference of the two in force and torque, against their size", "contact",
-           ("<=", 0.01)),
+    Figure("contact_force_difference", "ratio", "largest difference of the two in force and torque, against their size",
+           "contact", ("<=", 0.01)),
     # The coupling between hand and tool on simulated devices: a million ticks on virtual time, others cutting and bone taken back
     # under the tool, 0 to 200 ms on the way to the room. Energies at the handle, accounted for from outside. The same again on
     # devices that show torque, to a hand that tilts its tool by up to 15 degrees.
@@ -303,8 +304,8 @@ FIGURES = [
     *[figure for work, what in (
         ("drill", "drilling with a 3.2 mm drill"), ("burr", "burring with a 5 mm burr"), ("pin", "driving a pin"),
         ("saw", "sawing with a wide blade"), ("saw_narrow", "sawing with a narrow blade")) for figure in (
-        Figure(f"tick_{work}", "of_budget", f"a whole tick of the haptic loop while {what}: median as a part of 60 us", "haptic_tick",
-               ("<=", 1.0)),
+        Figure(f"tick_{work}", "of_budget", f"a whole tick of the haptic loop while {what}: median as a part of 60 us",
+               "haptic_tick", ("<=", 1.0)),
         Figure(f"tick_{work}_p50", "us", "the same, median", "haptic_tick"),
         Figure(f"tick_{work}_p99", "us", "the same, 99th percentile", "haptic_tick"))],
     # A hand that rocks, twists and pulls a turning tool from side to side in its own cut.

@@ -356,11 +356,12 @@ void StabilityResult::add(const StabilityResult& other) {
   least_cutting_n_mm = std::min(least_cutting_n_mm, other.least_cutting_n_mm);
   pushed_back += other.pushed_back;
   for (double StabilityResult::*most :
-       {&StabilityResult::pushed_back_most_mj, &StabilityResult::step_over_n, &StabilityResult::still_step_n, &StabilityResult::fall_n, &StabilityResult::motor_over_n,
-        &StabilityResult::motor_late_n, &StabilityResult::motor_most_n, &StabilityResult::force_most_n,
-        &StabilityResult::deepest_mm, &StabilityResult::turn_step_over_n, &StabilityResult::cut_step_over_n,
-        &StabilityResult::cut_over_nmm, &StabilityResult::cut_late_nmm, &StabilityResult::cut_most_nmm,
-        &StabilityResult::torque_most_nmm, &StabilityResult::torque_over_nmm})
+       {&StabilityResult::pushed_back_most_mj, &StabilityResult::step_over_n, &StabilityResult::still_step_n,
+        &StabilityResult::fall_n, &StabilityResult::motor_over_n, &StabilityResult::motor_late_n,
+        &StabilityResult::motor_most_n, &StabilityResult::force_most_n, &StabilityResult::deepest_mm,
+        &StabilityResult::turn_step_over_n, &StabilityResult::cut_step_over_n, &StabilityResult::cut_over_nmm,
+        &StabilityResult::cut_late_nmm, &StabilityResult::cut_most_nmm, &StabilityResult::torque_most_nmm,
+        &StabilityResult::torque_over_nmm})
     this->*most = std::max(this->*most, other.*most);
 }
 

@@ -336,7 +336,8 @@ class HandOnBlock {
     CutPiece piece;
     while (loop_.take_piece(piece)) replica_.add_own(cut_of(piece, loop_.tool(0), AuthorId{1}, 0));
     if (++ticks_ % 12 == 0) {
-      for (const ChangedLeaves& change : replica_.take_changes()) builder_.changed(bone_.pitch_mm(), change.level, change.origins);
+      for (const ChangedLeaves& change : replica_.take_changes())
+        builder_.changed(bone_.pitch_mm(), change.level, change.origins);
       builder_.build(replica_.bodies(), loop_.tool(0), report_.pose_bone_proxy, patch_);
       patch_.own_cuts = replica_.last_own();
     }

@@ -177,8 +177,9 @@ TEST(TorqueOnTheHand, ATurnAgainstAWallIsFeltAsForceAndTorque) {
     }
     // As push_n(), of what the handle did alone, whatever the loop let go.
     const double arm = kReach_mm / Proxy::kTurnArm_mm, expected_n = side.coupling_n_per_mm() * to_mm / (1.0 + arm * arm);
-    std::printf("  simulated: turned on by 40 mrad, %.2f N (closed form %.2f, before %.2f), %.1f N mm on the device (%.1f, %.1f)\n",
-                force_n, expected_n, before_n, torque_nmm, kShown * kReach_mm * expected_n, before_nmm);
+    std::printf(
+        "  simulated: turned on by 40 mrad, %.2f N (closed form %.2f, before %.2f), %.1f N mm on the device (%.1f, %.1f)\n",
+        force_n, expected_n, before_n, torque_nmm, kShown * kReach_mm * expected_n, before_nmm);
     EXPECT_NEAR(force_n, expected_n, expected_n * (0.02 + 0.07 / to_mm));
     EXPECT_NEAR(torque_nmm, kShown * kReach_mm * expected_n, kShown * kReach_mm * expected_n * (0.02 + 0.07 / to_mm));
     EXPECT_NEAR((report.torque_physical_nmm - side.arm_times_force()).norm(), 0.0, kRing_mm * force_n);
