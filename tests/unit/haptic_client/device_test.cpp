@@ -288,7 +288,7 @@ TEST(DeviceList, ShowsEveryKindAndWhatIsWrongWithTheFilesOfTheUser) {
   for (const DeviceLine& line : look_for_devices(wrong)) {
     const bool has_file = line.name == "phantom" || line.name == "force-dimension" || line.name == "falcon";
     EXPECT_EQ(line.finding.wrong_file, has_file) << line.name;
-    if (has_file) EXPECT_NE(line.finding.missing.find("/nowhere/"), std::string::npos) << line.name;
+    if (has_file) { EXPECT_NE(line.finding.missing.find("/nowhere/"), std::string::npos) << line.name; }
   }
 }
 
