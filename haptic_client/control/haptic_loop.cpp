@@ -229,9 +229,12 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
       share(wanted.force_n, s * (coupling.spring_n + coupling.damping_n).norm()) * s * coupling.damping_n,
       share(wanted.torque_nmm, turn_nmm.norm()) * moment.energy_scale * coupling.turn_damping_nmm};
   shown_ = ledger_.limited(wanted, damping, moment.touching);
-  constexpr double kClearly = 0.9;  // the filter's lag is less
-  fell_short_ = moment.touching && shown_.force_n.norm() < kClearly * s * coupling.spring_n.norm();
   report.energy = ledger_.report();
+  // From a missed tick, the ramp or the monitor on until what is shown has come up again: not where the spring grows faster
+  // than force may, as on a point that skates; a hand that presses there would sink.
+  constexpr double kClearly = 0.9;  // the filter's lag is less
+  fell_short_ = moment.touching && (fell_short_ || !safe || ramp_ < 1.0 || report.energy.held_back) &&
+                shown_.force_n.norm() < kClearly * s * coupling.spring_n.norm();
   if (report.energy.held_back) report.events |= kEnergyLimited;
   report.coupling_device_n = mapping_.to_device(shown_.force_n);
   report.coupling_device_nmm = mapping_.to_device(shown_.torque_nmm);

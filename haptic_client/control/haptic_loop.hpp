@@ -158,7 +158,7 @@ class HapticLoop {
   double turn_arm_mm_ = 0;                // of a turn that does work at the handle; zero where no torque is shown
   Pose device_;                           // device in the last tick, bone frame
   bool device_was_ok_ = true;
-  bool fell_short_ = false;               // less was shown in the last tick than the coupling's spring
+  bool fell_short_ = false;               // less was shown in the last tick than the coupling's spring, and not for its growth
   double ramp_ = 0;                       // 0 … 1
 };
 

@@ -26,6 +26,7 @@ constexpr double kFlatField = 0.3;     // a gradient shorter than this says noth
 constexpr double kBite = 0.3, kSteepest = 3.0, kWholePoint = 0.9;
 constexpr double kSkiveSpeed_mm_per_s = 30.0;
 constexpr double kMostSkive_mm = 3.0;
+constexpr double kHand_n_per_mm = 20.0;  // by which a hand, and the other beside it, hold the point against that [A]
 // Play of a tool in its own hole, in insets: points that stand round it some millimetres apart let it go a little farther
 // between them.
 constexpr double kPlay = 1.5;
@@ -85,7 +86,7 @@ Proxy::Proxy() : conditions_(std::make_unique<Conditions>()) {
 void Proxy::place(const Pose& pose_bone_tool) noexcept {
   pose_ = cut_pose_ = pose_bone_tool;
   sweep_count_ = 0;
-  sweeping_ = cut_before_ = returned_ = locked_ = false;
+  sweeping_ = cut_before_ = returned_ = locked_ = skates_ = bitten_ = false;
   skive_mm_.setZero();
   skive_to_mm_.setZero();
 }
@@ -486,9 +487,9 @@ void Proxy::note_forces(const Tick& tick, const Engagement& now, const Vec3& dir
   if (along > 0.0) cut_moment_nmm_ += thrust_n / along * pose_.direction(now.sums.torque);
 }
 
-void Proxy::note_slope(const Tick& tick, const Vec3& direction, double extension_mm) noexcept {
+void Proxy::note_slope(const Tick& tick, const Vec3& direction, double thrust_n) noexcept {
   // What bone is met pushes out along its own normal: where that is not against the feed, the point is pushed down the
-  // slope, as far as the coupling lets it.
+  // slope, as far as a hand lets it.
   const ContactSet& set = tick.model.contact;
   const ContactValues& values = ahead_.values;
   Vec3 out = Vec3::Zero();
@@ -504,7 +505,7 @@ void Proxy::note_slope(const Tick& tick, const Vec3& direction, double extension
   const Vec3 aside = out + against * direction;
   const double slope = against > 0.0 ? aside.norm() / against : 0.0;
   if (slope > kBite)
-    skive_to_mm_ = aside / aside.norm() * std::min(kMostSkive_mm, (std::min(slope, kSteepest) - kBite) * extension_mm);
+    skive_to_mm_ = std::min(kMostSkive_mm, (std::min(slope, kSteepest) - kBite) * thrust_n / kHand_n_per_mm) * aside.normalized();
 }
 
 bool Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm, ProxyStep& report) noexcept {
@@ -525,8 +526,10 @@ bool Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm,
     double step_mm = 0.0;
     FeedSolution feed;
     if (!engaged) {
-      if (report.cutting || cut_before_) {
+      // A point that skates leaves the slope and meets it again: it has not come through anything.
+      if ((report.cutting || cut_before_) && !skates_) {
         report.breakthrough = true;
+        bitten_ = false;
         break;
       }
       step_mm = std::min(free_mm, std::max(least_mm, 0.8 * now.sums.nearest_mm));
@@ -536,7 +539,8 @@ bool Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm,
       report.engaged = now.inputs.engaged;
       report.engaged_area_mm2 = now.inputs.engaged_area_mm2;
       report.density_g_cm3 = now.inputs.density_g_cm3;
-      if (skives(model.tool.kind) && now.inputs.engaged < kWholePoint) note_slope(tick, direction, extension_mm);
+      if (now.inputs.engaged >= kWholePoint) bitten_ = true;
+      else if (skives(model.tool.kind)) note_slope(tick, direction, tick.stiffness_n_per_mm * extension_mm);
       if (!tick.may_cut) break;
       FeedLaw law = model.law->feed_law(model.law_tool, now.inputs);
       if (tick.around.effects) law = tick.around.effects->felt(law);
@@ -593,6 +597,7 @@ void Proxy::cut_towards(Tick& tick, const Pose& wanted, ProxyStep& report) noexc
     const double most_mm = kSkiveSpeed_mm_per_s * tick.dt_s;
     const Vec3 change = skive_to_mm_ - skive_mm_;
     skive_mm_ += change.norm() > most_mm ? Vec3(change * (most_mm / change.norm())) : change;
+    skates_ = !bitten_ && !skive_to_mm_.isZero();
     skive_to_mm_.setZero();
     if (tick.around.guide == 0) beside.position_mm += skive_mm_;
     travel(tick, beside, &before, true, report);
@@ -737,6 +742,7 @@ ProxyStep Proxy::step(const ToolModel& model, const Patch& patch, const Pose& po
   report.contact_torque_nmm = cut_moment_nmm_;
   if (report.contact) report.contact_torque_nmm -= stiffness_n_per_mm * kTurnArm_mm * kTurnArm_mm * report.turn_rad;
   if (tick.may_cut) report.near_bone = near_bone(tick);
+  if (!report.near_bone) bitten_ = false;
   return report;
 }
 

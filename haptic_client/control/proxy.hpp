@@ -132,7 +132,7 @@ class Proxy {
   // Goes as far towards a pose as nothing blocks, cutting nothing.
   void travel(const Tick& tick, const Pose& wanted, const Vec3* across, bool move_too, ProxyStep& report) noexcept;
   [[nodiscard]] Engagement engagement(const Tick& tick, const Vec3& direction) noexcept;
-  void note_slope(const Tick& tick, const Vec3& direction, double extension_mm) noexcept;
+  void note_slope(const Tick& tick, const Vec3& direction, double thrust_n) noexcept;
   // Goes along a direction, cutting what is in the way as far as the force allows. True: here_ is another sight now.
   bool advance(const Tick& tick, const Vec3& direction, double distance_mm, ProxyStep& report) noexcept;
   void cut_towards(Tick& tick, const Pose& wanted, ProxyStep& report) noexcept;
@@ -158,6 +158,8 @@ class Proxy {
   int tries_ = 0;  // in this tick
   Vec3 skive_mm_ = Vec3::Zero();  // how far the point is pushed aside by the slope that it stands on
   Vec3 skive_to_mm_ = Vec3::Zero();
+  bool skates_ = false;  // the last tick met a slope
+  bool bitten_ = false;  // all of the point has been in bone since it came near it
   Vec3 cut_moment_nmm_ = Vec3::Zero();
   Sight here_, there_, ahead_;
   std::unique_ptr<Conditions> conditions_;

@@ -424,13 +424,17 @@ TEST(Skiving, ThePointSlidesDownASlopeUntilItBites) {
     Bench bench(osteon::test::make_bone(
                     {Vec3(-10, -10, -14), Vec3(12, 10, 16)}, 0.5, [=](const Vec3& p) { return p.dot(out); }, dense),
                 {step});
-    double drifted = 0.0, at_end = 0.0;
+    double drifted = 0.0, at_end = 0.0, sunk_mm = 0.0;
     bench.run([&](const SessionTick& tick) {
+      const LoopReport& r = tick.report;
+      if (r.phase != CuttingPhase::free && r.phase != CuttingPhase::idle)
+        sunk_mm = std::max(sunk_mm, r.pose_bone_device.position_mm.z() - r.pose_bone_proxy.position_mm.z());
       if (tick.report.phase != CuttingPhase::cutting) return;
       drifted = std::max(drifted, tick.report.pose_bone_proxy.position_mm.x());
       at_end = tick.report.pose_bone_proxy.position_mm.x();
     });
     EXPECT_TRUE(bench.session().surgeon().results()[0].completed) << slope;
+    EXPECT_LT(sunk_mm, 1.5) << slope;  // the hand's 29 N on K_c of 50 N/mm are 0.58
     std::printf("  slope %.0f degrees: the tip drifts %.3f mm downhill at most, %.3f mm at the end\n", slope, drifted, at_end);
     drift[i++] = drifted;
   }
