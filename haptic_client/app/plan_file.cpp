@@ -54,7 +54,11 @@ std::string text(const json& object, const char* field, const char* otherwise) {
 
 void only(const json& object, const std::set<std::string>& known) {
   for (const auto& [key, value] : object.items())
-    if (!known.contains(key)) throw Wrong("\"" + key + "\" is not known here; remove it or correct its spelling");
+    if (!known.contains(key)) {
+      std::string names;
+      for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
+      throw Wrong("\"" + key + "\" is not known here; choose from " + names);
+    }
 }
 
 PlanEntry read_entry(const json& step) {
