@@ -1,6 +1,7 @@
 #include "haptic_client/app/record.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 
 #include "common/runtime/files.hpp"
@@ -20,8 +21,11 @@ const char* name(CuttingPhase phase) {
 std::string law_name(const ToolModel& model) { return std::string(model.law->name); }
 
 std::vector<std::string> event_names() {
-  return {"uncovered", "force limited", "slew limited", "cuts waiting", "missed ticks", "heel contact", "guided",
-          "stalled", "breakthrough", "pushed away", "energy limited", "ramping"};
+  constexpr std::array kNames{"uncovered", "force limited", "slew limited", "cuts waiting", "missed ticks",
+                              "heel contact", "guided", "stalled", "breakthrough", "pushed away",
+                              "energy limited", "ramping", "room held"};
+  static_assert(kNames.size() == kLoopEvents);
+  return {kNames.begin(), kNames.end()};
 }
 
 std::vector<std::string> range_names() {

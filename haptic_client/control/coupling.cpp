@@ -95,7 +95,7 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
     let_go(slack_mm_, e_mm, Vec3::Zero());
     force.breakthrough = true;
   }
-  // Where less was shown than the spring says (missed ticks, the ramp, no link, the monitor) the hand goes on without paying.
+  // Where less was shown than the spring says (missed ticks, the ramp, the monitor) the hand goes on without paying.
   // That stretch would push it with less than it says, and cut by less, for good: it is let go.
   const double size_mm = e_mm.norm(), paid_mm = ledger.paid_mm(k * moment.energy_scale, cutting_mj);
   if (moment.fell_short && size_mm > paid_mm) let_go(slack_mm_, e_mm, e_mm * (paid_mm / size_mm));

@@ -20,7 +20,7 @@ struct CouplingMoment {
   double limit_n = 0;                         // physical: the device's over s
   double energy_scale = 1;                    // mJ at the handle for each physical mJ: s over the workspace's scale
   bool touching = false;
-  bool fell_short = false;                    // in the last tick the device was shown clearly less than the spring
+  bool fell_short = false;                    // less was shown in the last tick than the spring, and not for its growth
   // Of a device that shows torque; bone frame, axis times angle, from the proxy's orientation to the handle's.
   double stiffness_nmm_per_rad = 0;           // of the turn, physical; 0: no torque is shown
   double limit_nmm = 0;                       // physical: the device's over energy_scale

@@ -2,6 +2,8 @@
 // caller gives time by calling.
 #pragma once
 #include <array>
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -73,6 +75,7 @@ enum LoopEvent : std::uint32_t {
   kRamping = 2048,       // after connecting, or as the room is over
   kRoomHeld = 4096,      // the room takes no cuts: the spindle stands
 };
+inline constexpr std::size_t kLoopEvents = std::bit_width(std::uint32_t{kRoomHeld});
 
 struct LoopReport {
   Vec3 force_device_n = Vec3::Zero();    // to write to the device, device frame

@@ -28,7 +28,7 @@ class RoomWatch {
   static constexpr std::size_t kMostUnconfirmed = 512;
   static constexpr std::size_t kFewUnconfirmed = 256;  // cutting goes on from here
   static constexpr double kSilence_s = 2.0;
-  static constexpr double kLost_s = 20.0;
+  static constexpr double kLost_s = 20.0;  // its connection waits longer: common/wire/room_client.cpp
 
   // `heard`: something has come from the room since the last call. `now_s`: of a clock that never goes back.
   RoomHealth update(double now_s, bool heard, std::size_t unconfirmed) noexcept {

@@ -44,8 +44,9 @@ class SimulatedSession final : public Session {
   [[nodiscard]] bool done() const noexcept override;
   // Before the first tick: the handle moves as this device says, and the simulated hand lets go. The plan still says
   // which tools are taken up when. The same cuts and forces come again, bit for bit, with a recording of the same plan at
-  // the same force scale on bone that is as it was then, if patches, confirmed cuts and late ticks come in the ticks in
-  // which they came then; where threads bring them, as in a running client, cuts come again to their size, not to the bit.
+  // the same force scale on bone that is as it was then, if patches, confirmed cuts, late ticks and silences of the room come
+  // in the ticks in which they came then; where threads bring them, as in a running client, cuts come again to their size, not
+  // to the bit.
   void play(HapticDevice& device) noexcept { played_ = &device; }
 
   [[nodiscard]] HapticLoop& loop() noexcept override { return loop_; }

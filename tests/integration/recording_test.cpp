@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "tests/integration/stage.hpp"
+#include "tests/support/wait.hpp"
 
 namespace osteon::test {
 namespace {
@@ -90,9 +91,7 @@ TEST_F(RecordedRoom, HoldsEveryTickAndIsPlayedAgainInAnotherRoom) {
 TEST_F(RecordedRoom, OfAKilledClientCanBeReadAndPlayedToWhereItEnds) {
   Stage stage(24.0);
   Process haptic = stage.start("osteon-haptic", arguments(stage, "killed", 0.0));
-  const auto deadline = std::chrono::steady_clock::now() + 60s;
-  while (std::chrono::steady_clock::now() < deadline && !std::filesystem::exists(stage / "killed.h5"))
-    std::this_thread::sleep_for(20ms);
+  ASSERT_TRUE(wait_for_file(stage / "killed.h5", 60s));
   std::this_thread::sleep_for(5s);
   ASSERT_TRUE(haptic.running());
   haptic.signal(SIGKILL);
@@ -121,9 +120,7 @@ TEST_F(RecordedRoom, OfAKilledClientCanBeReadAndPlayedToWhereItEnds) {
 TEST_F(RecordedRoom, OfALostRoomSaysThatItDidNotEndAsItShould) {
   Stage stage(24.0);
   Process haptic = stage.start("osteon-haptic", arguments(stage, "lost", 0.0));
-  const auto deadline = std::chrono::steady_clock::now() + 60s;
-  while (std::chrono::steady_clock::now() < deadline && !std::filesystem::exists(stage / "lost.h5"))
-    std::this_thread::sleep_for(20ms);
+  ASSERT_TRUE(wait_for_file(stage / "lost.h5", 60s));
   std::this_thread::sleep_for(4s);
   ASSERT_TRUE(haptic.running());
   stage.server().signal(SIGKILL);

@@ -239,6 +239,23 @@ TEST(Trouble, AStepThatDoesNotFinishIsSaid) {
   EXPECT_NE(haptic.out().find("0 of 1 steps done"), std::string::npos) << haptic.out();
 }
 
+TEST(Trouble, AHandWithoutRealTimePriorityIsToldSo) {
+  Stage stage(16.0);
+  nlohmann::json step = drill_at(0, 0, "rig");
+  step["to_mm"] = 1.0;
+  std::ofstream(stage / "plan.json") << nlohmann::json{{"steps", nlohmann::json::array({step})}}.dump();
+  // Root may always, unless that is taken from it.
+  std::vector<std::string> line{"--rtprio=0"};
+  if (::geteuid() == 0) line.insert(line.end(), {"setpriv", "--bounding-set", "-sys_nice"});
+  line.insert(line.end(), {program("osteon-haptic"), "--server", stage.address(), "--plan", stage / "plan.json", "--cache",
+                           stage / "cache", "--summary", stage / "summary.json"});
+  Process haptic("/usr/bin/prlimit", line);
+  ASSERT_EQ(haptic.wait(60s), 0) << haptic.err();
+  EXPECT_EQ(read_json(stage / "summary.json")["loop"]["realtime"], false);
+  EXPECT_NE(haptic.err().find("no real-time priority"), std::string::npos) << haptic.err();
+  EXPECT_NE(haptic.err().find("osteon-haptic check"), std::string::npos) << haptic.err();
+}
+
 // What it has just measured goes into what it says: here it was stopped in the middle of it.
 TEST(Trouble, ACheckThatMissedTicksDoesNotSayThatNothingIsLacking) {
   Process check(program("osteon-haptic"), {"check", "--seconds", "2"});

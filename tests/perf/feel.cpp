@@ -24,15 +24,9 @@ constexpr double kFrom_mm[] = {1.5, 7.0, 27.0}, kTo_mm[] = {3.9, 23.9, 28.9};
 double rounded(double value) { return std::round(1e4 * value) / 1e4; }
 
 PlanStep drill_step(HandKind hand) {
-  PlanStep step;
-  step.action = Action::drill;
-  step.tool = "drill-3.2";
-  step.spindle_rpm = 1000;
-  step.hand = hand;
+  PlanStep step = straight_down("drill-3.2", hand);
   step.feed_mm_per_s = 1.0;
   step.beyond_mm = 3.0;
-  step.entry.point_mm = Vec3(0.1, -0.2, 0);
-  step.entry.axis = Vec3(0, 0, 1);
   return step;
 }
 

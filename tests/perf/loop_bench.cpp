@@ -22,15 +22,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-PlanStep drilling() {
-  PlanStep step;
-  step.action = Action::drill;
-  step.tool = "drill-3.2";
-  step.spindle_rpm = 1000;
-  step.entry.point_mm = Vec3(0.1, -0.2, 0);
-  step.entry.axis = Vec3(0, 0, 1);
-  return step;
-}
 PlanStep burring(double window_mm) {
   PlanStep step;
   step.action = Action::burr;
@@ -38,17 +29,6 @@ PlanStep burring(double window_mm) {
   step.window_u_mm = step.window_v_mm = window_mm;
   step.depth_mm = 3;
   step.entry.point_mm = Vec3(0, 0, 0);
-  step.entry.axis = Vec3(0, 0, 1);
-  return step;
-}
-
-// What goes straight in, at the tool's own speed.
-PlanStep pushing(const char* tool) {
-  PlanStep step;
-  step.action = Action::drill;
-  step.tool = tool;
-  step.hand = HandKind::expert;
-  step.entry.point_mm = Vec3(0.1, -0.2, 0);
   step.entry.axis = Vec3(0, 0, 1);
   return step;
 }
@@ -229,15 +209,15 @@ int run(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "";
   if (what == "tick") {
     std::printf("{");
-    measure("drill", drilling(), 12.0, 2);
+    measure("drill", straight_down("drill-3.2"), 12.0, 2);
     std::printf(", ");
     measure("burr", burring(12.0), 20.0, 2);
     std::printf(", ");
-    measure("pin", pushing("pin-1"), 16.0, 1);
+    measure("pin", straight_down("pin-1"), 16.0, 1);
     std::printf(", ");
-    measure("saw", pushing("saw-oscillating-1"), 16.0, 1);
+    measure("saw", straight_down("saw-oscillating-1"), 16.0, 1);
     std::printf(", ");
-    measure("saw_narrow", pushing("saw-oscillating-3"), 16.0, 1);
+    measure("saw_narrow", straight_down("saw-oscillating-3"), 16.0, 1);
     std::printf(", ");
     measure_wedged("pin_wedged", "pin-1");
     std::printf(", ");

@@ -19,14 +19,9 @@ class AxialTool : public ::testing::TestWithParam<AxialCase> {};
 
 TEST_P(AxialTool, MakesItsOwnHoleAndComesOut) {
   const AxialCase& which = GetParam();
-  PlanStep step;
-  step.action = Action::drill;
-  step.tool = which.tool;
-  step.hand = HandKind::rig;
+  PlanStep step = straight_down(which.tool, HandKind::rig);
   step.feed_mm_per_s = 2;
   step.to_mm = which.to_mm;
-  step.entry.point_mm = Vec3(0.1, -0.2, 0);
-  step.entry.axis = Vec3(0, 0, 1);
   const Case bone = block_case(which.block_mm);
   Bench bench(bone, {step});
   double out_n = 0.0, deepest = 0.0, work_min = 0.0;
@@ -74,14 +69,9 @@ INSTANTIATE_TEST_SUITE_P(All, AxialTool,
 // says for that force, however far ahead the rig is: 0.36 mm/s at 600 rpm, less 6 % of the speed under its 142 N mm. The slack
 // rule lets the rest of the way go. At its end the rig waits, with what stretch there is left.
 TEST(AxialFeed, IsThatOfTheForceThatTheDeviceShows) {
-  PlanStep step;
-  step.action = Action::drill;
-  step.tool = "end-drill";
-  step.hand = HandKind::rig;
+  PlanStep step = straight_down("end-drill", HandKind::rig);
   step.feed_mm_per_s = 2;
   step.to_mm = 4;
-  step.entry.point_mm = Vec3(0.1, -0.2, 0);
-  step.entry.axis = Vec3(0, 0, 1);
   Bench bench(block_case(20.0), {step});
   double force_n = 0.0, from_mm = -1.0, from_s = 0.0, to_mm = 0.0, to_s = 0.0, time_s = 0.0, rpm = 0.0;
   bench.run([&](const SessionTick& tick) {

@@ -38,6 +38,16 @@ ReadyPlan ready(const std::vector<PlanStep>& plan, const Case& bone) {
 }
 }  // namespace
 
+PlanStep straight_down(const std::string& tool, HandKind hand) {
+  PlanStep step;
+  step.action = Action::drill;
+  step.tool = tool;
+  step.hand = hand;
+  step.entry.point_mm = Vec3(0.1, -0.2, 0);
+  step.entry.axis = Vec3(0, 0, 1);
+  return step;
+}
+
 Bench::Bench(const Case& bone, const std::vector<PlanStep>& plan, const SimulatedDeviceParams& device, double force_scale,
              const BenchDelays& delays, double dt_s)
     : Bench(bone, ready(plan, bone), device, force_scale, delays, dt_s) {}

@@ -2,6 +2,7 @@
 #pragma once
 #include <deque>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "common/volume/case.hpp"
@@ -13,6 +14,9 @@ namespace osteon::haptic::test {
 
 // A block across z = 0 … 30 mm: layers 5/20/5 mm at 1.9/0.3/1.9 g/cm³. It is entered along +z. `pitch_mm`: h, a part of 5 mm.
 [[nodiscard]] Case block_case(double width_mm = 12.0, double pitch_mm = 0.5);
+
+// A step straight down into it, at a place that falls on no sample.
+[[nodiscard]] PlanStep straight_down(const std::string& tool, HandKind hand = HandKind::expert);
 
 struct BenchDelays {
   int patch_ticks = 12;   // between two patches

@@ -13,13 +13,7 @@ namespace osteon::haptic::test {
 namespace {
 
 PlanStep drill_step(HandKind hand) {
-  PlanStep step;
-  step.action = Action::drill;
-  step.tool = "drill-3.2";
-  step.spindle_rpm = 1000;
-  step.hand = hand;
-  step.entry.point_mm = Vec3(0.1, -0.2, 0);
-  step.entry.axis = Vec3(0, 0, 1);
+  PlanStep step = straight_down("drill-3.2", hand);
   return step;
 }
 

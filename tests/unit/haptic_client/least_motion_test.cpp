@@ -147,5 +147,41 @@ TEST(CutShape, AGroupOfPointsIsItsPoints) {
   EXPECT_GE(tried, 40);
 }
 
+// A sweep that begins where the one before is seen to end leaves out that place, and both together leave what they left.
+TEST(SweepView, LeavesOutOnlyWhatTheOneBeforeShows) {
+  std::mt19937 random(12);
+  std::uniform_real_distribution<double> even(-1.0, 1.0);
+  const CutShape shape(*find_tool("saw-oscillating-1"), false);
+  Sweep first, second;
+  first.shape = second.shape = &shape;
+  first.from = {{0.0, 0.0, 4.0}, Eigen::Quaterniond::Identity()};
+  first.reach({{0.5, 0.0, 4.3}, Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Vec3::UnitX()))});
+  second.from = first.to;
+  second.reach({{-0.4, 0.2, 5.2}, Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Vec3::UnitY()))});
+  Sweep elsewhere = second;  // begins a little off where the first ends
+  elsewhere.from.position_mm.x() += 0.5;
+  const Pose now = second.to;
+  const SweepView before(first, nullptr, now, 0.1), alone(second, nullptr, now, 0.1), after(second, &first, now, 0.1);
+  const SweepView off(elsewhere, &first, now, 0.1), off_alone(elsewhere, nullptr, now, 0.1);
+  int lent = 0;
+  for (int round = 0; round < 200; ++round) {
+    Lanes p[3], of_before, of_alone, of_after, of_off, of_off_alone;
+    Parts by;
+    for (Lanes& axis : p)
+      for (float& x : axis) x = static_cast<float>(6.0 * even(random));
+    before.left_mm(p, of_before, by);
+    alone.left_mm(p, of_alone, by);
+    after.left_mm(p, of_after, by);
+    off.left_mm(p, of_off, by);
+    off_alone.left_mm(p, of_off_alone, by);
+    EXPECT_EQ(of_off, of_off_alone);
+    for (std::size_t i = 0; i < kGroupPoints; ++i) {
+      EXPECT_EQ(std::max(of_before[i], of_after[i]), std::max(of_before[i], of_alone[i]));
+      lent += of_after[i] < of_alone[i];
+    }
+  }
+  EXPECT_GT(lent, 50);  // else it would prove nothing
+}
+
 }  // namespace
 }  // namespace osteon::haptic::test

@@ -403,11 +403,7 @@ TEST(RangeWatch, TellsOnlyOfWhatLasts) {
 
 // A surgeon's drill that enters cortical bone is worth no word; a rig that feeds it more slowly than the law was made for is.
 TEST(RangeWatch, SaysNothingOfAnEnteringDrill) {
-  PlanStep hole;
-  hole.action = Action::drill;
-  hole.tool = "drill-3.2";
-  hole.entry.point_mm = Vec3(0.1, -0.2, 0);
-  hole.entry.axis = Vec3(0, 0, 1);
+  PlanStep hole = straight_down("drill-3.2");
   hole.to_mm = 4.0;
   PlanStep slow = hole;
   slow.hand = HandKind::rig;

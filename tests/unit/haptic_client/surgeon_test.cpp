@@ -11,14 +11,9 @@ namespace osteon::haptic::test {
 namespace {
 
 PlanStep drill_down() {
-  PlanStep step;
-  step.action = Action::drill;
-  step.tool = "drill-3.2";
-  step.hand = HandKind::rig;
+  PlanStep step = straight_down("drill-3.2", HandKind::rig);
   step.feed_mm_per_s = 4.0;
   step.to_mm = 3.0;
-  step.entry.point_mm = Vec3(0.1, -0.2, 0);
-  step.entry.axis = Vec3(0, 0, 1);
   return step;
 }
 

@@ -8,23 +8,12 @@
 namespace osteon::haptic::test {
 namespace {
 
-PlanStep expert_drilling() {
-  PlanStep step;
-  step.action = Action::drill;
-  step.tool = "drill-3.2";
-  step.spindle_rpm = 1000;
-  step.hand = HandKind::expert;
-  step.entry.point_mm = Vec3(0.1, -0.2, 0);
-  step.entry.axis = Vec3(0, 0, 1);
-  return step;
-}
-
 struct Felt {
   double cortex_n, medulla_n, cortex_feed, medulla_feed;
 };
 Felt drill(double dt_s, double pitch_mm) {
   const auto ticks = [&](double s) { return static_cast<int>(std::lround(s / dt_s)); };
-  Bench bench(block_case(12.0, pitch_mm), {expert_drilling()}, {}, 0.0, {ticks(0.012), ticks(0.025)}, dt_s);
+  Bench bench(block_case(12.0, pitch_mm), {straight_down("drill-3.2")}, {}, 0.0, {ticks(0.012), ticks(0.025)}, dt_s);
   bench.run();
   EXPECT_TRUE(bench.session().done());
   const StepResult& result = bench.session().surgeon().results()[0];
@@ -49,7 +38,7 @@ TEST(Ticks, NeitherTheirRateNorThePitchIsFelt) {
 // A loop that comes late shows no force for some milliseconds, and the hand goes on. When it is over the coupling is what the
 // hand pays for again: drilling goes on as fast as before, and the force is the hand's.
 TEST(Ticks, AStallIsOverWhenItIsOver) {
-  Bench bench(block_case(), {expert_drilling()});
+  Bench bench(block_case(), {straight_down("drill-3.2")});
   int ticks = 0, stalls = 0;
   while (!bench.session().done() && ticks < 60'000) {
     const bool stalled = ticks > 2000 && ticks % 500 < 8;
@@ -76,7 +65,7 @@ TEST(Ticks, AStallIsOverWhenItIsOver) {
 // back it turns again. A sharp, clean drill's own motor never stalls under a hand; a bur's does, see the tools' effects.
 TEST(Ticks, ASpindleStallsInBoneAndTurnsAgain) {
   const Case bone = block_case();
-  ReadyPlan plan = *make_ready({expert_drilling()}, bone);
+  ReadyPlan plan = *make_ready({straight_down("drill-3.2")}, bone);
   plan.tools[0].spindle.most_nmm = 5.0;
   Bench bench(bone, std::move(plan));
   int stood = 0;
