@@ -149,6 +149,22 @@ TEST(SwungShank, StopsAtAWall) {
 // ---- holes
 
 // A flat end meets the rim of a hole that is narrower, wherever it is led and however it wiggles.
+// Nor through a thin one that it would be beyond within a tick, while its tip stays where it is.
+TEST(SwungShank, IsNeverTakenThroughAThinWall) {
+  const Case plate = osteon::test::make_bone({Vec3(-8, -8, -30), Vec3(12, 8, 4)}, 0.25,
+                                             [](const Vec3& p) { return std::abs(p.x() - 3.0) - 0.25; }, dense);
+  Stage stage(plate, "drill-3.2");
+  for (const double speed : {20.0, 500.0, 5000.0, 100000.0}) {
+    stage.place(straight(0, 0, 0));
+    const ProxyStep step = stage.lead(tilted(Vec3(0, 0, 0), Vec3::UnitY(), -0.6), speed);
+    EXPECT_TRUE(step.contact) << speed;
+    EXPECT_GT(stage.deepest_mm(), -0.05) << speed;
+    EXPECT_LT(stage.proxy_.pose().point(Vec3(0, 0, -20)).x(), 2.75) << speed;
+    EXPECT_GT(stage.proxy_.pose().direction(Vec3::UnitZ()).x(), -0.6) << speed;
+    EXPECT_LT(stage.proxy_.pose().direction(Vec3::UnitZ()).x(), -0.03) << speed;  // as far as the wall
+  }
+}
+
 TEST(PegInHole, ANarrowerOneCannotBeEntered) {
   for (const double diameter : {9.0, 7.0}) {
     Stage stage(hole(diameter, 15.0), "end-drill");  // 9.5 mm
