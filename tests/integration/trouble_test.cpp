@@ -124,6 +124,9 @@ TEST(Trouble, AHapticClientNamesWhatIsWrongWithItsPlan) {
   expect_one_sentence(run(program("osteon-haptic"), {"--server", deserted_address(), "--plan", temp / "missing.json"}), "osteon-haptic", {"missing.json"});
   expect_one_sentence(with_plan("{"), "osteon-haptic", {"plan.json"});
   expect_one_sentence(with_plan(R"({"steps":[{"action":"saw"}]})"), "osteon-haptic", {"plan.json", "action"});
+  // What is misspelt is told with what could be meant.
+  expect_one_sentence(with_plan(R"({"steps":[{"action":"drill","tool":"drill-3.2","entry":{"at_mm":[0,0,0]}}]})"), "osteon-haptic",
+                      {"plan.json", "step 1", "at_mm", "point_mm"});
   const auto drill = [&](const std::string& more, const std::string& entry = R"({"toward":[0,0,1]})") {
     return with_plan(R"({"steps":[{"action":"drill",)" + more + R"("entry":)" + entry + "}]}");
   };
