@@ -339,7 +339,8 @@ TEST(Recording, NamesItsEvents) {
   EXPECT_EQ(named(kBreakthrough), "breakthrough");
   EXPECT_EQ(named(kPushedAway), "pushed away");
   EXPECT_EQ(named(kRamping), "ramping");
-  EXPECT_EQ(names.size(), static_cast<std::size_t>(std::bit_width(static_cast<unsigned>(kRamping))));
+  EXPECT_EQ(named(kRoomHeld), "room held");
+  EXPECT_EQ(names.size(), kLoopEvents);
 }
 
 // Ticks of a session as the watch is asked of them: those outside only.
