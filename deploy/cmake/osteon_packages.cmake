@@ -19,6 +19,7 @@ find_package(VTK 9.1 REQUIRED COMPONENTS
 
 pkg_check_modules(grpc REQUIRED IMPORTED_TARGET grpc++)
 pkg_check_modules(sodium REQUIRED IMPORTED_TARGET libsodium)
+pkg_check_modules(sqlite REQUIRED IMPORTED_TARGET sqlite3)
 pkg_check_modules(hdf5 REQUIRED IMPORTED_TARGET hdf5-serial)
 pkg_check_modules(usb REQUIRED IMPORTED_TARGET libusb-1.0)
 pkg_check_modules(hidapi REQUIRED IMPORTED_TARGET hidapi-hidraw)

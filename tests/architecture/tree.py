@@ -14,8 +14,9 @@ LAYERS = {
     "mechanics": {"core", "geometry", "tools", "field"},
     "sound": {"core"},
     "runtime": {"core"},
+    "link": {"core", "geometry"},
     "input": {"core", "geometry", "runtime"},
-    "wire": {"core", "geometry", "tools", "field", "surface", "mechanics"},
+    "wire": {"core", "geometry", "tools", "field", "surface", "mechanics", "link"},
 }
 PROGRAMS = ("server", "haptic_client", "viewer_client", "audio_client")
 # Inside a program: folders that only the program's app (and tests) put together.
@@ -27,6 +28,8 @@ HEAVY = {
     "VTK": (re.compile(r"^vtk"), ("viewer_client", "common/volume")),
     "gRPC": (re.compile(r"^grpc(pp)?/"), ("common/wire", "*/net")),
     "HDF5": (re.compile(r"^hdf5"), ("haptic_client/app", "haptic_client/device")),
+    "SQLite": (re.compile(r"^sqlite3"), ("server/journal",)),
+    "Asio": (re.compile(r"^asio"), ("common/link",)),
     "libusb": (re.compile(r"^libusb"), ("haptic_client/device",)),
     "hidapi": (re.compile(r"^hidapi/"), ("common/input",)),
     "GDCM": (re.compile(r"^gdcm"), ("common/imaging", "server/import")),
