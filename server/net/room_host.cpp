@@ -18,43 +18,36 @@
 #include "common/runtime/periodic.hpp"
 #include "common/wire/convert.hpp"
 #include "server/net/host_parts.hpp"
-#include "server/net/lookers.hpp"
+#include "server/net/mesh_room.hpp"
 #include "server/net/piece_watch.hpp"
 #include "server/net/room_rows.hpp"
+#include "server/net/state_board.hpp"
 
 namespace osteon {
 namespace {
 
 using Clock = RoomHost::Clock;
-constexpr Coord kFirstCoord{INT32_MIN, INT32_MIN, INT32_MIN};  // before every block of a level
 
 }  // namespace
 
 // Leaves copied at once. Between two batches the room goes on cutting.
 constexpr std::size_t kLeafBatch = 64;
 
-// Lock order: room_mutex, then sessions_mutex or mesh_mutex or cutting_mutex, then a stream's own, then jobs_mutex.
-// queue_mutex, mesh_wake_mutex, pieces_mutex and stats_mutex are never held with another.
+// Lock order: room_mutex, then sessions_mutex or that of the surface or the board, then a stream's own, then jobs_mutex.
+// queue_mutex, pieces_mutex and stats_mutex are never held with another.
 struct RoomHost::Impl {
   Impl(Room r, HostRates rates, Detail detail)
       : room(std::move(r)),
         rates_(rates),
-        near(detail == Detail::near || (detail == Detail::automatic && room.bone_blocks().size() > kMostFullBlocks)) {}
+        mesh(room, room_mutex, {rates.mesh, rates.looks}, detail, [this] { return board.tool_tips_mm(); }) {}
 
-  void make_whole_surface(const std::function<void(double)>& progress);
   void run_ticks();
-  void run_mesh();
   void run_jobs();
   void run_pieces();
   void decide(QueuedCut& queued);
   void decide(QueuedEvent& queued);
   void publish(const RoomEvent& event);
   void show_scene();
-  void publish_states();
-  void make_stale_blocks(bool due);
-  void follow_looks();
-  void wake_mesh();
-  void session_over(AuthorId author);
   void read_leaves(std::vector<FieldLeaf>& leaves);
 
   // All bodies at one place of the order, copied while the room went on.
@@ -71,9 +64,7 @@ struct RoomHost::Impl {
   std::shared_mutex room_mutex;
   std::optional<std::vector<Cut>> meanwhile;  // under room_mutex: cuts applied since copy_bone() began to copy
   const HostRates rates_;
-  const bool near;                       // in full only near viewers and tools
   std::atomic<std::uint64_t> room_seq{0}, authors{0};
-  std::atomic<std::size_t> stale{0};
   std::atomic<bool> stopping{false};
 
   std::mutex queue_mutex;
@@ -84,25 +75,8 @@ struct RoomHost::Impl {
   Audience<SessionSink> sessions;
   std::set<AuthorId> open_authors;
 
-  mutable std::mutex cutting_mutex;
-  Audience<CuttingSink> cutting_streams;
-  std::map<AuthorId, ShownState> states;
-  Bytes shown;               // the newest message, for those who come later
-  bool states_changed = false;
-  std::vector<v1::SceneItem> items;
-  std::vector<BodyId> bodies;
-
-  mutable std::mutex mesh_mutex;
-  Audience<MeshSink> mesh_streams;
-  BlockStore store;
-  MeshUpdate surface;        // every block with a surface, as it travels
-  Lookers lookers;
-  Clock::time_point next_look{};  // of the mesh thread
-
-  std::mutex mesh_wake_mutex;
-  std::condition_variable mesh_wake;
-  std::vector<Clock::time_point> unmeshed;  // arrivals of cuts whose blocks are not made yet
-  bool mesh_due = false, mesh_end = false;
+  StateBoard board;
+  MeshRoom mesh;
 
   std::mutex pieces_mutex;
   std::condition_variable pieces_wake;
@@ -118,42 +92,13 @@ struct RoomHost::Impl {
 
   mutable std::mutex stats_mutex;
   TickStats stats;
-  DurationHistogram mesh_update;
   RoomCounts counts;
 
-  std::optional<std::string> ended;  // under sessions, cutting and mesh mutex: why new streams end at once
+  std::optional<std::string> ended;       // under sessions_mutex: why new sessions end at once
   std::optional<BoneStatus> last_status;  // of the job thread
 
-  std::thread tick_thread, mesh_thread, piece_thread, job_thread;
+  std::thread tick_thread, piece_thread, job_thread;
 };
-
-void RoomHost::Impl::make_whole_surface(const std::function<void(double)>& progress) {
-  if (near) room.focus({focus_on_nothing()});
-  std::vector<BlockKey> keys = room.bone_blocks();
-  for (const BlockKey& key : room.take_stale_blocks()) keys.push_back(key);  // fine ones of fields that were loaded
-  std::ranges::sort(keys);
-  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
-  std::vector<BlockPayload> payloads(keys.size());
-  std::atomic<std::size_t> next{0};
-  const auto work = [&](bool reports) {
-    for (std::size_t i = next++; i < keys.size(); i = next++) {
-      payloads[i] = make_block(room.gather_block(keys[i]));
-      if (reports && progress) progress(static_cast<double>(i) / static_cast<double>(keys.size()));
-    }
-  };
-  {
-    std::vector<std::jthread> helpers;
-    for (unsigned i = 1; i < std::max(1u, std::thread::hardware_concurrency()); ++i) helpers.emplace_back(work, false);
-    work(true);
-  }
-  for (std::size_t i = 0; i < keys.size(); ++i)
-    if (const StoredBlock* block = store.put(keys[i], std::move(payloads[i])))
-      surface.blocks[keys[i]] = block_message(keys[i], *block);
-  surface.room_seq = room.room_seq();
-  room_seq = room.room_seq().value;
-  show_scene();
-  if (progress) progress(1.0);
-}
 
 void RoomHost::Impl::run_ticks() {
   PeriodicTimer timer(rates_.tick);
@@ -172,13 +117,9 @@ void RoomHost::Impl::run_ticks() {
     for (Queued& queued : batch) std::visit([this](auto& one) { decide(one); }, queued);
     const bool decided = !batch.empty();
     batch.clear();
-    publish_states();
+    board.publish(RoomSeq{room_seq});
     if (decided) {
-      {
-        const std::lock_guard lock(mesh_wake_mutex);
-        mesh_due = true;
-        mesh_wake.notify_one();
-      }
+      mesh.wake();
       const std::lock_guard lock(pieces_mutex);
       pieces_due = true;
       pieces_wake.notify_one();
@@ -199,7 +140,6 @@ void RoomHost::Impl::decide(QueuedCut& queued) {
     const std::unique_lock lock(room_mutex);
     Result<Outcome> decision = room.submit(queued.cut);
     room_seq = room.room_seq().value;
-    stale = room.stale_blocks();
     if (meanwhile && decision && decision->committed() && !decision->repeated) meanwhile->push_back(queued.cut);
     return decision;
   }();
@@ -232,10 +172,7 @@ void RoomHost::Impl::decide(QueuedCut& queued) {
       queued.sink->offer(outcome->room_seq, row);
   }
   queued.sink->decided();
-  if (!outcome->report.changed_leaves.empty()) {
-    const std::lock_guard lock(mesh_wake_mutex);
-    unmeshed.push_back(queued.arrived);
-  }
+  if (!outcome->report.changed_leaves.empty()) mesh.changed(queued.arrived);
 }
 
 void RoomHost::Impl::decide(QueuedEvent& queued) {
@@ -243,14 +180,11 @@ void RoomHost::Impl::decide(QueuedEvent& queued) {
     const std::unique_lock lock(room_mutex);
     Result<RoomEvent> decision = queued.change(room);
     room_seq = room.room_seq().value;
-    stale = room.stale_blocks();
     return decision;
   }();
   if (event && event->room_seq) publish(*event);
   queued.answer(event);
-  if (!event || !event->bone) return;
-  const std::lock_guard lock(mesh_wake_mutex);
-  unmeshed.push_back(queued.arrived);
+  if (event && event->bone) mesh.changed(queued.arrived);
 }
 
 void RoomHost::Impl::publish(const RoomEvent& event) {
@@ -268,149 +202,7 @@ void RoomHost::Impl::publish(const RoomEvent& event) {
 }
 
 // What viewers draw beside the surface.
-void RoomHost::Impl::show_scene() {
-  const std::lock_guard lock(cutting_mutex);
-  items.clear();
-  for (const SceneItem& item : room.items()) items.push_back(wire::to_wire(item));
-  bodies = room.bodies();
-  states_changed = true;
-}
-
-void RoomHost::Impl::publish_states() {
-  const std::lock_guard lock(cutting_mutex);
-  for (auto& [author, entry] : states) entry.ticks_over += entry.over ? 1 : 0;
-  if (std::erase_if(states, [](const auto& entry) { return entry.second.ticks_over > kShowIdleTicks; }) > 0)
-    states_changed = true;
-  if (!states_changed) return;
-  states_changed = false;
-  v1::WatchCuttingResponse response;
-  response.set_room_seq(room_seq);
-  for (const auto& [author, entry] : states) *response.add_states() = wire::to_wire(entry.state);
-  for (const v1::SceneItem& item : items) *response.add_items() = item;
-  for (const BodyId body : bodies) response.add_bodies(body.value);
-  shown = serialised(response);
-  cutting_streams.each([&](CuttingSink& sink) { sink.offer(shown); });
-}
-
-// A tool whose hand is gone stands still: readers must not go on sounding and drawing its last moment.
-void RoomHost::Impl::session_over(AuthorId author) {
-  const std::lock_guard lock(cutting_mutex);
-  const auto entry = states.find(author);
-  if (entry == states.end()) return;
-  CuttingState& state = entry->second.state;
-  ++state.state_seq;
-  state.phase = CuttingPhase::idle;
-  state.spindle_rpm = state.feed_mm_per_s = state.engaged_fraction = state.torque_Nmm = 0;
-  state.force_physical_N = Vec3::Zero();
-  entry->second.over = true;
-  states_changed = true;
-}
-
-void RoomHost::Impl::run_mesh() {
-  auto next = Clock::now();
-  bool due = false;
-  while (true) {
-    {
-      std::unique_lock lock(mesh_wake_mutex);
-      if (near)  // tools move without anything else that wakes this thread
-        mesh_wake.wait_for(lock, rates_.looks, [&] { return mesh_due || mesh_end; });
-      else
-        mesh_wake.wait(lock, [&] { return mesh_due || mesh_end; });
-      if (!mesh_due && (mesh_end || !near)) return;
-      // A first cut is shown at once, a row of cuts at the mesh rate.
-      mesh_wake.wait_until(lock, next, [&] { return mesh_end; });
-      due = std::exchange(mesh_due, false);
-    }
-    next = Clock::now() + rates_.mesh;
-    make_stale_blocks(due);
-  }
-}
-
-void RoomHost::Impl::wake_mesh() {
-  const std::lock_guard lock(mesh_wake_mutex);
-  mesh_due = true;
-  mesh_wake.notify_one();
-}
-
-// [mesh thread]
-void RoomHost::Impl::follow_looks() {
-  if (!near || Clock::now() < next_look) return;
-  next_look = Clock::now() + rates_.looks;
-  std::vector<Vec3> tips_mm;
-  {
-    const std::lock_guard lock(cutting_mutex);
-    for (const auto& [author, entry] : states)
-      if (!entry.over) tips_mm.push_back(entry.state.pose_bone_tool.position_mm);
-  }
-  auto focuses = lookers.focuses(room.bone().pitch_mm(), tips_mm);
-  if (!focuses) return;
-  const std::unique_lock lock(room_mutex);
-  room.focus(std::move(*focuses));
-}
-
-void RoomHost::Impl::make_stale_blocks(bool due) {
-  follow_looks();
-  std::vector<BlockKey> keys;
-  std::vector<BodyId> bodies_now;
-  std::vector<Clock::time_point> arrivals;
-  MeshUpdate update;
-  {
-    // Arrivals first: a cut between the two is measured with the next blocks, never before its own are made.
-    const std::lock_guard lock(mesh_wake_mutex);
-    std::swap(arrivals, unmeshed);
-  }
-  {
-    const std::unique_lock lock(room_mutex);
-    keys = room.take_stale_blocks();
-    stale = 0;
-    update.room_seq = room.room_seq();
-    bodies_now = room.bodies();
-  }
-  if (!due && keys.empty()) return;
-
-  // The room goes on between two blocks; one that it changes meanwhile is stale again and made anew.
-  std::vector<BlockPayload> payloads;
-  payloads.reserve(keys.size());
-  for (const BlockKey& key : keys) {
-    const std::optional<BlockSamples> samples = [&] {
-      const std::shared_lock lock(room_mutex);
-      return room.find_field(key.body) ? std::optional(room.gather_block(key)) : std::nullopt;
-    }();
-    payloads.push_back(samples ? make_block(*samples) : BlockPayload{});
-  }
-
-  {
-    const std::lock_guard lock(mesh_mutex);
-    for (std::size_t i = 0; i < keys.size(); ++i) {
-      const StoredBlock* block = store.put(keys[i], std::move(payloads[i]));
-      if (!block) continue;
-      const Bytes message = block_message(keys[i], *block);
-      update.blocks[keys[i]] = message;
-      if (block->payload.bytes.empty())
-        surface.blocks.erase(keys[i]);
-      else
-        surface.blocks[keys[i]] = message;
-    }
-    // Bodies that are gone take their blocks along.
-    std::vector<BlockKey> gone;
-    for (auto block = surface.blocks.begin(); block != surface.blocks.end();) {
-      const BodyId body = block->first.body;
-      const auto next_body = surface.blocks.lower_bound({BodyId{body.value + 1}, kCoarsestLevel, kFirstCoord});
-      if (!std::ranges::binary_search(bodies_now, body))
-        for (; block != next_body; ++block) gone.push_back(block->first);
-      block = next_body;
-    }
-    for (const BlockKey& key : gone) {
-      surface.blocks.erase(key);
-      if (const StoredBlock* block = store.put(key, {})) update.blocks[key] = block_message(key, *block);
-    }
-    surface.room_seq = update.room_seq;
-    mesh_streams.each([&](MeshSink& sink) { sink.offer(update); });
-  }
-  const auto ready = Clock::now();
-  const std::lock_guard lock(stats_mutex);
-  for (const Clock::time_point arrived : arrivals) mesh_update.record(ready - arrived);
-}
+void RoomHost::Impl::show_scene() { board.show(room.items(), room.bodies()); }
 
 void RoomHost::Impl::run_jobs() {
   while (true) {
@@ -428,9 +220,11 @@ void RoomHost::Impl::run_jobs() {
 
 RoomHost::RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress, Detail detail)
     : impl_(std::make_unique<Impl>(std::move(room), rates, detail)) {
-  impl_->make_whole_surface(progress);
+  impl_->mesh.make_whole_surface(progress);
+  impl_->room_seq = impl_->room.room_seq().value;
+  impl_->show_scene();
   impl_->tick_thread = std::thread([this] { impl_->run_ticks(); });
-  impl_->mesh_thread = std::thread([this] { impl_->run_mesh(); });
+  impl_->mesh.start();
   impl_->piece_thread = std::thread([this] { impl_->run_pieces(); });
   impl_->job_thread = std::thread([this] { impl_->run_jobs(); });
 }
@@ -459,16 +253,16 @@ HostHealth RoomHost::health() const {
     health.sessions = impl_->sessions.size();
     impl_->sessions.each(look);
   }
+  const MeshHealth mesh = impl_->mesh.health();
+  health.mesh_update = mesh.update;
+  health.mesh_streams = mesh.streams;
+  health.blocks = mesh.blocks;
+  health.surface_bytes = mesh.surface_bytes;
+  health.furthest_behind = std::max(health.furthest_behind, mesh.furthest_behind);
+  health.cutting_streams = impl_->board.streams();
   {
-    const std::lock_guard lock(impl_->mesh_mutex);
-    health.mesh_streams = impl_->mesh_streams.size();
-    health.blocks = impl_->surface.blocks.size();
-    for (const auto& [key, message] : impl_->surface.blocks) health.surface_bytes += message->size();
-    impl_->mesh_streams.each(look);
-  }
-  {
-    const std::lock_guard lock(impl_->cutting_mutex);
-    health.cutting_streams = impl_->cutting_streams.size();
+    const std::shared_lock lock(impl_->room_mutex);
+    health.stale_blocks = impl_->room.stale_blocks();
   }
   {
     const std::lock_guard lock(impl_->queue_mutex);
@@ -476,9 +270,7 @@ HostHealth RoomHost::health() const {
   }
   const std::lock_guard lock(impl_->stats_mutex);
   health.tick = impl_->stats;
-  health.mesh_update = impl_->mesh_update;
   health.counts = impl_->counts;
-  health.stale_blocks = impl_->stale;
   return health;
 }
 
@@ -496,10 +288,7 @@ AuthorId RoomHost::join(MemberKind kind) {
   return author;
 }
 
-Digest RoomHost::surface_hash() const {
-  const std::lock_guard lock(impl_->mesh_mutex);
-  return impl_->store.hash();
-}
+Digest RoomHost::surface_hash() const { return impl_->mesh.surface_hash(); }
 
 // In batches: a room that is much cut has many leaves, and a tick must not wait until all of them are copied. Those of a
 // body that goes meanwhile stay without values.
@@ -684,53 +473,22 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink) {
   return {};
 }
 
-void RoomHost::watch_mesh(MeshSink& sink, const std::optional<Look>& look) {
-  {
-    const std::lock_guard lock(impl_->mesh_mutex);
-    impl_->mesh_streams.add(sink);
-    impl_->lookers.open(sink.author(), look);
-    // What is there: the finer blocks that this viewer's look asks for follow.
-    sink.begin(impl_->surface);
-    if (impl_->ended) sink.end(*impl_->ended);
-  }
-  impl_->wake_mesh();
-}
-
-void RoomHost::look(AuthorId viewer, const Look& from) {
-  if (impl_->lookers.look(viewer, from)) impl_->wake_mesh();
-}
-
-bool RoomHost::draws_near() const { return impl_->near; }
-
-void RoomHost::watch_cutting(CuttingSink& sink) {
-  const std::lock_guard lock(impl_->cutting_mutex);
-  impl_->cutting_streams.add(sink);
-  if (impl_->shown) sink.offer(impl_->shown);
-  if (impl_->ended) sink.end(*impl_->ended);
-}
+void RoomHost::watch_mesh(MeshSink& sink, const std::optional<Look>& look) { impl_->mesh.watch(sink, look); }
+void RoomHost::look(AuthorId viewer, const Look& from) { impl_->mesh.look(viewer, from); }
+bool RoomHost::draws_near() const { return impl_->mesh.draws_near(); }
+void RoomHost::watch_cutting(CuttingSink& sink) { impl_->board.watch(sink); }
+void RoomHost::leave(MeshSink& sink) { impl_->mesh.leave(sink); }
+void RoomHost::leave(CuttingSink& sink) { impl_->board.leave(sink); }
+void RoomHost::offer_state(CuttingState state) { impl_->board.offer(std::move(state)); }
 
 void RoomHost::leave(SessionSink& sink) {
   bool was_open = false;
   {
     const std::lock_guard lock(impl_->sessions_mutex);
-    const std::size_t before = impl_->sessions.size();
-    impl_->sessions.remove(sink);
-    was_open = impl_->sessions.size() < before;
+    was_open = impl_->sessions.remove(sink);
     if (was_open) impl_->open_authors.erase(sink.author());
   }
-  if (was_open) impl_->session_over(sink.author());
-}
-
-void RoomHost::leave(MeshSink& sink) {
-  const std::lock_guard lock(impl_->mesh_mutex);
-  const std::size_t before = impl_->mesh_streams.size();
-  impl_->mesh_streams.remove(sink);
-  if (impl_->mesh_streams.size() < before) impl_->lookers.close(sink.author());
-}
-
-void RoomHost::leave(CuttingSink& sink) {
-  const std::lock_guard lock(impl_->cutting_mutex);
-  impl_->cutting_streams.remove(sink);
+  if (was_open) impl_->board.session_over(sink.author());
 }
 
 void RoomHost::queue_cut(std::shared_ptr<SessionSink> sink, Cut cut, Clock::time_point arrived) {
@@ -750,31 +508,21 @@ void RoomHost::queue_event(std::function<Result<RoomEvent>(Room&)> change,
   answer(failure(ErrorCode::unavailable, "the server stops"));
 }
 
-void RoomHost::offer_state(CuttingState state) {
-  const std::lock_guard lock(impl_->cutting_mutex);
-  ShownState& entry = impl_->states[state.author];
-  entry = {std::move(state)};
-  impl_->states_changed = true;
-}
-
 void RoomHost::end_streams(const std::string& why) {
-  const std::scoped_lock lock(impl_->sessions_mutex, impl_->mesh_mutex, impl_->cutting_mutex);
-  impl_->ended = why;
-  impl_->sessions.each([&](SessionSink& sink) { sink.end(why); });
-  impl_->mesh_streams.each([&](MeshSink& sink) { sink.end(why); });
-  impl_->cutting_streams.each([&](CuttingSink& sink) { sink.end(why); });
+  {
+    const std::lock_guard lock(impl_->sessions_mutex);
+    impl_->ended = why;
+    impl_->sessions.each([&](SessionSink& sink) { sink.end(why); });
+  }
+  impl_->mesh.end_streams(why);
+  impl_->board.end_streams(why);
 }
 
 void RoomHost::stop() {
   // The last tick may still make blocks due, so the mesh thread ends after it.
   impl_->stopping = true;
   if (impl_->tick_thread.joinable()) impl_->tick_thread.join();
-  {
-    const std::lock_guard lock(impl_->mesh_wake_mutex);
-    impl_->mesh_end = true;
-    impl_->mesh_wake.notify_all();
-  }
-  if (impl_->mesh_thread.joinable()) impl_->mesh_thread.join();
+  impl_->mesh.stop();
   {
     const std::lock_guard lock(impl_->pieces_mutex);
     impl_->pieces_end = true;
@@ -786,7 +534,7 @@ void RoomHost::stop() {
     if (impl_->rates_.pieces.count() > 0)
       for (Separation& found : impl_->pieces.look()) (void)impl_->room.split(std::move(found));
     impl_->room_seq = impl_->room.room_seq().value;
-    impl_->make_stale_blocks(false);
+    impl_->mesh.update(false);
   }
   {
     const std::lock_guard lock(impl_->jobs_mutex);

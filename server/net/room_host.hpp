@@ -12,28 +12,14 @@
 #include "common/mechanics/cutting_state.hpp"
 #include "common/runtime/tick_stats.hpp"
 #include "common/surface/look.hpp"
+#include "server/net/mesh_room.hpp"
 #include "server/net/outbox.hpp"
+#include "server/net/state_board.hpp"
+#include "server/net/stream_sink.hpp"
 #include "server/room/room.hpp"
 
 namespace osteon {
 
-// What the host says to open streams. Called under the host's locks: must return at once and never call back.
-class StreamSink {
- public:
-  virtual ~StreamSink() = default;
-  virtual void end(const std::string& why) = 0;             // the server stops
-  [[nodiscard]] virtual std::size_t waiting() const = 0;    // rows or blocks that the reader is behind
-};
-class MeshSink : public StreamSink {
- public:
-  [[nodiscard]] virtual AuthorId author() const { return {}; }
-  virtual void begin(MeshUpdate whole_surface) = 0;
-  virtual void offer(const MeshUpdate& update) = 0;
-};
-class CuttingSink : public StreamSink {
- public:
-  virtual void offer(const Bytes& message) = 0;             // a whole WatchCuttingResponse; newest wins
-};
 class SessionSink : public StreamSink {
  public:
   [[nodiscard]] virtual AuthorId author() const = 0;
@@ -48,11 +34,6 @@ class SessionSink : public StreamSink {
   virtual void refuse(const Error& why) = 0;                // a breach of the protocol: the stream ends
   virtual void decided() = 0;                               // one queued cut has left the queue
 };
-
-// How much of the bone is drawn: all of it in full, or in full only what viewers look at and tools work on.
-// `automatic`: near for a bone of more than kMostFullBlocks blocks, full otherwise.
-enum class Detail : std::uint8_t { automatic, full, near };
-inline constexpr std::size_t kMostFullBlocks = 4000;
 
 struct HostRates {
   std::chrono::nanoseconds tick{1'000'000'000 / 120};

@@ -13,189 +13,10 @@
 #include "common/wire/convert.hpp"
 #include "osteon/v1/cutting.grpc.pb.h"
 #include "osteon/v1/room.grpc.pb.h"
-#include "osteon/v1/watch.grpc.pb.h"
+#include "server/net/out_stream.inl"
 
 namespace osteon {
 namespace {
-
-using grpc::ByteBuffer;
-using grpc::Status;
-using grpc::StatusCode;
-
-// A slice that shares the bytes instead of copying them.
-grpc::Slice slice_of(const Bytes& bytes) {
-  auto* keep = new Bytes(bytes);
-  return {const_cast<char*>(bytes->data()), bytes->size(), [](void* kept) { delete static_cast<Bytes*>(kept); }, keep};
-}
-
-ByteBuffer buffer_of(const MessageParts& parts) {
-  std::vector<grpc::Slice> slices;
-  slices.reserve(parts.size());
-  for (const Bytes& part : parts) slices.push_back(slice_of(part));
-  return {slices.data(), slices.size()};
-}
-
-template <class Message>
-std::optional<Message> parse(const ByteBuffer& bytes) {
-  ByteBuffer copy(bytes);  // shares the slices
-  Message message;
-  if (!grpc::SerializationTraits<Message>::Deserialize(&copy, &message).ok()) return std::nullopt;
-  return message;
-}
-
-Status invalid(std::string why) { return {StatusCode::INVALID_ARGUMENT, std::move(why)}; }
-
-Status not_joined(const char* message, std::uint64_t author) {
-  return invalid(std::string(message) + ".author " + std::to_string(author) + " has not joined this room; call Join first");
-}
-
-// A stream that owns at most the message in flight; what waits behind it is the derived class's bounded set. Exactly one
-// path calls Finish, decided under the mutex.
-template <class Reactor>
-class OutStream : public Reactor {
- public:
-  // Hands the stream to gRPC, which holds it until OnDone; queued jobs and cuts may hold it longer.
-  template <class Stream>
-  static Stream* launch(std::shared_ptr<Stream> stream) {
-    Stream* raw = stream.get();
-    raw->self_ = std::move(stream);
-    return raw;
-  }
-
-  void close(Status status) {
-    const std::lock_guard lock(mutex_);
-    close_locked(std::move(status));
-  }
-
-  void OnWriteDone(bool ok) final {
-    const std::lock_guard lock(mutex_);
-    writing_ = false;
-    message_.Clear();
-    if (!ok) close_locked({StatusCode::CANCELLED, "the reader is gone"});
-    pump();
-  }
-  void OnCancel() final { close({StatusCode::CANCELLED, "the reader is gone"}); }
-  void OnDone() final {
-    {
-      const std::lock_guard lock(mutex_);
-      done_ = true;
-    }
-    leave();
-    const std::shared_ptr<void> last = std::move(self_);
-  }
-
- protected:
-  // The rest is called under mutex_, except leave().
-  // Fills the next message; false when nothing waits.
-  virtual bool take(ByteBuffer& message) = 0;
-  virtual void leave() = 0;
-
-  // Ends the stream after the message in flight; an OK end sends what waits first.
-  void close_locked(Status status) {
-    if (!closing_) closing_ = std::move(status);
-    pump();
-  }
-  void pump() {
-    if (writing_ || finished_) return;
-    if ((!closing_ || closing_->ok()) && take(message_)) {
-      writing_ = true;
-      this->StartWrite(&message_);
-    } else if (closing_) {
-      finished_ = true;
-      this->Finish(*closing_);
-    }
-  }
-  [[nodiscard]] bool closing() const { return closing_.has_value(); }
-  [[nodiscard]] bool done() const { return done_; }  // gRPC has let go of the stream
-  [[nodiscard]] std::shared_ptr<void> self() const { return self_; }
-
-  mutable std::mutex mutex_;
-
- private:
-  std::shared_ptr<void> self_;
-  std::optional<Status> closing_;
-  bool writing_ = false, finished_ = false, done_ = false;
-  ByteBuffer message_;
-};
-
-using WriteReactor = grpc::ServerWriteReactor<ByteBuffer>;
-using BidiReactor = grpc::ServerBidiReactor<ByteBuffer, ByteBuffer>;
-
-// A stream that is refused at once.
-class RefusedStream final : public OutStream<WriteReactor> {
-  bool take(ByteBuffer&) override { return false; }
-  void leave() override {}
-};
-
-WriteReactor* refused(Status status) {
-  RefusedStream* stream = RefusedStream::launch(std::make_shared<RefusedStream>());
-  stream->close(std::move(status));
-  return stream;
-}
-
-class MeshStream final : public OutStream<WriteReactor>, public MeshSink {
- public:
-  MeshStream(RoomHost& host, AuthorId author) : host_(host), author_(author) {}
-
-  AuthorId author() const override { return author_; }
-  void begin(MeshUpdate whole_surface) override {
-    const std::lock_guard lock(mutex_);
-    outbox_.emplace(std::move(whole_surface));
-    pump();
-  }
-  void offer(const MeshUpdate& update) override {
-    const std::lock_guard lock(mutex_);
-    if (closing()) return;
-    outbox_->add(update);
-    pump();
-  }
-  void end(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
-  std::size_t waiting() const override {
-    const std::lock_guard lock(mutex_);
-    return outbox_ ? outbox_->waiting() : 0;
-  }
-
- private:
-  bool take(ByteBuffer& message) override {
-    if (!outbox_) return false;
-    const MessageParts parts = outbox_->take();
-    if (!parts.empty()) message = buffer_of(parts);
-    return !parts.empty();
-  }
-  void leave() override { host_.leave(*this); }
-
-  RoomHost& host_;
-  const AuthorId author_;
-  std::optional<MeshOutbox> outbox_;
-};
-
-class CuttingStream final : public OutStream<WriteReactor>, public CuttingSink {
- public:
-  explicit CuttingStream(RoomHost& host) : host_(host) {}
-
-  void offer(const Bytes& message) override {
-    const std::lock_guard lock(mutex_);
-    if (closing()) return;
-    waiting_ = message;
-    pump();
-  }
-  void end(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
-  std::size_t waiting() const override {
-    const std::lock_guard lock(mutex_);
-    return waiting_ ? 1 : 0;
-  }
-
- private:
-  bool take(ByteBuffer& message) override {
-    if (!waiting_) return false;
-    message = buffer_of({std::exchange(waiting_, nullptr)});
-    return true;
-  }
-  void leave() override { host_.leave(*this); }
-
-  RoomHost& host_;
-  Bytes waiting_;
-};
 
 // One haptic client's session. Reading stops while kMaxQueuedCuts of its cuts wait for a tick, so a client that sends
 // faster than the room cuts is slowed down by the network instead of filling memory.
@@ -473,7 +294,6 @@ class RoomServiceImpl final : public RoomBase {
       response->set_subscribers(static_cast<std::uint32_t>(health.mesh_streams + health.cutting_streams));
       for (const BodyId body : status.bodies) response->add_bodies(body.value);
       for (const SceneItem& item : host_.items()) *response->add_items() = wire::to_wire(item);
-      response->set_lease_epoch(host_.lease_epoch());
       v1::TickHealth& tick = *response->mutable_tick();
       tick.set_ticks(health.tick.work.count());
       tick.set_missed(health.tick.missed);
@@ -667,56 +487,6 @@ class CuttingServiceImpl final : public v1::CuttingService::WithRawCallbackMetho
   const std::uint64_t server_epoch_;
 };
 
-using WatchBase = v1::WatchService::WithRawCallbackMethod_WatchMesh<v1::WatchService::WithRawCallbackMethod_WatchCutting<
-    v1::WatchService::WithCallbackMethod_LookFrom<v1::WatchService::Service>>>;
-
-class WatchServiceImpl final : public WatchBase {
- public:
-  explicit WatchServiceImpl(RoomHost& host) : host_(host) {}
-
-  WriteReactor* WatchMesh(grpc::CallbackServerContext*, const ByteBuffer* bytes) override {
-    const auto request = parse<v1::WatchMeshRequest>(*bytes);
-    if (!request) return refused(invalid("the WatchMeshRequest could not be parsed"));
-    if (!host_.knows(AuthorId{request->author()})) return refused(not_joined("WatchMeshRequest", request->author()));
-    std::optional<Look> look;
-    if (request->has_look()) {
-      const Result<Look> stated = wire::from_wire(request->look());
-      if (!stated) return refused(invalid(stated.error().message));
-      look = *stated;
-    }
-    MeshStream* stream = MeshStream::launch(std::make_shared<MeshStream>(host_, AuthorId{request->author()}));
-    host_.watch_mesh(*stream, look);
-    return stream;
-  }
-
-  grpc::ServerUnaryReactor* LookFrom(grpc::CallbackServerContext* context, const v1::LookFromRequest* request,
-                                     v1::LookFromResponse*) override {
-    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-    const Result<Look> look = wire::from_wire(request->look());
-    if (!host_.knows(AuthorId{request->author()})) {
-      reactor->Finish(not_joined("LookFromRequest", request->author()));
-    } else if (!look) {
-      reactor->Finish(invalid(look.error().message));
-    } else {
-      host_.look(AuthorId{request->author()}, *look);
-      reactor->Finish(Status::OK);
-    }
-    return reactor;
-  }
-
-  WriteReactor* WatchCutting(grpc::CallbackServerContext*, const ByteBuffer* bytes) override {
-    const auto request = parse<v1::WatchCuttingRequest>(*bytes);
-    if (!request) return refused(invalid("the WatchCuttingRequest could not be parsed"));
-    if (!host_.knows(AuthorId{request->author()})) return refused(not_joined("WatchCuttingRequest", request->author()));
-    CuttingStream* stream = CuttingStream::launch(std::make_shared<CuttingStream>(host_));
-    host_.watch_cutting(*stream);
-    return stream;
-  }
-
- private:
-  RoomHost& host_;
-};
-
 }  // namespace
 
 std::unique_ptr<grpc::Service> make_room_service(RoomHost& host, RoomFiles files, std::uint64_t server_epoch) {
@@ -725,6 +495,5 @@ std::unique_ptr<grpc::Service> make_room_service(RoomHost& host, RoomFiles files
 std::unique_ptr<grpc::Service> make_cutting_service(RoomHost& host, std::uint64_t server_epoch) {
   return std::make_unique<CuttingServiceImpl>(host, server_epoch);
 }
-std::unique_ptr<grpc::Service> make_watch_service(RoomHost& host) { return std::make_unique<WatchServiceImpl>(host); }
 
 }  // namespace osteon

@@ -1,0 +1,212 @@
+#include "server/net/mesh_room.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <utility>
+
+#include "server/net/room_rows.hpp"
+
+namespace osteon {
+namespace {
+
+constexpr Coord kFirstCoord{INT32_MIN, INT32_MIN, INT32_MIN};  // before every block of a level
+
+}  // namespace
+
+MeshRoom::MeshRoom(Room& room, std::shared_mutex& room_mutex, MeshRates rates, Detail detail, ToolTips tool_tips_mm)
+    : room_(room),
+      room_mutex_(room_mutex),
+      rates_(rates),
+      near_(detail == Detail::near || (detail == Detail::automatic && room.bone_blocks().size() > kMostFullBlocks)),
+      tool_tips_mm_(std::move(tool_tips_mm)) {}
+
+void MeshRoom::make_whole_surface(const std::function<void(double)>& progress) {
+  if (near_) room_.focus({focus_on_nothing()});
+  std::vector<BlockKey> keys = room_.bone_blocks();
+  for (const BlockKey& key : room_.take_stale_blocks()) keys.push_back(key);  // fine ones of fields that were loaded
+  std::ranges::sort(keys);
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  std::vector<BlockPayload> payloads(keys.size());
+  std::atomic<std::size_t> next{0};
+  const auto work = [&](bool reports) {
+    for (std::size_t i = next++; i < keys.size(); i = next++) {
+      payloads[i] = make_block(room_.gather_block(keys[i]));
+      if (reports && progress) progress(static_cast<double>(i) / static_cast<double>(keys.size()));
+    }
+  };
+  {
+    std::vector<std::jthread> helpers;
+    for (unsigned i = 1; i < std::max(1u, std::thread::hardware_concurrency()); ++i) helpers.emplace_back(work, false);
+    work(true);
+  }
+  for (std::size_t i = 0; i < keys.size(); ++i)
+    if (const StoredBlock* block = store_.put(keys[i], std::move(payloads[i])))
+      surface_.blocks[keys[i]] = block_message(keys[i], *block);
+  surface_.room_seq = room_.room_seq();
+  if (progress) progress(1.0);
+}
+
+void MeshRoom::start() {
+  thread_ = std::thread([this] { run(); });
+}
+
+void MeshRoom::stop() {
+  {
+    const std::lock_guard lock(wake_mutex_);
+    end_ = true;
+    wake_.notify_all();
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+void MeshRoom::run() {
+  auto next = Clock::now();
+  bool due = false;
+  while (true) {
+    {
+      std::unique_lock lock(wake_mutex_);
+      if (near_)  // tools move without anything else that wakes this thread
+        wake_.wait_for(lock, rates_.looks, [&] { return due_ || end_; });
+      else
+        wake_.wait(lock, [&] { return due_ || end_; });
+      if (!due_ && (end_ || !near_)) return;
+      // A first cut is shown at once, a row of cuts at the mesh rate.
+      wake_.wait_until(lock, next, [&] { return end_; });
+      due = std::exchange(due_, false);
+    }
+    next = Clock::now() + rates_.mesh;
+    update(due);
+  }
+}
+
+void MeshRoom::changed(Clock::time_point arrived) {
+  const std::lock_guard lock(wake_mutex_);
+  unmeshed_.push_back(arrived);
+}
+
+void MeshRoom::wake() {
+  const std::lock_guard lock(wake_mutex_);
+  due_ = true;
+  wake_.notify_one();
+}
+
+// [mesh thread]
+void MeshRoom::follow_looks() {
+  if (!near_ || Clock::now() < next_look_) return;
+  next_look_ = Clock::now() + rates_.looks;
+  auto focuses = lookers_.focuses(room_.bone().pitch_mm(), tool_tips_mm_());
+  if (!focuses) return;
+  const std::unique_lock lock(room_mutex_);
+  room_.focus(std::move(*focuses));
+}
+
+void MeshRoom::update(bool due) {
+  follow_looks();
+  std::vector<BlockKey> keys;
+  std::vector<BodyId> bodies_now;
+  std::vector<Clock::time_point> arrivals;
+  MeshUpdate update;
+  {
+    // Arrivals first: a cut between the two is measured with the next blocks, never before its own are made.
+    const std::lock_guard lock(wake_mutex_);
+    std::swap(arrivals, unmeshed_);
+  }
+  {
+    const std::unique_lock lock(room_mutex_);
+    keys = room_.take_stale_blocks();
+    update.room_seq = room_.room_seq();
+    bodies_now = room_.bodies();
+  }
+  if (!due && keys.empty()) return;
+
+  // The room goes on between two blocks; one that it changes meanwhile is stale again and made anew.
+  std::vector<BlockPayload> payloads;
+  payloads.reserve(keys.size());
+  for (const BlockKey& key : keys) {
+    const std::optional<BlockSamples> samples = [&] {
+      const std::shared_lock lock(room_mutex_);
+      return room_.find_field(key.body) ? std::optional(room_.gather_block(key)) : std::nullopt;
+    }();
+    payloads.push_back(samples ? make_block(*samples) : BlockPayload{});
+  }
+
+  {
+    const std::lock_guard lock(surface_mutex_);
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      const StoredBlock* block = store_.put(keys[i], std::move(payloads[i]));
+      if (!block) continue;
+      const Bytes message = block_message(keys[i], *block);
+      update.blocks[keys[i]] = message;
+      if (block->payload.bytes.empty())
+        surface_.blocks.erase(keys[i]);
+      else
+        surface_.blocks[keys[i]] = message;
+    }
+    // Bodies that are gone take their blocks along.
+    std::vector<BlockKey> gone;
+    for (auto block = surface_.blocks.begin(); block != surface_.blocks.end();) {
+      const BodyId body = block->first.body;
+      const auto next_body = surface_.blocks.lower_bound({BodyId{body.value + 1}, kCoarsestLevel, kFirstCoord});
+      if (!std::ranges::binary_search(bodies_now, body))
+        for (; block != next_body; ++block) gone.push_back(block->first);
+      block = next_body;
+    }
+    for (const BlockKey& key : gone) {
+      surface_.blocks.erase(key);
+      if (const StoredBlock* block = store_.put(key, {})) update.blocks[key] = block_message(key, *block);
+    }
+    surface_.room_seq = update.room_seq;
+    streams_.each([&](MeshSink& sink) { sink.offer(update); });
+  }
+  const auto ready = Clock::now();
+  const std::lock_guard lock(stats_mutex_);
+  for (const Clock::time_point arrived : arrivals) update_.record(ready - arrived);
+}
+
+void MeshRoom::watch(MeshSink& sink, const std::optional<Look>& look) {
+  {
+    const std::lock_guard lock(surface_mutex_);
+    streams_.add(sink);
+    lookers_.open(sink.author(), look);
+    // What is there: the finer blocks that this viewer's look asks for follow.
+    sink.begin(surface_);
+    if (ended_) sink.end(*ended_);
+  }
+  wake();
+}
+
+void MeshRoom::leave(MeshSink& sink) {
+  const std::lock_guard lock(surface_mutex_);
+  if (streams_.remove(sink)) lookers_.close(sink.author());
+}
+
+void MeshRoom::look(AuthorId viewer, const Look& from) {
+  if (lookers_.look(viewer, from)) wake();
+}
+
+void MeshRoom::end_streams(const std::string& why) {
+  const std::lock_guard lock(surface_mutex_);
+  ended_ = why;
+  streams_.each([&](MeshSink& sink) { sink.end(why); });
+}
+
+MeshHealth MeshRoom::health() const {
+  MeshHealth health;
+  {
+    const std::lock_guard lock(surface_mutex_);
+    health.streams = streams_.size();
+    health.blocks = surface_.blocks.size();
+    for (const auto& [key, message] : surface_.blocks) health.surface_bytes += message->size();
+    streams_.each([&](const MeshSink& sink) { health.furthest_behind = std::max(health.furthest_behind, sink.waiting()); });
+  }
+  const std::lock_guard lock(stats_mutex_);
+  health.update = update_;
+  return health;
+}
+
+Digest MeshRoom::surface_hash() const {
+  const std::lock_guard lock(surface_mutex_);
+  return store_.hash();
+}
+
+}  // namespace osteon

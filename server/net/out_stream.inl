@@ -1,0 +1,130 @@
+// How an open stream looks to gRPC. For the sources of the services alone: gRPC stays out of headers.
+#include <grpcpp/grpcpp.h>
+
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/net/outbox.hpp"
+
+namespace osteon {
+
+using grpc::ByteBuffer;
+using grpc::Status;
+using grpc::StatusCode;
+
+// A slice that shares the bytes instead of copying them.
+inline grpc::Slice slice_of(const Bytes& bytes) {
+  auto* keep = new Bytes(bytes);
+  return {const_cast<char*>(bytes->data()), bytes->size(), [](void* kept) { delete static_cast<Bytes*>(kept); }, keep};
+}
+
+inline ByteBuffer buffer_of(const MessageParts& parts) {
+  std::vector<grpc::Slice> slices;
+  slices.reserve(parts.size());
+  for (const Bytes& part : parts) slices.push_back(slice_of(part));
+  return {slices.data(), slices.size()};
+}
+
+template <class Message>
+std::optional<Message> parse(const ByteBuffer& bytes) {
+  ByteBuffer copy(bytes);  // shares the slices
+  Message message;
+  if (!grpc::SerializationTraits<Message>::Deserialize(&copy, &message).ok()) return std::nullopt;
+  return message;
+}
+
+inline Status invalid(std::string why) { return {StatusCode::INVALID_ARGUMENT, std::move(why)}; }
+
+inline Status not_joined(const char* message, std::uint64_t author) {
+  return invalid(std::string(message) + ".author " + std::to_string(author) + " has not joined this room; call Join first");
+}
+
+// A stream that owns at most the message in flight; what waits behind it is the derived class's bounded set. Exactly one
+// path calls Finish, decided under the mutex.
+template <class Reactor>
+class OutStream : public Reactor {
+ public:
+  // Hands the stream to gRPC, which holds it until OnDone; queued jobs and cuts may hold it longer.
+  template <class Stream>
+  static Stream* launch(std::shared_ptr<Stream> stream) {
+    Stream* raw = stream.get();
+    raw->self_ = std::move(stream);
+    return raw;
+  }
+
+  void close(Status status) {
+    const std::lock_guard lock(mutex_);
+    close_locked(std::move(status));
+  }
+
+  void OnWriteDone(bool ok) final {
+    const std::lock_guard lock(mutex_);
+    writing_ = false;
+    message_.Clear();
+    if (!ok) close_locked({StatusCode::CANCELLED, "the reader is gone"});
+    pump();
+  }
+  void OnCancel() final { close({StatusCode::CANCELLED, "the reader is gone"}); }
+  void OnDone() final {
+    {
+      const std::lock_guard lock(mutex_);
+      done_ = true;
+    }
+    leave();
+    const std::shared_ptr<void> last = std::move(self_);
+  }
+
+ protected:
+  // The rest is called under mutex_, except leave().
+  // Fills the next message; false when nothing waits.
+  virtual bool take(ByteBuffer& message) = 0;
+  virtual void leave() = 0;
+
+  // Ends the stream after the message in flight; an OK end sends what waits first.
+  void close_locked(Status status) {
+    if (!closing_) closing_ = std::move(status);
+    pump();
+  }
+  void pump() {
+    if (writing_ || finished_) return;
+    if ((!closing_ || closing_->ok()) && take(message_)) {
+      writing_ = true;
+      this->StartWrite(&message_);
+    } else if (closing_) {
+      finished_ = true;
+      this->Finish(*closing_);
+    }
+  }
+  [[nodiscard]] bool closing() const { return closing_.has_value(); }
+  [[nodiscard]] bool done() const { return done_; }  // gRPC has let go of the stream
+  [[nodiscard]] std::shared_ptr<void> self() const { return self_; }
+
+  mutable std::mutex mutex_;
+
+ private:
+  std::shared_ptr<void> self_;
+  std::optional<Status> closing_;
+  bool writing_ = false, finished_ = false, done_ = false;
+  ByteBuffer message_;
+};
+
+using WriteReactor = grpc::ServerWriteReactor<ByteBuffer>;
+using BidiReactor = grpc::ServerBidiReactor<ByteBuffer, ByteBuffer>;
+
+// A stream that is refused at once.
+class RefusedStream final : public OutStream<WriteReactor> {
+  bool take(ByteBuffer&) override { return false; }
+  void leave() override {}
+};
+
+inline WriteReactor* refused(Status status) {
+  RefusedStream* stream = RefusedStream::launch(std::make_shared<RefusedStream>());
+  stream->close(std::move(status));
+  return stream;
+}
+
+}  // namespace osteon

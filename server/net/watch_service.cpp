@@ -1,0 +1,135 @@
+// What viewers and audio clients subscribe to.
+#include <grpcpp/grpcpp.h>
+
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "common/wire/convert.hpp"
+#include "osteon/v1/watch.grpc.pb.h"
+#include "server/net/out_stream.inl"
+#include "server/net/services.hpp"
+
+namespace osteon {
+namespace {
+
+class MeshStream final : public OutStream<WriteReactor>, public MeshSink {
+ public:
+  MeshStream(RoomHost& host, AuthorId author) : host_(host), author_(author) {}
+
+  AuthorId author() const override { return author_; }
+  void begin(MeshUpdate whole_surface) override {
+    const std::lock_guard lock(mutex_);
+    outbox_.emplace(std::move(whole_surface));
+    pump();
+  }
+  void offer(const MeshUpdate& update) override {
+    const std::lock_guard lock(mutex_);
+    if (closing()) return;
+    outbox_->add(update);
+    pump();
+  }
+  void end(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
+  std::size_t waiting() const override {
+    const std::lock_guard lock(mutex_);
+    return outbox_ ? outbox_->waiting() : 0;
+  }
+
+ private:
+  bool take(ByteBuffer& message) override {
+    if (!outbox_) return false;
+    const MessageParts parts = outbox_->take();
+    if (!parts.empty()) message = buffer_of(parts);
+    return !parts.empty();
+  }
+  void leave() override { host_.leave(*this); }
+
+  RoomHost& host_;
+  const AuthorId author_;
+  std::optional<MeshOutbox> outbox_;
+};
+
+class CuttingStream final : public OutStream<WriteReactor>, public CuttingSink {
+ public:
+  explicit CuttingStream(RoomHost& host) : host_(host) {}
+
+  void offer(const Bytes& message) override {
+    const std::lock_guard lock(mutex_);
+    if (closing()) return;
+    waiting_ = message;
+    pump();
+  }
+  void end(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
+  std::size_t waiting() const override {
+    const std::lock_guard lock(mutex_);
+    return waiting_ ? 1 : 0;
+  }
+
+ private:
+  bool take(ByteBuffer& message) override {
+    if (!waiting_) return false;
+    message = buffer_of({std::exchange(waiting_, nullptr)});
+    return true;
+  }
+  void leave() override { host_.leave(*this); }
+
+  RoomHost& host_;
+  Bytes waiting_;
+};
+
+using WatchBase = v1::WatchService::WithRawCallbackMethod_WatchMesh<v1::WatchService::WithRawCallbackMethod_WatchCutting<
+    v1::WatchService::WithCallbackMethod_LookFrom<v1::WatchService::Service>>>;
+
+class WatchServiceImpl final : public WatchBase {
+ public:
+  explicit WatchServiceImpl(RoomHost& host) : host_(host) {}
+
+  WriteReactor* WatchMesh(grpc::CallbackServerContext*, const ByteBuffer* bytes) override {
+    const auto request = parse<v1::WatchMeshRequest>(*bytes);
+    if (!request) return refused(invalid("the WatchMeshRequest could not be parsed"));
+    if (!host_.knows(AuthorId{request->author()})) return refused(not_joined("WatchMeshRequest", request->author()));
+    std::optional<Look> look;
+    if (request->has_look()) {
+      const Result<Look> stated = wire::from_wire(request->look());
+      if (!stated) return refused(invalid(stated.error().message));
+      look = *stated;
+    }
+    MeshStream* stream = MeshStream::launch(std::make_shared<MeshStream>(host_, AuthorId{request->author()}));
+    host_.watch_mesh(*stream, look);
+    return stream;
+  }
+
+  grpc::ServerUnaryReactor* LookFrom(grpc::CallbackServerContext* context, const v1::LookFromRequest* request,
+                                     v1::LookFromResponse*) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    const Result<Look> look = wire::from_wire(request->look());
+    if (!host_.knows(AuthorId{request->author()})) {
+      reactor->Finish(not_joined("LookFromRequest", request->author()));
+    } else if (!look) {
+      reactor->Finish(invalid(look.error().message));
+    } else {
+      host_.look(AuthorId{request->author()}, *look);
+      reactor->Finish(Status::OK);
+    }
+    return reactor;
+  }
+
+  WriteReactor* WatchCutting(grpc::CallbackServerContext*, const ByteBuffer* bytes) override {
+    const auto request = parse<v1::WatchCuttingRequest>(*bytes);
+    if (!request) return refused(invalid("the WatchCuttingRequest could not be parsed"));
+    if (!host_.knows(AuthorId{request->author()})) return refused(not_joined("WatchCuttingRequest", request->author()));
+    CuttingStream* stream = CuttingStream::launch(std::make_shared<CuttingStream>(host_));
+    host_.watch_cutting(*stream);
+    return stream;
+  }
+
+ private:
+  RoomHost& host_;
+};
+
+}  // namespace
+
+std::unique_ptr<grpc::Service> make_watch_service(RoomHost& host) { return std::make_unique<WatchServiceImpl>(host); }
+
+}  // namespace osteon
