@@ -1,0 +1,189 @@
+#include "server/journal/database.hpp"
+
+#include <sqlite3.h>
+
+#include <cstring>
+#include <system_error>
+
+#include "common/core/check.hpp"
+
+namespace osteon {
+namespace {
+
+// One sentence of SQLite's, with the system's reason where there is one.
+Error error_of(sqlite3* connection, const std::string& file) {
+  const int code = sqlite3_errcode(connection) & 0xff;  // without what the extended code adds
+  const bool of_system = code == SQLITE_IOERR || code == SQLITE_FULL || code == SQLITE_CANTOPEN;
+  std::string message = file + ": " + sqlite3_errmsg(connection);
+  if (const int reason = sqlite3_system_errno(connection); of_system && reason != 0)
+    message += " (" + std::generic_category().message(reason) + ")";
+  switch (code) {
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED: return {ErrorCode::exists, message};
+    case SQLITE_CORRUPT:
+    case SQLITE_NOTADB:
+    case SQLITE_FORMAT: return {ErrorCode::invalid_input, message};
+    case SQLITE_CANTOPEN: return {ErrorCode::not_found, message};
+    default: return {ErrorCode::internal, message};
+  }
+}
+
+// A path as SQLite takes it with parameters behind it.
+std::string uri_of(const std::filesystem::path& file) {
+  static constexpr char kDigits[] = "0123456789ABCDEF";
+  std::string uri = "file:";
+  for (const char c : file.string()) {
+    if (std::strchr("?#%", c) == nullptr) {
+      uri += c;
+      continue;
+    }
+    const auto byte = static_cast<unsigned char>(c);
+    uri += '%';
+    uri += kDigits[byte >> 4];
+    uri += kDigits[byte & 15];
+  }
+  // A write that a power failure tears may spoil the sector's other bytes: the log is filled up to a sector at each commit.
+  return uri + "?psow=0";
+}
+
+}  // namespace
+
+Statement& Statement::integer(int at, std::int64_t value) {
+  OSTEON_CHECK(sqlite3_bind_int64(statement_.get(), at + 1, value) == SQLITE_OK);
+  return *this;
+}
+
+Statement& Statement::text(int at, std::string_view value) {
+  OSTEON_CHECK(sqlite3_bind_text64(statement_.get(), at + 1, value.empty() ? "" : value.data(), value.size(), SQLITE_STATIC,
+                                   SQLITE_UTF8) == SQLITE_OK);
+  return *this;
+}
+
+Statement& Statement::blob(int at, std::string_view value) {
+  OSTEON_CHECK(sqlite3_bind_blob64(statement_.get(), at + 1, value.empty() ? "" : value.data(), value.size(), SQLITE_STATIC) ==
+               SQLITE_OK);
+  return *this;
+}
+
+Result<bool> Statement::step() {
+  const int code = sqlite3_step(statement_.get());
+  if (code == SQLITE_ROW) return true;
+  if (code == SQLITE_DONE) return false;
+  return tl::unexpected(error_of(sqlite3_db_handle(statement_.get()), file_));
+}
+
+Result<void> Statement::run() {
+  Result<bool> more = true;
+  while (more && *more) more = step();
+  reset();
+  if (!more) return tl::unexpected(more.error());
+  return {};
+}
+
+void Statement::reset() { sqlite3_reset(statement_.get()); }
+
+std::int64_t Statement::integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
+
+std::string_view Statement::bytes(int column) const {
+  const auto* data = static_cast<const char*>(sqlite3_column_blob(statement_.get(), column));
+  return {data == nullptr ? "" : data, static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column))};
+}
+
+void Statement::Finalize::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+
+struct Database::Connection {
+  sqlite3* handle = nullptr;
+  std::string file;
+  std::uint64_t page_bytes = 0;
+  std::uint64_t log_pages = 0;  // in the log, the last time that something was committed
+};
+
+void Database::Close::operator()(Connection* connection) const {
+  // A statement that outlives the database would keep it open: then it ends with the statement.
+  sqlite3_close_v2(connection->handle);
+  delete connection;
+}
+
+Result<Database> Database::open(const std::filesystem::path& file, const Disk& disk, const DatabaseOptions& options) {
+  Database made;
+  made.connection_.reset(new Connection);
+  Connection& connection = *made.connection_;
+  connection.file = file.string();
+  const std::string vfs = disk.vfs();
+  const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE;
+  const int code = sqlite3_open_v2(uri_of(file).c_str(), &connection.handle, flags | (options.create ? SQLITE_OPEN_CREATE : 0),
+                                   vfs.empty() ? nullptr : vfs.c_str());
+  if (code != SQLITE_OK) return tl::unexpected(error_of(connection.handle, connection.file));
+  sqlite3_db_config(connection.handle, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+  sqlite3_db_config(connection.handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  sqlite3_wal_hook(
+      connection.handle,
+      [](void* to, sqlite3*, const char*, int pages) {
+        static_cast<Connection*>(to)->log_pages = static_cast<std::uint64_t>(pages);
+        return SQLITE_OK;
+      },
+      &connection);
+
+  // EXCLUSIVE keeps the index of the log in memory: no file of it that another process could have damaged, and nobody beside us.
+  std::string settings =
+      "PRAGMA locking_mode=EXCLUSIVE; PRAGMA temp_store=MEMORY; PRAGMA mmap_size=0; PRAGMA secure_delete=ON;"
+      "PRAGMA cell_size_check=ON; PRAGMA trusted_schema=OFF; PRAGMA fullfsync=ON; PRAGMA checkpoint_fullfsync=ON;";
+  if (options.create) settings += "PRAGMA page_size=" + std::to_string(options.page_bytes) + "; PRAGMA journal_mode=WAL;";
+  settings += options.durable ? "PRAGMA synchronous=FULL;" : "PRAGMA synchronous=OFF;";
+  if (Result<void> set = made.run(settings); !set) return tl::unexpected(set.error());
+  const Result<std::int64_t> page = made.integer("PRAGMA page_size");
+  if (!page) return tl::unexpected(page.error());
+  connection.page_bytes = static_cast<std::uint64_t>(*page);
+  return made;
+}
+
+Result<Statement> Database::prepare(std::string_view sql) {
+  sqlite3_stmt* statement = nullptr;
+  const int code = sqlite3_prepare_v3(connection_->handle, sql.data(), static_cast<int>(sql.size()), SQLITE_PREPARE_PERSISTENT,
+                                      &statement, nullptr);
+  if (code != SQLITE_OK) return tl::unexpected(error_of(connection_->handle, connection_->file));
+  Statement made;
+  made.statement_.reset(statement);
+  made.file_ = connection_->file;
+  return made;
+}
+
+Result<void> Database::run(const std::string& sql) {
+  if (sqlite3_exec(connection_->handle, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK)
+    return tl::unexpected(error_of(connection_->handle, connection_->file));
+  return {};
+}
+
+Result<std::int64_t> Database::integer(std::string_view sql) {
+  return prepare(sql).and_then([](Statement statement) {
+    return statement.step().map([&](bool row) { return row ? statement.integer(0) : std::int64_t{0}; });
+  });
+}
+
+Result<std::string> Database::text(std::string_view sql) {
+  return prepare(sql).and_then([](Statement statement) {
+    return statement.step().map([&](bool row) { return row ? std::string(statement.bytes(0)) : std::string(); });
+  });
+}
+
+Result<void> Database::transact(const std::function<Result<void>()>& work) {
+  if (Result<void> begun = run("BEGIN IMMEDIATE"); !begun) return begun;
+  Result<void> done = work();
+  if (done) done = run("COMMIT");
+  if (done || sqlite3_get_autocommit(connection_->handle) != 0) return done;
+  static_cast<void>(run("ROLLBACK"));  // what was wrong before is what is told
+  return done;
+}
+
+Result<void> Database::carry_log(bool emptied) {
+  int in_log = 0, carried = 0;
+  const int code = sqlite3_wal_checkpoint_v2(connection_->handle, nullptr,
+                                             emptied ? SQLITE_CHECKPOINT_TRUNCATE : SQLITE_CHECKPOINT_PASSIVE, &in_log, &carried);
+  if (code != SQLITE_OK) return tl::unexpected(error_of(connection_->handle, connection_->file));
+  connection_->log_pages = static_cast<std::uint64_t>(in_log - carried);
+  return {};
+}
+
+std::uint64_t Database::log_bytes() const { return connection_->log_pages * connection_->page_bytes; }
+
+}  // namespace osteon

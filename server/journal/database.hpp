@@ -1,0 +1,76 @@
+// SQLite as the journal uses it: one connection that has the file to itself, a write-ahead log synced at every commit, and
+// the log carried into the file only when asked. Errors are sentences; what SQLite returns stops here.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "common/core/result.hpp"
+#include "server/journal/disk.hpp"
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+namespace osteon {
+
+// One SQL statement, run any number of times. Columns and parameters count from 0.
+class Statement {
+ public:
+  Statement& integer(int at, std::int64_t value);
+  Statement& text(int at, std::string_view value);  // must stay until the next step
+  Statement& blob(int at, std::string_view value);  // likewise
+  [[nodiscard]] Result<bool> step();                // true: there is a row
+  [[nodiscard]] Result<void> run();                 // to its end; ready to run again
+  void reset();
+
+  [[nodiscard]] std::int64_t integer(int column) const;
+  [[nodiscard]] std::string_view bytes(int column) const;  // of a text or blob, until the next step
+
+ private:
+  friend class Database;
+  Statement() = default;
+  struct Finalize {
+    void operator()(sqlite3_stmt* statement) const;
+  };
+  std::unique_ptr<sqlite3_stmt, Finalize> statement_;
+  std::string file_;
+};
+
+struct DatabaseOptions {
+  bool create = false;
+  bool durable = true;  // false: SQLite waits for no write; for tests that must see rows lost
+  int page_bytes = 4096;
+};
+
+// Not synchronised; one thread at a time.
+class Database {
+ public:
+  [[nodiscard]] static Result<Database> open(const std::filesystem::path& file, const Disk& disk, const DatabaseOptions& options);
+  // Closing carries nothing from the log into the file: that is for carry_log(), while it still can be told to have failed.
+  Database(Database&&) noexcept = default;
+  Database& operator=(Database&&) noexcept = default;
+
+  [[nodiscard]] Result<Statement> prepare(std::string_view sql);
+  [[nodiscard]] Result<void> run(const std::string& sql);  // statements without rows that matter
+  [[nodiscard]] Result<std::int64_t> integer(std::string_view sql);  // of the first row; 0 without one
+  [[nodiscard]] Result<std::string> text(std::string_view sql);
+  // All of it, or after a failure nothing: an error means that it is not committed for sure.
+  [[nodiscard]] Result<void> transact(const std::function<Result<void>()>& work);
+
+  // Copies the log into the file, both synced; `emptied`: and cuts the log to nothing.
+  [[nodiscard]] Result<void> carry_log(bool emptied);
+  [[nodiscard]] std::uint64_t log_bytes() const;  // not yet carried into the file
+
+ private:
+  Database() = default;
+  struct Connection;
+  struct Close {
+    void operator()(Connection* connection) const;
+  };
+  std::unique_ptr<Connection, Close> connection_;
+};
+
+}  // namespace osteon

@@ -1,0 +1,89 @@
+// The files of a journal, as an interface: so that a test can put a disk under it that fails, tears and forgets.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/core/digest.hpp"
+#include "common/core/result.hpp"
+
+namespace osteon {
+
+// A file being written, piece by piece.
+class DiskFile {
+ public:
+  virtual ~DiskFile() = default;
+  [[nodiscard]] virtual Result<void> write(std::string_view piece) = 0;  // at its end
+  [[nodiscard]] virtual Result<void> sync() = 0;                         // what was written stays, whatever happens
+};
+
+// Held until it is destroyed, or its process has ended in whatever way.
+class DiskLock {
+ public:
+  virtual ~DiskLock() = default;
+};
+
+// What is written stays after a power failure only once the file was synced; what is made, renamed or removed, once its
+// folder was. Any thread. Errors name the file and the system's reason: not_found, exists (a lock), internal.
+class Disk {
+ public:
+  virtual ~Disk() = default;
+  // An empty file, in place of one that is there.
+  [[nodiscard]] virtual Result<std::unique_ptr<DiskFile>> create(const std::filesystem::path& file) = 0;
+  [[nodiscard]] virtual Result<std::string> read(const std::filesystem::path& file, std::uint64_t from, std::size_t most) = 0;
+  // Nothing: no such file.
+  [[nodiscard]] virtual Result<std::optional<std::uint64_t>> size(const std::filesystem::path& file) = 0;
+  [[nodiscard]] virtual Result<void> rename(const std::filesystem::path& from, const std::filesystem::path& to) = 0;
+  [[nodiscard]] virtual Result<void> remove(const std::filesystem::path& file) = 0;  // one that is not there is well
+  [[nodiscard]] virtual Result<void> sync_folder(const std::filesystem::path& folder) = 0;
+  // The names of the files in a folder.
+  [[nodiscard]] virtual Result<std::vector<std::string>> list(const std::filesystem::path& folder) = 0;
+  [[nodiscard]] virtual Result<std::unique_ptr<DiskLock>> lock(const std::filesystem::path& file) = 0;
+  // The name of SQLite's virtual file system that keeps its files on this disk; empty: the system's.
+  [[nodiscard]] virtual std::string vfs() const { return {}; }
+};
+
+// The computer's. It has no state.
+[[nodiscard]] Disk& system_disk();
+
+// The folder that a file is in, as sync_folder() wants it.
+[[nodiscard]] std::filesystem::path folder_of(const std::filesystem::path& file);
+
+struct WrittenFile {
+  std::uint64_t size = 0;
+  Digest digest;  // SHA-256 of its bytes
+};
+
+// A file that is there whole or not at all: written beside its place, synced, renamed, its folder synced.
+class DurableFile {
+ public:
+  [[nodiscard]] static Result<DurableFile> begin(Disk& disk, const std::filesystem::path& file);
+  DurableFile(DurableFile&&) noexcept;
+  DurableFile& operator=(DurableFile&&) = delete;
+  ~DurableFile();  // one that was not finished leaves nothing
+
+  [[nodiscard]] Result<void> write(std::string_view piece);
+  [[nodiscard]] Result<WrittenFile> finish();  // once
+
+ private:
+  DurableFile(Disk& disk, std::filesystem::path file) : disk_(&disk), file_(std::move(file)) {}
+  Disk* disk_;
+  std::filesystem::path file_;
+  std::unique_ptr<DiskFile> partial_;
+  Hasher hasher_;
+  std::uint64_t size_ = 0;
+};
+
+// The end of the name of a file that is still being written.
+inline constexpr std::string_view kPartial = ".partial";
+
+// A file's bytes in pieces of 1 MiB.
+[[nodiscard]] Result<WrittenFile> read_in_pieces(Disk& disk, const std::filesystem::path& file,
+                                                 const std::function<Result<void>(std::string_view)>& take);
+
+}  // namespace osteon

@@ -1,0 +1,369 @@
+#include "server/journal/journal.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "common/core/check.hpp"
+#include "server/journal/journal_state.hpp"
+
+namespace osteon {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kCheckpointsKept = 2;
+constexpr std::uint64_t kTidyBytes = std::uint64_t{1} << 20;
+
+fs::path with(const fs::path& file, std::string_view end) { return file.string() + std::string(end); }
+
+// After a failed sync the system may show bytes that are not on the disk, and never write them: not even a later sync
+// does. What a process that died has left in the log is therefore written anew before anything is put behind it.
+Result<void> renew_log(Disk& disk, const fs::path& log) {
+  const auto size = disk.size(log);
+  if (!size) return tl::unexpected(size.error());
+  if (!*size || **size == 0) return {};
+  auto renewed = DurableFile::begin(disk, log);
+  if (!renewed) return tl::unexpected(renewed.error());
+  const auto copied = read_in_pieces(disk, log, [&](std::string_view piece) { return renewed->write(piece); });
+  if (!copied) return tl::unexpected(copied.error());
+  if (const auto finished = renewed->finish(); !finished) return tl::unexpected(finished.error());
+  return {};
+}
+
+// Whatever a process that died was about to write: half a checkpoint, one that was never noted, one that was given up.
+Result<void> clear_leftovers(Disk& disk, const fs::path& file, const std::vector<Checkpoint>& kept) {
+  const auto names = disk.list(folder_of(file));
+  if (!names) return tl::unexpected(names.error());
+  for (const std::string& name : *names) {
+    const auto at = parse_checkpoint_file(file, name);
+    const bool noted = at && std::any_of(kept.begin(), kept.end(), [&](const Checkpoint& c) { return c.at == *at; });
+    if (!(at && !noted) && !is_partial_of(file, name)) continue;
+    if (Result<void> removed = disk.remove(folder_of(file) / name); !removed) return removed;
+  }
+  return {};
+}
+
+}  // namespace
+
+Disk& disk_of(const JournalOptions& options) { return options.disk != nullptr ? *options.disk : system_disk(); }
+
+Result<std::unique_ptr<DiskLock>> take_lock(Disk& disk, const fs::path& file) {
+  return disk.lock(with(file, ".lock")).map_error([&](Error error) {
+    if (error.code == ErrorCode::exists)
+      error.message = file.string() + " is in use by another process; close the room there first";
+    return error;
+  });
+}
+
+Result<void> check_nothing_left(Disk& disk, const fs::path& file) {
+  const auto names = disk.list(folder_of(file));
+  if (!names) return tl::unexpected(names.error());
+  for (const std::string& name : *names) {
+    const fs::path other = folder_of(file) / name;
+    if (name == file.filename())
+      return failure(ErrorCode::exists, "there is a journal " + file.string() + "; open it, or give the new one another name");
+    if (name == log_of(file).filename() || name == failed_of(file).filename() || parse_checkpoint_file(file, name))
+      return failure(ErrorCode::exists, other.string() + " belonged to an earlier journal " + file.string() +
+                                            "; move it away, or give the new one another name");
+  }
+  return {};
+}
+
+Result<void> CheckpointFile::finish() {
+  const auto written = file_.finish();
+  if (!written) return tl::unexpected(written.error());
+  about_.size = written->size;
+  about_.digest = written->digest;
+  finished_ = true;
+  return {};
+}
+
+Journal::Journal(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Journal::Journal(Journal&&) noexcept = default;
+Journal& Journal::operator=(Journal&&) noexcept = default;
+Journal::~Journal() = default;
+
+Result<Journal> Journal::create(const fs::path& file, std::string_view genesis, JournalOptions options) {
+  Disk& disk = disk_of(options);
+  auto lock = take_lock(disk, file);
+  if (!lock) return tl::unexpected(lock.error());
+  if (Result<void> clear = check_nothing_left(disk, file); !clear) return tl::unexpected(clear.error());
+
+  // Made beside its place, so that a journal is there whole or not at all.
+  const fs::path partial = with(file, kPartial);
+  const auto remove_partial = [&] { return disk.remove(partial).and_then([&] { return disk.remove(log_of(partial)); }); };
+  const DatabaseOptions as_made{.create = true, .durable = options.durable, .page_bytes = options.page_bytes};
+  const Result<void> made = remove_partial()
+                                .and_then([&] { return JournalFile::make(partial, genesis, disk, as_made); })
+                                .and_then([&] { return disk.rename(partial, file); })
+                                .and_then([&] { return disk.sync_folder(folder_of(file)); });
+  if (!made) {
+    static_cast<void>(remove_partial());
+    return tl::unexpected(made.error());
+  }
+  return open_locked(file, options, std::move(*lock));
+}
+
+Result<Journal> Journal::open(const fs::path& file, JournalOptions options) {
+  Disk& disk = disk_of(options);
+  // First, so that no lock file is made for a journal that is not there.
+  const auto size = disk.size(file);
+  if (!size) return tl::unexpected(size.error());
+  if (!*size) return failure(ErrorCode::not_found, "there is no journal " + file.string());
+  auto lock = take_lock(disk, file);
+  if (!lock) return tl::unexpected(lock.error());
+  return open_locked(file, options, std::move(*lock));
+}
+
+Result<Journal> Journal::open_locked(const fs::path& file, const JournalOptions& options, std::unique_ptr<DiskLock> lock) {
+  Disk& disk = disk_of(options);
+  if (Result<void> renewed = renew_log(disk, log_of(file)); !renewed) return tl::unexpected(renewed.error());
+  auto opened = JournalFile::open(file, disk, {.durable = options.durable});
+  if (!opened) return tl::unexpected(opened.error());
+  if (opened->version() != kJournalVersion)
+    return failure(ErrorCode::unsupported, file.string() + " is a journal of version " + std::to_string(opened->version()) +
+                                               "; migrate it into a copy of version " + std::to_string(kJournalVersion));
+  Journal journal(std::unique_ptr<State>(new State{file, options, &disk, std::move(lock), std::move(*opened), {}, {}, {}, {}}));
+  State& state = *journal.state_;
+  const Inspection found = state.file.inspect(false);
+  state.head = found.head;
+  if (!found.faults.empty()) {
+    state.closed = Error{ErrorCode::unavailable, found.faults.front()};
+    return journal;
+  }
+  const auto recovered = state.file.find_register(kRecoveredRegister);
+  if (!recovered) return tl::unexpected(recovered.error());
+  if (*recovered) state.recovered_to = RoomSeq{decode_number(**recovered).value_or(0)};
+
+  const auto kept = state.file.checkpoints();
+  if (!kept) return tl::unexpected(kept.error());
+  if (Result<void> cleared = clear_leftovers(disk, file, *kept); !cleared) return tl::unexpected(cleared.error());
+  auto insert = state.file.database().prepare("INSERT INTO rows(place, at_ns, bytes, chain) VALUES(?, ?, ?, ?)");
+  if (!insert) return tl::unexpected(insert.error());
+  state.insert = std::move(*insert);
+  // From here on the end of the file is no longer its footer.
+  if (found.closed_cleanly) {
+    const Result<void> noted = state.file.database().transact(
+        [&] { return state.file.set_register(kFooterRegister, encode_footer({state.head, false})); });
+    if (!noted) return tl::unexpected(noted.error());
+  }
+  return journal;
+}
+
+const Error* Journal::closed_because() const { return state_->closed ? &*state_->closed : nullptr; }
+
+void Journal::close_to_rows(Error reason) {
+  if (!state_->closed) state_->closed = std::move(reason);
+}
+
+const JournalHead& Journal::head() const { return state_->head; }
+const std::string& Journal::genesis() const { return state_->file.genesis(); }
+std::optional<RoomSeq> Journal::recovered_to() const { return state_->recovered_to; }
+
+// Every change goes through here: the first that fails is the last. Whether it reached the disk is then unknown, and what the
+// system shows of the file is not to be trusted, so a note beside the file keeps the next process from going on as well.
+Result<void> Journal::write(const std::function<Result<void>()>& work) {
+  State& state = *state_;
+  if (state.closed) return tl::unexpected(*state.closed);
+  Result<void> done = work();
+  if (done) return done;
+  state.closed = Error{ErrorCode::unavailable, state.path.string() + " takes no more rows, since a write to it failed: " +
+                                                   done.error().message + "; recover it into a new journal"};
+  if (auto note = DurableFile::begin(*state.disk, failed_of(state.path)); note && note->write(state.closed->message))
+    static_cast<void>(note->finish());  // best effort: the disk may take nothing at all
+  return tl::unexpected(*state.closed);
+}
+
+Result<void> Journal::append(std::span<const JournalRow> rows) {
+  State& state = *state_;
+  if (state.closed) return tl::unexpected(*state.closed);
+  for (const JournalRow& row : rows)
+    if (row.bytes.size() > state.options.most_row_bytes)
+      return failure(ErrorCode::invalid_input, state.path.string() + ": row " + std::to_string(row.place.value) + " has " +
+                                                   std::to_string(row.bytes.size()) + " bytes, more than the " +
+                                                   std::to_string(state.options.most_row_bytes) + " that a row may have");
+  JournalHead head = state.head;
+  const Result<void> done = write([&] {
+    return state.file.database().transact([&]() -> Result<void> {
+      for (const JournalRow& row : rows) {
+        OSTEON_CHECK(row.place.value == head.place.value + 1);
+        head = next_head(head, row);
+        Statement& insert = *state.insert;
+        insert.integer(0, static_cast<std::int64_t>(row.place.value)).integer(1, row.at_ns).blob(2, row.bytes);
+        if (Result<void> put = insert.blob(3, as_text(head.chain)).run(); !put) return put;
+      }
+      return {};
+    });
+  });
+  if (!done) return done;
+  state.head = head;
+  // The rows are safe whatever becomes of this.
+  if (state.file.database().log_bytes() > state.options.most_log_bytes) static_cast<void>(tidy());
+  return {};
+}
+
+Result<void> Journal::read(RoomSeq from, const std::function<bool(const JournalRow&)>& take) {
+  State& state = *state_;
+  OSTEON_CHECK(from.value >= 1);
+  if (from > state.head.place) return {};
+  const RoomSeq before{from.value - 1};
+  const auto chain = state.file.chain_at(before);
+  if (!chain) return tl::unexpected(chain.error());
+  const Walk walked = state.file.walk({before, chain->value_or(Digest{})}, state.head.place,
+                                      [&](const JournalRow& row, const JournalHead&) { return take(row); });
+  if (walked.stopped) return tl::unexpected(*walked.stopped);
+  return {};
+}
+
+Result<void> Journal::check_witness(const JournalHead& witness) {
+  State& state = *state_;
+  const std::string place = std::to_string(witness.place.value), file = state.path.string();
+  if (witness.place > state.head.place && state.recovered_to)
+    return failure(ErrorCode::unavailable,
+                   file + " was recovered to place " + std::to_string(state.recovered_to->value) + ", and a client knows " +
+                       place + ": what it knows beyond is lost, it has to join anew");
+  if (witness.place > state.head.place) {
+    close_to_rows({ErrorCode::unavailable, file + " goes to place " + std::to_string(state.head.place.value) +
+                                               ", but a client was told that place " + place +
+                                               " is safe: rows were lost; recover it into a new journal, or go on from a backup"});
+    return tl::unexpected(*state.closed);
+  }
+  const auto chain = state.file.chain_at(witness.place);
+  if (!chain) return tl::unexpected(chain.error());
+  if (*chain == witness.chain) return {};
+  return failure(ErrorCode::invalid_input,
+                 file + " and a client know different histories up to place " + place + "; it has to join anew");
+}
+
+Result<CheckpointFile> Journal::begin_checkpoint(const JournalHead& at, std::string_view meta) {
+  State& state = *state_;
+  if (state.closed) return tl::unexpected(*state.closed);
+  const auto chain = state.file.chain_at(at.place);
+  if (!chain) return tl::unexpected(chain.error());
+  if (at.place > state.head.place || *chain != at.chain)
+    return failure(ErrorCode::invalid_input, state.path.string() + ": a checkpoint at place " + std::to_string(at.place.value) +
+                                                 " is of another history than the journal's");
+  const auto all = checkpoints();
+  if (!all) return tl::unexpected(all.error());
+  if (std::any_of(all->begin(), all->end(), [&](const Checkpoint& c) { return c.at == at; }))
+    return failure(ErrorCode::exists, state.path.string() + " has a checkpoint at place " + std::to_string(at.place.value));
+  auto file = DurableFile::begin(*state.disk, checkpoint_file(state.path, at));
+  if (!file) return tl::unexpected(file.error());
+  return CheckpointFile({at, std::string(meta), 0, {}}, std::move(*file));
+}
+
+Result<void> Journal::add_checkpoint(CheckpointFile file) {
+  State& state = *state_;
+  OSTEON_CHECK(file.finished_);
+  auto all = checkpoints();
+  if (!all) return tl::unexpected(all.error());
+  all->push_back(file.about_);
+  std::sort(all->begin(), all->end(), [](const Checkpoint& a, const Checkpoint& b) { return a.at.place > b.at.place; });
+  const auto kept = static_cast<std::ptrdiff_t>(std::min(kCheckpointsKept, all->size()));
+  const std::vector<Checkpoint> old(all->begin() + kept, all->end());
+  const Result<void> noted = write([&] {
+    return state.file.database().transact([&]() -> Result<void> {
+      Result<void> done = state.file.add_checkpoint(file.about_);
+      for (const Checkpoint& checkpoint : old)
+        if (done)
+          done = state.file.database().run("DELETE FROM checkpoints WHERE place = " + std::to_string(checkpoint.at.place.value));
+      return done;
+    });
+  });
+  if (!noted) return noted;
+  // A file that cannot be removed now is removed when the journal is opened next.
+  for (const Checkpoint& checkpoint : old) static_cast<void>(state.disk->remove(checkpoint_file(state.path, checkpoint.at)));
+  return {};
+}
+
+Result<std::vector<Checkpoint>> Journal::checkpoints() { return state_->file.checkpoints(); }
+
+Result<std::string> Journal::read_checkpoint(const Checkpoint& checkpoint) {
+  const fs::path file = checkpoint_file(state_->path, checkpoint.at);
+  std::string bytes;
+  const auto read = read_in_pieces(*state_->disk, file, [&](std::string_view piece) {
+    bytes += piece;
+    return Result<void>{};
+  });
+  if (!read) return tl::unexpected(read.error());
+  if (read->size == checkpoint.size && read->digest == checkpoint.digest) return bytes;
+  return failure(ErrorCode::invalid_input,
+                 file.string() + " is not what was written; take the checkpoint before it, or all rows");
+}
+
+Result<void> Journal::set_register(std::string_view name, std::string_view value) {
+  OSTEON_CHECK(name != kGenesisRegister && name != kFooterRegister);
+  return write([&] { return state_->file.database().transact([&] { return state_->file.set_register(name, value); }); });
+}
+
+Result<std::optional<std::string>> Journal::find_register(std::string_view name) { return state_->file.find_register(name); }
+
+Result<std::uint64_t> Journal::next_server_epoch() {
+  const auto known = find_register(kEpochRegister);
+  if (!known) return tl::unexpected(known.error());
+  const std::uint64_t next = (*known ? decode_number(**known).value_or(0) : 0) + 1;
+  return set_register(kEpochRegister, encode_number(next)).map([&] { return next; });
+}
+
+Result<void> Journal::set_person(const Person& person) {
+  return write([&] { return state_->file.database().transact([&] { return state_->file.add_person(person); }); });
+}
+
+Result<std::vector<Person>> Journal::people() { return state_->file.people(); }
+
+// A row that is deleted is overwritten, but a copy of it may be left where the tree once moved it to another page. So the
+// whole table is emptied, which overwrites every page that it ever had, and those who stay are written anew; then the log,
+// which has the pages as they were, is cut to nothing.
+Result<std::size_t> Journal::keep_people(const std::function<bool(const Person&)>& kept) {
+  const auto all = people();
+  if (!all) return tl::unexpected(all.error());
+  const auto staying = static_cast<std::size_t>(std::count_if(all->begin(), all->end(), kept));
+  Database& database = state_->file.database();
+  const Result<void> done = write([&] {
+    return database
+        .transact([&]() -> Result<void> {
+          if (Result<void> emptied = database.run("DELETE FROM people"); !emptied) return emptied;
+          for (const Person& person : *all)
+            if (kept(person))
+              if (Result<void> put = state_->file.add_person(person); !put) return put;
+          return {};
+        })
+        .and_then([&] { return database.carry_log(true); });
+  });
+  if (!done) return tl::unexpected(done.error());
+  return all->size() - staying;
+}
+
+Result<std::size_t> Journal::forget_person(std::string_view pseudonym) {
+  return keep_people([&](const Person& person) { return person.pseudonym != pseudonym; });
+}
+
+Result<std::size_t> Journal::forget_people_before(std::int32_t day) {
+  return keep_people([&](const Person& person) { return person.joined_day >= day; });
+}
+
+Result<void> Journal::tidy() {
+  if (state_->file.database().log_bytes() < std::min(kTidyBytes, state_->options.most_log_bytes)) return {};
+  return write([&] { return state_->file.database().carry_log(false); });
+}
+
+Result<void> Journal::close() {
+  State& state = *state_;
+  const auto lock = std::move(state.lock);  // held to the end
+  Disk& disk = *state.disk;
+  const fs::path log = log_of(state.path);
+  Result<void> done;
+  const bool vouched = !state.closed;
+  if (vouched) {
+    Database& database = state.file.database();
+    done = write([&] {
+      return database.transact([&] { return state.file.set_register(kFooterRegister, encode_footer({state.head, true})); })
+          .and_then([&] { return database.carry_log(true); });
+    });
+  }
+  state_.reset();
+  if (vouched && done) static_cast<void>(disk.remove(log));  // which is empty
+  return done;
+}
+
+}  // namespace osteon

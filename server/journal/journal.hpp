@@ -1,0 +1,108 @@
+// The room's journal: rows in one order, each bound by a chain of hashes to all before it, and safe on the disk before
+// append() returns. The recording, the replay, the undo and the evidence of the room are all read from it.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/journal/chain.hpp"
+#include "server/journal/journal_parts.hpp"
+
+namespace osteon {
+
+// A checkpoint being written, piece by piece, on any thread: nothing of the journal itself is touched before
+// Journal::add_checkpoint. One that is dropped leaves nothing.
+class CheckpointFile {
+ public:
+  [[nodiscard]] Result<void> write(std::string_view piece) { return file_.write(piece); }
+  // Syncs the file and gives it its name: this is what takes long.
+  [[nodiscard]] Result<void> finish();
+
+ private:
+  friend class Journal;
+  CheckpointFile(Checkpoint about, DurableFile file) : about_(std::move(about)), file_(std::move(file)) {}
+  Checkpoint about_;
+  DurableFile file_;
+  bool finished_ = false;
+};
+
+// One file, NAME, with SQLite's log NAME-wal, a lock NAME.lock and checkpoints beside it. Not synchronised: one thread at a
+// time, the room's journal thread. What takes rows no more (closed_because) can still be read, backed up and recovered.
+class Journal {
+ public:
+  // Error exists: a journal, or what belonged to one, is there.
+  [[nodiscard]] static Result<Journal> create(const std::filesystem::path& file, std::string_view genesis,
+                                              JournalOptions options = {});
+  // Takes over where the last process left off, however it ended, and confirms every row. Errors: not_found; exists (in use
+  // by another process); unsupported (an older version: migrate_journal; a newer one); invalid_input (damaged so that no row
+  // can be read). Where rows are damaged, or the journal is behind a witness, it opens and is closed to rows.
+  [[nodiscard]] static Result<Journal> open(const std::filesystem::path& file, JournalOptions options = {});
+  Journal(Journal&&) noexcept;
+  Journal& operator=(Journal&&) noexcept;
+  ~Journal();  // without close(): as if the process had been killed
+
+  // Why it takes no more rows, for good: a write that failed, damage, a witness that knows more. Null: it takes rows.
+  [[nodiscard]] const Error* closed_because() const;
+  // Closes it to rows, for a reason of the owner's.
+  void close_to_rows(Error reason);
+
+  // All of them or, after an error, none that was ever reported: safe on the disk when it returns. Places must go on from
+  // head(). Error invalid_input: a row above most_row_bytes, and nothing happens; any other closes the journal to rows.
+  [[nodiscard]] Result<void> append(std::span<const JournalRow> rows);
+  [[nodiscard]] const JournalHead& head() const;
+  [[nodiscard]] const std::string& genesis() const;
+  // Rows from this place on up to the head, held against the chain again, until `take` returns false. Error: the sentence of
+  // the first that does not fit.
+  [[nodiscard]] Result<void> read(RoomSeq from, const std::function<bool(const JournalRow&)>& take);
+
+  // What somebody was told was safe, a client's last acknowledged row, say. Error unavailable: the journal is behind it, and
+  // from now on closed to rows, unless it was recovered with losses (see recovered_to). Error invalid_input: the witness
+  // knows another history.
+  [[nodiscard]] Result<void> check_witness(const JournalHead& witness);
+  // Where it was cut off when it was recovered from a damaged one: what a witness knows beyond is lost for good.
+  [[nodiscard]] std::optional<RoomSeq> recovered_to() const;
+
+  // The room as it was at `at`, not beyond head(). Error exists: there is one of that place; invalid_input: another history.
+  [[nodiscard]] Result<CheckpointFile> begin_checkpoint(const JournalHead& at, std::string_view meta);
+  // Of a finished file. Only the newest two stay.
+  [[nodiscard]] Result<void> add_checkpoint(CheckpointFile file);
+  [[nodiscard]] Result<std::vector<Checkpoint>> checkpoints();  // newest first
+  // Its bytes, held against its digest.
+  [[nodiscard]] Result<std::string> read_checkpoint(const Checkpoint& checkpoint);
+
+  // Small values by name, each safe on the disk when set.
+  [[nodiscard]] Result<void> set_register(std::string_view name, std::string_view value);
+  [[nodiscard]] Result<std::optional<std::string>> find_register(std::string_view name);
+  // Counts the openings of the room; never the same again.
+  [[nodiscard]] Result<std::uint64_t> next_server_epoch();
+
+  // People can be forgotten: then no byte of their labels is left in the journal's files. Copies made before have them.
+  [[nodiscard]] Result<void> set_person(const Person& person);
+  [[nodiscard]] Result<std::vector<Person>> people();
+  [[nodiscard]] Result<std::size_t> forget_person(std::string_view pseudonym);
+  [[nodiscard]] Result<std::size_t> forget_people_before(std::int32_t day);  // who joined before it
+
+  // Carries the log into the file, if it has grown: a few milliseconds and two syncs, for when the room is idle.
+  [[nodiscard]] Result<void> tidy();
+  // Vouches for the head in a footer and carries the log into the file; of a journal that is closed to rows, nothing. The
+  // journal must not be used afterwards.
+  [[nodiscard]] Result<void> close();
+
+ private:
+  friend struct JournalInside;  // for what checks and copies one while it is in use
+  struct State;
+  explicit Journal(std::unique_ptr<State> state);
+  [[nodiscard]] static Result<Journal> open_locked(const std::filesystem::path& file, const JournalOptions& options,
+                                                   std::unique_ptr<DiskLock> lock);
+  [[nodiscard]] Result<void> write(const std::function<Result<void>()>& work);
+  [[nodiscard]] Result<std::size_t> keep_people(const std::function<bool(const Person&)>& kept);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace osteon

@@ -1,0 +1,438 @@
+#include "server/journal/journal_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstring>
+#include <utility>
+
+#include "common/core/check.hpp"
+
+namespace osteon {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kApplication = 0x4f73744a;  // "OstJ"
+constexpr std::string_view kRemedy = "; recover it into a new journal";
+
+// The tables of each version, and how its rows read as those of today. A new version gets an entry of its own, and the
+// older ones columns for what they did not have.
+struct Version {
+  int number;
+  const char* tables;
+  const char* rows;
+};
+
+#define OSTEON_OTHER_TABLES                                                                                             \
+  "CREATE TABLE registers(name TEXT PRIMARY KEY, value BLOB NOT NULL, seal BLOB NOT NULL) STRICT, WITHOUT ROWID;"      \
+  "CREATE TABLE checkpoints(place INTEGER PRIMARY KEY, chain BLOB NOT NULL, meta BLOB NOT NULL, size INTEGER NOT NULL," \
+  " digest BLOB NOT NULL, seal BLOB NOT NULL) STRICT;"                                                                 \
+  "CREATE TABLE people(pseudonym TEXT PRIMARY KEY, label TEXT NOT NULL, joined_day INTEGER NOT NULL,"                  \
+  " seal BLOB NOT NULL) STRICT, WITHOUT ROWID;"
+
+constexpr std::array kVersions{
+    Version{1,
+            "CREATE TABLE rows(place INTEGER PRIMARY KEY, bytes BLOB NOT NULL, chain BLOB NOT NULL) STRICT;" OSTEON_OTHER_TABLES,
+            "SELECT place, 0, bytes, chain FROM rows WHERE place > ? AND place <= ? ORDER BY place"},
+    Version{kJournalVersion,
+            "CREATE TABLE rows(place INTEGER PRIMARY KEY, at_ns INTEGER NOT NULL, bytes BLOB NOT NULL,"
+            " chain BLOB NOT NULL) STRICT;" OSTEON_OTHER_TABLES,
+            "SELECT place, at_ns, bytes, chain FROM rows WHERE place > ? AND place <= ? ORDER BY place"}};
+
+const Version& version_of(int number) {
+  return *std::find_if(kVersions.begin(), kVersions.end(), [&](const Version& v) { return v.number == number; });
+}
+
+std::optional<Digest> digest_of(std::string_view bytes) {
+  Digest digest;
+  if (bytes.size() != digest.bytes.size()) return std::nullopt;
+  std::memcpy(digest.bytes.data(), bytes.data(), bytes.size());
+  return digest;
+}
+
+// What stands beside the chain is confirmed row by row.
+Digest seal_of(const Checkpoint& checkpoint) {
+  Hasher hasher;
+  hasher.text("checkpoint");
+  hasher.integer(checkpoint.at.place.value);
+  hasher.text(as_text(checkpoint.at.chain));
+  hasher.text(checkpoint.meta);
+  hasher.integer(checkpoint.size);
+  hasher.text(as_text(checkpoint.digest));
+  return hasher.finish();
+}
+
+Digest seal_of(const Person& person) {
+  Hasher hasher;
+  hasher.text("person");
+  hasher.text(person.pseudonym);
+  hasher.text(person.label);
+  hasher.integer(static_cast<std::uint64_t>(person.joined_day));
+  return hasher.finish();
+}
+
+Digest seal_of(std::string_view name, std::string_view value) {
+  Hasher hasher;
+  hasher.text("register");
+  hasher.text(name);
+  hasher.text(value);
+  return hasher.finish();
+}
+
+std::uint64_t big_endian_32(std::string_view bytes, std::size_t at) {
+  std::uint64_t value = 0;
+  for (std::size_t i = 0; i < 4; ++i) value = (value << 8) | static_cast<unsigned char>(bytes[at + i]);
+  return value;
+}
+
+// SQLite takes an empty file for a new database, and throws away the log beside it: so the first page is looked at before.
+Result<int> version_in_header(const fs::path& file, Disk& disk) {
+  const auto size = disk.size(file);
+  if (!size) return tl::unexpected(size.error());
+  if (!*size) return failure(ErrorCode::not_found, "there is no journal " + file.string());
+  const Result<std::string> header = disk.read(file, 0, 100);
+  if (!header) return tl::unexpected(header.error());
+  if (header->size() < 100 || header->compare(0, 16, std::string_view("SQLite format 3\0", 16)) != 0 ||
+      big_endian_32(*header, 68) != static_cast<std::uint64_t>(kApplication))
+    return failure(ErrorCode::invalid_input, file.string() + " is no journal, or its first page is damaged");
+  if ((*header)[18] != 2 || (*header)[19] != 2)
+    return failure(ErrorCode::invalid_input, file.string() + " is no journal as its first page says, so that is damaged");
+  const auto version = static_cast<std::int64_t>(big_endian_32(*header, 60));
+  const auto known = std::find_if(kVersions.begin(), kVersions.end(), [&](const Version& v) { return v.number == version; });
+  if (known == kVersions.end())
+    return failure(ErrorCode::unsupported, file.string() + " is a journal of version " + std::to_string(version) +
+                                               ", this program reads up to version " + std::to_string(kJournalVersion) +
+                                               "; open it with the program that made it");
+  return known->number;
+}
+
+}  // namespace
+
+fs::path log_of(const fs::path& journal) { return journal.string() + "-wal"; }
+fs::path failed_of(const fs::path& journal) { return journal.string() + ".failed"; }
+
+fs::path checkpoint_file(const fs::path& journal, const JournalHead& at) {
+  return journal.string() + "-" + std::to_string(at.place.value) + "-" + to_hex(at.chain) + ".checkpoint";
+}
+
+std::optional<JournalHead> parse_checkpoint_file(const fs::path& journal, std::string_view name) {
+  const std::string before = journal.filename().string() + "-";
+  constexpr std::string_view kAfter = ".checkpoint";
+  if (!name.starts_with(before) || !name.ends_with(kAfter)) return std::nullopt;
+  name = name.substr(before.size(), name.size() - before.size() - kAfter.size());
+  JournalHead head;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), head.place.value);
+  if (error != std::errc{} || end == name.data() + name.size() || *end != '-') return std::nullopt;
+  const auto chain = digest_from_hex(name.substr(static_cast<std::size_t>(end - name.data()) + 1));
+  if (!chain) return std::nullopt;
+  head.chain = *chain;
+  return head;
+}
+
+bool is_partial_of(const fs::path& journal, std::string_view name) {
+  if (name == log_of(journal.string() + std::string(kPartial)).filename()) return true;
+  if (!name.ends_with(kPartial)) return false;
+  name.remove_suffix(kPartial.size());
+  return name == journal.filename() || name == log_of(journal).filename() || name == failed_of(journal).filename() ||
+         parse_checkpoint_file(journal, name);
+}
+
+std::string_view as_text(const Digest& digest) {
+  return {reinterpret_cast<const char*>(digest.bytes.data()), digest.bytes.size()};
+}
+
+std::string encode_number(std::uint64_t number) {
+  std::string bytes;
+  for (int i = 0; i < 8; ++i) bytes += static_cast<char>(number >> (8 * i));
+  return bytes;
+}
+
+std::optional<std::uint64_t> decode_number(std::string_view bytes) {
+  if (bytes.size() != 8) return std::nullopt;
+  std::uint64_t number = 0;
+  for (int i = 0; i < 8; ++i) number |= std::uint64_t{static_cast<unsigned char>(bytes[static_cast<std::size_t>(i)])} << (8 * i);
+  return number;
+}
+
+std::string encode_footer(const Footer& footer) {
+  return encode_number(footer.head.place.value) + std::string(as_text(footer.head.chain)) + (footer.clean ? '\1' : '\0');
+}
+
+std::optional<Footer> decode_footer(std::string_view bytes) {
+  if (bytes.size() != 41) return std::nullopt;
+  return Footer{{RoomSeq{*decode_number(bytes.substr(0, 8))}, *digest_of(bytes.substr(8, 32))}, bytes[40] != '\0'};
+}
+
+Result<void> JournalFile::make(const fs::path& file, std::string_view genesis, Disk& disk, const DatabaseOptions& options) {
+  auto database = Database::open(file, disk, options);
+  if (!database) return tl::unexpected(database.error());
+  const Result<std::string> mode = database->text("PRAGMA journal_mode");
+  if (!mode) return tl::unexpected(mode.error());
+  if (*mode != "wal") return failure(ErrorCode::internal, file.string() + ": SQLite cannot keep a write-ahead log here");
+  JournalFile made(file, disk, std::move(*database));
+  const Result<void> done = made.database_.transact([&]() -> Result<void> {
+    return made.database_
+        .run(std::string(version_of(kJournalVersion).tables) + "PRAGMA application_id=" + std::to_string(kApplication) +
+             "; PRAGMA user_version=" + std::to_string(kJournalVersion) + ";")
+        .and_then([&] { return made.set_register(kGenesisRegister, genesis); });
+  });
+  if (!done) return done;
+  return made.database_.carry_log(true);
+}
+
+Result<JournalFile> JournalFile::open(const fs::path& file, Disk& disk, const DatabaseOptions& options) {
+  const Result<int> version = version_in_header(file, disk);
+  if (!version) return tl::unexpected(version.error());
+  auto database = Database::open(file, disk, options);
+  if (!database) return tl::unexpected(database.error());
+  JournalFile opened(file, disk, std::move(*database));
+  opened.version_ = *version;
+  if (Result<void> known = opened.check_tables(); !known) return tl::unexpected(known.error());
+  const auto genesis = opened.find_register(kGenesisRegister);
+  if (!genesis) return tl::unexpected(genesis.error());
+  if (!*genesis)
+    return failure(ErrorCode::invalid_input, file.string() + " has lost its register genesis, so no row of it can be confirmed");
+  opened.genesis_ = **genesis;
+  return opened;
+}
+
+tl::unexpected<Error> JournalFile::damaged(const std::string& what) const {
+  return failure(ErrorCode::invalid_input, file_.string() + ": " + what + " is damaged" + std::string(kRemedy));
+}
+
+// A damaged definition could make SQLite read the right bytes wrongly.
+Result<void> JournalFile::check_tables() {
+  const Result<std::string> tables =
+      database_.text("SELECT group_concat(sql, ';') || ';' FROM (SELECT sql FROM sqlite_schema ORDER BY rowid)");
+  if (!tables) return tl::unexpected(tables.error());
+  const Result<std::int64_t> version = database_.integer("PRAGMA user_version");
+  if (!version) return tl::unexpected(version.error());
+  if (*tables == version_of(version_).tables && *version == version_) return {};
+  return failure(ErrorCode::invalid_input, file_.string() + ": its tables are not those of version " + std::to_string(version_) +
+                                               ", so its first pages are damaged" + std::string(kRemedy));
+}
+
+Walk JournalFile::walk(const JournalHead& before, RoomSeq last,
+                       const std::function<bool(const JournalRow&, const JournalHead&)>& take) {
+  Walk walked{before, std::nullopt};
+  auto statement = database_.prepare(version_of(version_).rows);
+  if (!statement) {
+    walked.stopped = statement.error();
+    return walked;
+  }
+  statement->integer(0, static_cast<std::int64_t>(before.place.value)).integer(1, static_cast<std::int64_t>(last.value));
+  JournalRow row;
+  for (;;) {
+    const Result<bool> more = statement->step();
+    if (!more) {
+      walked.stopped = more.error();
+      walked.stopped->message = "after row " + std::to_string(walked.head.place.value) + ": " + more.error().message;
+      return walked;
+    }
+    if (!*more) return walked;
+    row.place.value = static_cast<std::uint64_t>(statement->integer(0));
+    row.at_ns = statement->integer(1);
+    row.bytes = statement->bytes(2);
+    const JournalHead next = next_head(walked.head, row);
+    if (row.place.value != walked.head.place.value + 1 || statement->bytes(3) != as_text(next.chain)) {
+      walked.stopped = Error{ErrorCode::invalid_input, file_.string() + ": row " + std::to_string(walked.head.place.value + 1) +
+                                                           " does not fit the chain of hashes" + std::string(kRemedy)};
+      return walked;
+    }
+    walked.head = next;
+    if (!take(row, next)) return walked;
+  }
+}
+
+Result<std::optional<Digest>> JournalFile::chain_at(RoomSeq place) {
+  if (place.value == 0) return first_head(genesis_).chain;
+  auto statement = database_.prepare("SELECT chain FROM rows WHERE place = ?");
+  if (!statement) return tl::unexpected(statement.error());
+  const Result<bool> row = statement->integer(0, static_cast<std::int64_t>(place.value)).step();
+  if (!row) return tl::unexpected(row.error());
+  if (!*row) return std::nullopt;
+  return digest_of(statement->bytes(0));
+}
+
+Result<std::vector<Checkpoint>> JournalFile::checkpoints() {
+  std::vector<Checkpoint> all;
+  auto statement = database_.prepare("SELECT place, chain, meta, size, digest, seal FROM checkpoints ORDER BY place DESC");
+  if (!statement) return tl::unexpected(statement.error());
+  for (;;) {
+    const Result<bool> more = statement->step();
+    if (!more) return tl::unexpected(more.error());
+    if (!*more) return all;
+    Checkpoint checkpoint;
+    checkpoint.at.place.value = static_cast<std::uint64_t>(statement->integer(0));
+    const auto chain = digest_of(statement->bytes(1)), digest = digest_of(statement->bytes(4));
+    checkpoint.at.chain = chain.value_or(Digest{});
+    checkpoint.meta = statement->bytes(2);
+    checkpoint.size = static_cast<std::uint64_t>(statement->integer(3));
+    checkpoint.digest = digest.value_or(Digest{});
+    if (!chain || !digest || statement->bytes(5) != as_text(seal_of(checkpoint)))
+      return damaged("the entry of the checkpoint at place " + std::to_string(checkpoint.at.place.value));
+    all.push_back(std::move(checkpoint));
+  }
+}
+
+Result<std::vector<Person>> JournalFile::people() {
+  std::vector<Person> all;
+  auto statement = database_.prepare("SELECT pseudonym, label, joined_day, seal FROM people ORDER BY pseudonym");
+  if (!statement) return tl::unexpected(statement.error());
+  for (;;) {
+    const Result<bool> more = statement->step();
+    if (!more) return tl::unexpected(more.error());
+    if (!*more) return all;
+    Person person{std::string(statement->bytes(0)), std::string(statement->bytes(1)),
+                  static_cast<std::int32_t>(statement->integer(2))};
+    if (statement->bytes(3) != as_text(seal_of(person)))
+      return damaged("an entry of its people");
+    all.push_back(std::move(person));
+  }
+}
+
+Result<std::vector<std::string>> JournalFile::registers() {
+  std::vector<std::string> names;
+  auto statement = database_.prepare("SELECT name FROM registers WHERE name NOT IN ('genesis', 'footer') ORDER BY name");
+  if (!statement) return tl::unexpected(statement.error());
+  for (;;) {
+    const Result<bool> more = statement->step();
+    if (!more) return tl::unexpected(more.error());
+    if (!*more) return names;
+    names.emplace_back(statement->bytes(0));
+  }
+}
+
+Result<std::optional<std::string>> JournalFile::find_register(std::string_view name) {
+  auto statement = database_.prepare("SELECT value, seal FROM registers WHERE name = ?");
+  if (!statement) return tl::unexpected(statement.error());
+  const Result<bool> row = statement->text(0, name).step();
+  if (!row) return tl::unexpected(row.error());
+  if (!*row) return std::nullopt;
+  std::string value(statement->bytes(0));
+  if (statement->bytes(1) != as_text(seal_of(name, value)))
+    return damaged("its register " + std::string(name));
+  return value;
+}
+
+void JournalFile::check_witness(const JournalHead& witness, const std::string& what, Inspection& found) {
+  found.witnessed = std::max(found.witnessed, witness.place);
+  if (witness.place > found.head.place) {
+    found.faults.push_back(file_.string() + " goes to place " + std::to_string(found.head.place.value) + ", but " + what +
+                           " vouches for place " + std::to_string(witness.place.value) + ": rows were lost" +
+                           std::string(kRemedy));
+    return;
+  }
+  const auto chain = chain_at(witness.place);
+  if (!chain) {
+    found.faults.push_back(chain.error().message);
+  } else if (*chain != witness.chain) {
+    found.faults.push_back(file_.string() + ": " + what + " vouches for another history up to place " +
+                           std::to_string(witness.place.value) + std::string(kRemedy));
+  }
+}
+
+Inspection JournalFile::inspect(bool files) {
+  Inspection found;
+  const auto note = [&](const Error& error) { found.faults.push_back(error.message); };
+
+  // Pages first: the rows may all be there and the tree above them be damaged, which the next append would make worse.
+  const Result<std::string> pages = database_.text("PRAGMA quick_check(1)");
+  if (!pages)
+    note(pages.error());
+  else if (*pages != "ok")
+    found.faults.push_back(file_.string() + " is damaged (" + *pages + ")" + std::string(kRemedy));
+
+  const Walk walked = walk(first_head(genesis_), RoomSeq{INT64_MAX}, [](const JournalRow&, const JournalHead&) { return true; });
+  found.head = walked.head;
+  if (walked.stopped) {
+    found.first_bad = RoomSeq{walked.head.place.value + 1};
+    note(*walked.stopped);
+  } else if (const Result<std::int64_t> rows = database_.integer("SELECT count(*) FROM rows"); !rows) {
+    note(rows.error());
+  } else if (static_cast<std::uint64_t>(*rows) != found.head.place.value) {  // some have places below 1
+    found.faults.push_back(file_.string() + " has rows that are in no place of the order" + std::string(kRemedy));
+  }
+
+  if (const auto bytes = find_register(kFooterRegister); !bytes) {
+    note(bytes.error());
+  } else if (*bytes) {
+    const std::optional<Footer> footer = decode_footer(**bytes);
+    if (!footer) {
+      found.faults.push_back(damaged("its footer").value().message);
+    } else {
+      found.closed_cleanly = footer->clean;
+      check_witness(footer->head, "its footer", found);
+      if (footer->clean && footer->head.place < found.head.place)
+        found.faults.push_back(file_.string() + " goes on behind its footer" + std::string(kRemedy));
+    }
+  }
+
+  if (const auto all = checkpoints(); !all) {
+    note(all.error());
+  } else {
+    for (const Checkpoint& checkpoint : *all) {
+      const fs::path file = checkpoint_file(file_, checkpoint.at);
+      check_witness(checkpoint.at, "the checkpoint at place " + std::to_string(checkpoint.at.place.value), found);
+      if (!files) continue;
+      const auto read = read_in_pieces(*disk_, file, [](std::string_view) { return Result<void>{}; });
+      if (!read)
+        note(read.error());
+      else if (read->size != checkpoint.size || read->digest != checkpoint.digest)
+        found.faults.push_back(file.string() + " is not what was written; the checkpoint before it has to serve");
+    }
+  }
+
+  // A checkpoint is written only of rows that are safe: its name alone vouches for them.
+  if (const auto names = disk_->list(folder_of(file_)); !names) {
+    note(names.error());
+  } else {
+    for (const std::string& name : *names)
+      if (const auto at = parse_checkpoint_file(file_, name)) check_witness(*at, "the file " + name, found);
+  }
+
+  if (const auto size = disk_->size(failed_of(file_)); !size) {
+    note(size.error());
+  } else if (*size) {
+    const auto why = disk_->read(failed_of(file_), 0, 4096);
+    found.faults.push_back(why && !why->empty() ? *why : file_.string() + " failed to be written" + std::string(kRemedy));
+  }
+  if (const auto all = people(); !all) note(all.error());
+  if (const auto names = registers(); !names) {
+    note(names.error());
+  } else {
+    for (const std::string& name : *names)
+      if (const auto value = find_register(name); !value) note(value.error());
+  }
+  return found;
+}
+
+Result<void> JournalFile::set_register(std::string_view name, std::string_view value) {
+  auto statement = database_.prepare("INSERT OR REPLACE INTO registers(name, value, seal) VALUES(?, ?, ?)");
+  if (!statement) return tl::unexpected(statement.error());
+  const Digest seal = seal_of(name, value);
+  return statement->text(0, name).blob(1, value).blob(2, as_text(seal)).run();
+}
+
+Result<void> JournalFile::add_checkpoint(const Checkpoint& checkpoint) {
+  auto statement = database_.prepare("INSERT INTO checkpoints(place, chain, meta, size, digest, seal) VALUES(?, ?, ?, ?, ?, ?)");
+  if (!statement) return tl::unexpected(statement.error());
+  const Digest seal = seal_of(checkpoint);
+  return statement->integer(0, static_cast<std::int64_t>(checkpoint.at.place.value))
+      .blob(1, as_text(checkpoint.at.chain))
+      .blob(2, checkpoint.meta)
+      .integer(3, static_cast<std::int64_t>(checkpoint.size))
+      .blob(4, as_text(checkpoint.digest))
+      .blob(5, as_text(seal))
+      .run();
+}
+
+Result<void> JournalFile::add_person(const Person& person) {
+  auto statement = database_.prepare("INSERT OR REPLACE INTO people(pseudonym, label, joined_day, seal) VALUES(?, ?, ?, ?)");
+  if (!statement) return tl::unexpected(statement.error());
+  const Digest seal = seal_of(person);
+  return statement->text(0, person.pseudonym).text(1, person.label).integer(2, person.joined_day).blob(3, as_text(seal)).run();
+}
+
+}  // namespace osteon

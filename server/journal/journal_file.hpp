@@ -1,0 +1,102 @@
+// A journal's tables, as this and every older version of them is read: for the journal itself and for what checks, copies
+// and recovers one. Reading writes nothing.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/journal/chain.hpp"
+#include "server/journal/database.hpp"
+#include "server/journal/disk.hpp"
+#include "server/journal/journal_parts.hpp"
+
+namespace osteon {
+
+// Files beside the journal's own.
+[[nodiscard]] std::filesystem::path log_of(const std::filesystem::path& journal);     // SQLite's write-ahead log
+[[nodiscard]] std::filesystem::path failed_of(const std::filesystem::path& journal);  // says why it takes no more rows
+// Its name is a witness: of the place and the chain there.
+[[nodiscard]] std::filesystem::path checkpoint_file(const std::filesystem::path& journal, const JournalHead& at);
+[[nodiscard]] std::optional<JournalHead> parse_checkpoint_file(const std::filesystem::path& journal, std::string_view name);
+// Whether a name in the journal's folder is of something that is still being written: the journal, its log, a checkpoint.
+[[nodiscard]] bool is_partial_of(const std::filesystem::path& journal, std::string_view name);
+
+// What a file says of itself.
+struct Inspection {
+  JournalHead head;                  // of the last row that the chain confirms
+  std::vector<std::string> faults;   // one sentence each; none: sound
+  std::optional<RoomSeq> first_bad;  // row
+  bool closed_cleanly = false;
+  RoomSeq witnessed;                 // the furthest place that a footer or checkpoint vouches for
+};
+
+struct Walk {
+  JournalHead head;              // of the last row that fitted
+  std::optional<Error> stopped;  // why the next one does not
+};
+
+class JournalFile {
+ public:
+  // Makes the tables in a file of that name. Nothing else may be there.
+  [[nodiscard]] static Result<void> make(const std::filesystem::path& file, std::string_view genesis, Disk& disk,
+                                         const DatabaseOptions& options);
+  // Any version that this program reads. Error invalid_input: no journal, or damaged beyond reading.
+  [[nodiscard]] static Result<JournalFile> open(const std::filesystem::path& file, Disk& disk, const DatabaseOptions& options);
+
+  [[nodiscard]] int version() const { return version_; }
+  [[nodiscard]] const std::string& genesis() const { return genesis_; }
+  [[nodiscard]] Database& database() { return database_; }
+
+  // Rows after `before` up to `last`, each held against the chain, as long as `take` returns true.
+  [[nodiscard]] Walk walk(const JournalHead& before, RoomSeq last,
+                          const std::function<bool(const JournalRow&, const JournalHead&)>& take);
+  [[nodiscard]] Result<std::optional<Digest>> chain_at(RoomSeq place);  // as stored
+  [[nodiscard]] Result<std::vector<Checkpoint>> checkpoints();          // newest first
+  [[nodiscard]] Result<std::vector<Person>> people();
+  [[nodiscard]] Result<std::vector<std::string>> registers();           // their names, the journal's own not
+  [[nodiscard]] Result<std::optional<std::string>> find_register(std::string_view name);
+  // The whole file: its pages, its chain, its witnesses. `files`: the checkpoints' bytes too.
+  [[nodiscard]] Inspection inspect(bool files);
+
+  // Of the current version, within a transaction.
+  [[nodiscard]] Result<void> set_register(std::string_view name, std::string_view value);
+  [[nodiscard]] Result<void> add_checkpoint(const Checkpoint& checkpoint);
+  [[nodiscard]] Result<void> add_person(const Person& person);
+
+ private:
+  JournalFile(std::filesystem::path file, Disk& disk, Database database)
+      : file_(std::move(file)), disk_(&disk), database_(std::move(database)) {}
+  [[nodiscard]] Result<void> check_tables();
+  [[nodiscard]] tl::unexpected<Error> damaged(const std::string& what) const;
+  void check_witness(const JournalHead& witness, const std::string& what, Inspection& found);
+
+  std::filesystem::path file_;
+  Disk* disk_;
+  Database database_;
+  int version_ = 0;
+  std::string genesis_;
+};
+
+inline constexpr std::string_view kGenesisRegister = "genesis", kFooterRegister = "footer", kEpochRegister = "server_epoch",
+                                  kRecoveredRegister = "recovered";
+
+// A head that is kept as a register, with a mark.
+struct Footer {
+  JournalHead head;
+  bool clean = false;
+};
+[[nodiscard]] std::string encode_footer(const Footer& footer);
+[[nodiscard]] std::optional<Footer> decode_footer(std::string_view bytes);
+[[nodiscard]] std::string encode_number(std::uint64_t number);
+[[nodiscard]] std::optional<std::uint64_t> decode_number(std::string_view bytes);
+
+[[nodiscard]] std::string_view as_text(const Digest& digest);
+
+inline constexpr int kJournalVersion = 2;
+
+}  // namespace osteon

@@ -1,0 +1,36 @@
+// What a journal keeps beside its rows.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "server/journal/chain.hpp"
+#include "server/journal/disk.hpp"
+
+namespace osteon {
+
+struct JournalOptions {
+  Disk* disk = nullptr;                                 // null: the computer's; must outlive the journal
+  std::size_t most_row_bytes = std::size_t{64} << 20;
+  std::uint64_t most_log_bytes = std::uint64_t{64} << 20;  // beyond it an append also does what tidy() does
+  int page_bytes = 4096;                                // of a new journal
+  bool durable = true;                                  // false, for tests only: no row is waited for
+};
+
+// The room as it was at one place, in a file of its own: opaque to the journal.
+struct Checkpoint {
+  JournalHead at;
+  std::string meta;  // a few words of the owner's
+  std::uint64_t size = 0;
+  Digest digest;     // SHA-256 of the file's bytes
+};
+
+// Who a pseudonym of the rows is. Apart from the chain, so that a person can be forgotten and the rows still be confirmed.
+struct Person {
+  std::string pseudonym;
+  std::string label;
+  std::int32_t joined_day = 0;  // since 1970-01-01
+  friend bool operator==(const Person&, const Person&) = default;
+};
+
+}  // namespace osteon

@@ -1,0 +1,68 @@
+// What is done to journals as files: checking, backing up, recovering, bringing to today's version. What is read is left as
+// it was, byte by byte; what is written is a new journal, there whole or not at all.
+#pragma once
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/journal/journal.hpp"
+
+namespace osteon {
+
+struct VerifyReport {
+  int version = 0;
+  JournalHead head;                  // of the last row that the chain confirms
+  std::optional<RoomSeq> first_bad;  // row
+  RoomSeq witnessed;                 // the furthest place that a footer or checkpoint vouches for
+  bool closed_cleanly = false;
+  std::vector<std::string> faults;   // one sentence each
+  [[nodiscard]] bool sound() const { return faults.empty(); }
+};
+// Everything: pages, chain, footer, checkpoints and their files. Of any version. Errors: not_found; exists (in use: then the
+// program that uses it has to verify it); invalid_input (nothing of it can be read).
+[[nodiscard]] Result<VerifyReport> verify_journal(const std::filesystem::path& file, Disk* disk = nullptr);
+// Of one in use. It takes as long as reading the whole file.
+[[nodiscard]] Result<VerifyReport> verify_journal(Journal& journal);
+
+// A copy of a journal in use up to its head at begin(), made in slices so that rows can be appended between them. The copy
+// has the same genesis, chain, people, registers and checkpoints. Dropped unfinished, it leaves nothing.
+class JournalCopy {
+ public:
+  // Error exists: something is there. `source` must outlive the copy.
+  [[nodiscard]] static Result<JournalCopy> begin(Journal& source, const std::filesystem::path& to);
+  JournalCopy(JournalCopy&&) noexcept;
+  JournalCopy& operator=(JournalCopy&&) = delete;
+  ~JournalCopy();
+
+  // Copies some more rows. True: all is copied, checked and synced.
+  [[nodiscard]] Result<bool> step(std::size_t most_rows = 1000);
+
+ private:
+  friend struct JournalCopying;
+  struct State;
+  explicit JournalCopy(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+// In one go, of a journal that is not in use. Error invalid_input: it is not sound.
+[[nodiscard]] Result<void> backup_journal(const std::filesystem::path& file, const std::filesystem::path& to,
+                                          Disk* disk = nullptr);
+
+// Into the current version. Errors: exists (it is of that already, or `to` is there); invalid_input (it is not sound).
+[[nodiscard]] Result<void> migrate_journal(const std::filesystem::path& file, const std::filesystem::path& to,
+                                           Disk* disk = nullptr);
+
+struct RecoverReport {
+  JournalHead head;                 // of the new journal
+  RoomSeq witnessed;                // what was vouched for; beyond head: lost
+  std::vector<std::string> faults;  // of the old one
+  [[nodiscard]] std::uint64_t lost() const { return witnessed > head.place ? witnessed.value - head.place.value : 0; }
+};
+// Every row up to the last that the chain confirms, in a new journal that takes rows. `known`: what clients say they were
+// told, to count as witnesses. Error invalid_input: not even its genesis can be read.
+[[nodiscard]] Result<RecoverReport> recover_journal(const std::filesystem::path& file, const std::filesystem::path& to,
+                                                    Disk* disk = nullptr, const std::vector<JournalHead>& known = {});
+
+}  // namespace osteon

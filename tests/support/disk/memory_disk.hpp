@@ -1,0 +1,102 @@
+// A disk in memory that forgets, tears and fails as real ones do, deterministic by its seed: one store both under the files
+// of server/journal/disk.hpp and, as a virtual file system, under SQLite.
+#pragma once
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/journal/disk.hpp"
+
+namespace osteon::test {
+
+// What is written can be read at once, and is lost with the power until it was synced: of the sectors written since, each is
+// then as before, as after, torn between the two, or spoiled. Names made, changed or removed may be forgotten until their
+// folder was synced. After a sync that failed, a sector may look written, never to be written (as Linux does), or be as
+// before. Not synchronised: one thread. Making one also seeds SQLite's generator, which is the process's.
+class MemoryDisk final : public Disk {
+ public:
+  explicit MemoryDisk(std::uint64_t seed, std::size_t sector_bytes = 4096);
+  ~MemoryDisk() override;
+  MemoryDisk(const MemoryDisk&) = delete;
+  MemoryDisk& operator=(const MemoryDisk&) = delete;
+
+  Result<std::unique_ptr<DiskFile>> create(const std::filesystem::path& file) override;
+  Result<std::string> read(const std::filesystem::path& file, std::uint64_t from, std::size_t most) override;
+  Result<std::optional<std::uint64_t>> size(const std::filesystem::path& file) override;
+  Result<void> rename(const std::filesystem::path& from, const std::filesystem::path& to) override;
+  Result<void> remove(const std::filesystem::path& file) override;
+  Result<void> sync_folder(const std::filesystem::path& folder) override;
+  Result<std::vector<std::string>> list(const std::filesystem::path& folder) override;
+  Result<std::unique_ptr<DiskLock>> lock(const std::filesystem::path& file) override;
+  std::string vfs() const override;
+
+  // Faults. They count from now, 1 being the next; `error` is an errno value: EIO, ENOSPC.
+  enum class Lasting { once, from_then_on };
+  void fail_write_at(std::uint64_t n, int error, Lasting lasting = Lasting::once);  // writes, and new, renamed, removed names
+  void fail_sync_at(std::uint64_t n, int error, Lasting lasting = Lasting::once);   // of files and folders
+  // The power fails at the n-th write or sync: that and all later calls fail, reads too, until power_returns().
+  void fail_power_at(std::uint64_t n);
+  // With only what is left of what was not synced. Nobody may have a file open.
+  void power_returns();
+  void mend();  // no fault to come
+  [[nodiscard]] bool has_failed() const { return failed_; }  // since the last mend() or power_returns()
+
+  // Damage, synced at once.
+  void flip_bit(const std::filesystem::path& file, std::uint64_t bit);
+  void cut(const std::filesystem::path& file, std::uint64_t size);
+  void put(const std::filesystem::path& file, std::string bytes);
+  using Image = std::map<std::string, std::string>;  // bytes by path
+  [[nodiscard]] Image image() const;
+  void load(const Image& image);  // instead of all there is, all synced
+
+  struct Counts {
+    std::uint64_t writes = 0, syncs = 0, written_bytes = 0;
+  };
+  [[nodiscard]] const Counts& counts() const { return counts_; }
+
+  struct Sqlite;   // the virtual file system
+  struct Content;  // of a file
+  using Contents = std::shared_ptr<Content>;  // held by its names, and by those who have it open though it was removed
+
+ private:
+  friend struct Sqlite;
+  class OpenFile;
+  class HeldLock;
+  // 0, or the errno value that the call fails with.
+  [[nodiscard]] int before_write();
+  [[nodiscard]] int before_sync();
+  [[nodiscard]] int write_at(Content& content, std::uint64_t from, std::string_view bytes);
+  [[nodiscard]] int truncate(Content& content, std::uint64_t size);
+  [[nodiscard]] int sync(Content& content);
+  [[nodiscard]] int sync_names(const std::string& folder);
+  [[nodiscard]] int change_names(std::vector<std::pair<std::string, Contents>> change);
+  [[nodiscard]] Contents find(const std::string& name) const;
+  void lose_power(Content& content);
+  bool chance(std::uint64_t in) { return random_() % in == 0; }
+
+  std::mt19937_64 random_;
+  std::size_t sector_bytes_;
+  std::map<std::string, Contents> names_, synced_names_;
+  // Not yet synced, oldest first: what these names stand for since (null: nothing), all at once.
+  std::vector<std::vector<std::pair<std::string, Contents>>> changes_;
+  std::map<std::string, std::uint64_t> locks_;
+  std::uint64_t last_lock_ = 0;
+  struct Fault {
+    std::uint64_t at = 0;  // counted down; 0: none
+    int error = 0;
+    Lasting lasting = Lasting::once;
+    int next();
+  };
+  Fault write_fault_, sync_fault_, power_fault_;
+  bool off_ = false, failed_ = false;
+  int open_files_ = 0;
+  int last_error_ = 0;
+  Counts counts_;
+  std::unique_ptr<Sqlite> sqlite_;
+};
+
+}  // namespace osteon::test
