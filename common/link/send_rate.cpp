@@ -1,0 +1,58 @@
+#include "common/link/send_rate.hpp"
+
+#include <cmath>
+
+namespace osteon {
+namespace {
+
+constexpr double kSmoothing_packets = 64.0;
+// A loss is never taken for certain or impossible: the estimate rests on few packets.
+constexpr double kLeastLoss = 0.005, kMostLoss = 0.9;
+
+double seconds(std::chrono::nanoseconds t) { return std::chrono::duration<double>(t).count(); }
+
+}  // namespace
+
+double SendRate::tokens(Time now) const {
+  return std::min(static_cast<double>(params_.burst_bytes), tokens_ + seconds(now - filled_) * params_.bytes_per_s);
+}
+
+SendRate::Time SendRate::next(Time now, Time wanted) const {
+  if (last_ == Time::min()) return now;
+  Time at = std::max(now, last_ + params_.interval);
+  at = std::max(at, std::min(wanted, last_ + params_.idle_interval));
+  const double lacking = static_cast<double>(params_.least_bytes) - tokens(at);
+  if (lacking > 0.0) at += Time(static_cast<std::int64_t>(std::ceil(lacking / params_.bytes_per_s * 1e9)));
+  return at;
+}
+
+std::size_t SendRate::budget(Time now) const {
+  if (next(now, now) > now) return 0;
+  return std::min(kMostDatagramBytes, static_cast<std::size_t>(tokens(now)) - params_.overhead_bytes);
+}
+
+void SendRate::sent(Time now, std::size_t bytes) {
+  tokens_ = tokens(now) - static_cast<double>(bytes + params_.overhead_bytes);
+  filled_ = now;
+  last_ = now;
+}
+
+void SendRate::heard(std::uint64_t newest_counter, std::uint64_t received) {
+  if (newest_counter <= newest_ || received < received_) return;
+  const auto passed = static_cast<double>(newest_counter - newest_);
+  // Packets that were overtaken are counted after the one that overtook them, so a single look may see too many lost or
+  // come; over some of them that evens out.
+  const double share = 1.0 - static_cast<double>(received - received_) / passed;
+  loss_ += (1.0 - std::exp(-passed / kSmoothing_packets)) * (share - loss_);
+  newest_ = newest_counter;
+  received_ = received;
+}
+
+int SendRate::repeats() const {
+  const double p = std::clamp(loss_, kLeastLoss, kMostLoss);
+  const double in_flight = std::max(1.0, seconds(round_trip_) / seconds(params_.interval));
+  const double k = std::ceil(std::log(params_.late_share / in_flight) / std::log(p));
+  return std::clamp(static_cast<int>(k), params_.fewest_repeats, params_.most_repeats);
+}
+
+}  // namespace osteon

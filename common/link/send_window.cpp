@@ -1,0 +1,168 @@
+#include "common/link/send_window.hpp"
+
+#include <algorithm>
+
+#include "common/core/check.hpp"
+
+namespace osteon {
+namespace {
+
+// Packets that an item which counts as lost goes into: once would leave many to be lost again.
+constexpr int kResends = 3;
+
+}  // namespace
+
+const SendWindow::Waiting* SendWindow::find(std::uint64_t number) const {
+  return number >= oldest_ && number < next() ? &waiting_[number - oldest_] : nullptr;
+}
+
+std::optional<std::uint64_t> SendWindow::push(SendItem item) {
+  const bool full = waiting_.size() >= limits_.items || bytes_ + item.bytes.size() > limits_.bytes;
+  if (full && !waiting_.empty()) {
+    ++counts_.refused;
+    return {};
+  }
+  const std::uint64_t number = next();
+  OSTEON_CHECK(item.follows < number);
+  if (Waiting* before = find(item.follows)) {
+    OSTEON_CHECK(before->follower == 0);
+    before->follower = number;
+  }
+  bytes_ += item.bytes.size();
+  waiting_.push_back({std::move(item)});
+  ++unsent_;
+  ++counts_.pushed;
+  return number;
+}
+
+bool SendWindow::acknowledge(std::uint64_t upto, std::uint64_t beyond) {
+  // What was never sent cannot have arrived: an answer that says so is of another window, or wrong.
+  const std::uint64_t fresh = next() - unsent_;
+  if (upto >= fresh) return false;
+  bool news = upto >= oldest_;
+  for (; oldest_ <= upto; ++oldest_) forget_oldest();
+  for (std::uint64_t number = upto + 2; beyond != 0 && number < fresh; ++number, beyond >>= 1) {
+    Waiting* waiting = (beyond & 1) != 0 ? find(number) : nullptr;
+    if (waiting == nullptr || waiting->arrived) continue;
+    waiting->arrived = news = true;
+  }
+  return news;
+}
+
+bool SendWindow::restart(std::uint64_t upto) {
+  if (upto + 1 < oldest_ || upto >= next()) return false;
+  for (; oldest_ <= upto; ++oldest_) forget_oldest();
+  for (Waiting& waiting : waiting_) {
+    waiting.sent = waiting.resend = 0;
+    waiting.arrived = false;
+  }
+  unsent_ = waiting_.size();
+  return true;
+}
+
+void SendWindow::forget_oldest() {
+  bytes_ -= waiting_.front().item.bytes.size();
+  waiting_.pop_front();
+  ++counts_.acknowledged;
+}
+
+SendWindow::Time SendWindow::retransmission_time() const {
+  // The acknowledgement waits for the other end's next packet, and that may be lost too.
+  return round_trip_ + round_trip_ / 8 + std::chrono::milliseconds(24);
+}
+
+// A packet on its way to being full.
+class SendWindow::Filling {
+ public:
+  Filling(SendWindow& window, std::size_t budget) : window_(window), budget_(budget), chosen_(window.waiting_.size()) {}
+
+  // False where the packet has no room for it.
+  bool add(std::uint64_t number) {
+    if (chosen(number)) return true;
+    const Waiting& waiting = *window_.find(number);
+    std::size_t bytes = bytes_ + waiting.item.bytes.size();
+    if (!chosen(waiting.item.follows)) bytes += waiting.item.head.size();
+    if (chosen(waiting.follower)) bytes -= window_.find(waiting.follower)->item.head.size();
+    if (bytes > budget_) return false;
+    bytes_ = bytes;
+    chosen_[number - window_.oldest_] = true;
+    return true;
+  }
+
+  Picked take(Time now) {
+    Picked picked{{}, bytes_};
+    for (std::uint64_t number = window_.oldest_; number < window_.next(); ++number) {
+      if (!chosen(number)) continue;
+      Waiting& waiting = *window_.find(number);
+      ++window_.counts_.sent;
+      if (waiting.sent > 0) {
+        ++window_.counts_.repeated;
+      } else {
+        --window_.unsent_;
+        waiting.first_sent = now;
+      }
+      ++waiting.sent;
+      waiting.resend = std::max(0, waiting.resend - 1);
+      waiting.last_sent = now;
+      picked.numbers.push_back(number);
+    }
+    return picked;
+  }
+
+ private:
+  [[nodiscard]] bool chosen(std::uint64_t number) const {
+    return number >= window_.oldest_ && number < window_.next() && chosen_[number - window_.oldest_];
+  }
+
+  SendWindow& window_;
+  std::size_t budget_;
+  std::vector<bool> chosen_;
+  std::size_t bytes_ = 0;
+};
+
+SendWindow::Picked SendWindow::pick(Time now, std::size_t budget_bytes, int repeats) {
+  if (waiting_.empty()) return {};
+  Filling packet(*this, budget_bytes);
+  // Of what is on its way the oldest has mostly arrived, and is no neighbour of the others: alone it would take a head of its
+  // own in every packet.
+  if (waiting_.front().first_sent + retransmission_time() <= now) packet.add(oldest_);
+  const std::uint64_t fresh = next() - unsent_;
+  for (std::uint64_t number = fresh; number < next(); ++number)
+    if (!packet.add(number)) return packet.take(now);
+  // What was in flight when many packets were lost in a row comes before others' repeats: all that follows waits for it.
+  for (std::uint64_t number = oldest_; number < fresh; ++number) {
+    Waiting& waiting = *find(number);
+    if (waiting.arrived) continue;
+    if (waiting.last_sent + retransmission_time() <= now) waiting.resend = kResends;
+    if (waiting.resend > 0 && !packet.add(number)) return packet.take(now);
+  }
+  // Sent in order, so the least often sent are the last: a packet's items are then neighbours, which share one head.
+  for (std::uint64_t number = fresh; number-- > oldest_;)
+    if (find(number)->sent < repeats && !find(number)->arrived && !packet.add(number)) break;
+  return packet.take(now);
+}
+
+std::optional<SendWindow::Time> SendWindow::next_due(Time now, int repeats) const {
+  if (waiting_.empty()) return {};
+  if (unsent_ > 0) return now;
+  Time due = Time::max();
+  for (const Waiting& waiting : waiting_) {
+    if (waiting.arrived) continue;
+    if (waiting.sent < repeats || waiting.resend > 0) return now;
+    due = std::min(due, waiting.last_sent + retransmission_time());
+  }
+  return std::max(due, now);
+}
+
+const SendItem& SendWindow::item(std::uint64_t number) const {
+  const Waiting* waiting = find(number);
+  OSTEON_CHECK(waiting != nullptr);
+  return waiting->item;
+}
+
+bool SendWindow::needs_head(std::uint64_t number, const Picked& picked) const {
+  const std::uint64_t before = item(number).follows;
+  return before == 0 || !std::ranges::binary_search(picked.numbers, before);
+}
+
+}  // namespace osteon
