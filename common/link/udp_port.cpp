@@ -112,13 +112,14 @@ Endpoint UdpPort::local() const {
   return endpoint_of(socket_->datagrams.local_endpoint(error));
 }
 
-void UdpPort::wait(std::chrono::nanoseconds patience) {
+bool UdpPort::wait(std::chrono::nanoseconds patience) {
   Socket* const socket = socket_.get();
   if (!socket->watched) {
     socket->watched = true;
     socket->datagrams.async_wait(udp::socket::wait_read, [socket](const asio::error_code&) { socket->watched = false; });
   }
-  socket->context.run_one_for(patience);
+  // run_one_for() looks at nothing when its time is over at once.
+  return (patience.count() > 0 ? socket->context.run_one_for(patience) : socket->context.poll_one()) > 0;
 }
 
 void UdpPort::wake() {
@@ -131,7 +132,9 @@ UdpPortCounts UdpPort::counts() const { return {sent_, send_failed_, received_, 
 Result<Endpoint> find_endpoint(const std::string& host, std::uint16_t port) {
   asio::io_context context;
   asio::error_code error;
-  const auto found = udp::resolver(context).resolve(host, std::to_string(port), error);
+  const asio::ip::address numeric = asio::ip::make_address(host, error);
+  if (!error) return endpoint_of({numeric, port});
+  const auto found = udp::resolver(context).resolve(host, std::to_string(port), udp::resolver::numeric_service, error);
   if (error || found.empty())
     return failure(ErrorCode::not_found, "no machine named \"" + host + "\" is known (" + error.message() + "); give its address");
   for (const auto& entry : found)

@@ -34,8 +34,8 @@ class UdpPort final : public DatagramPort {
   void send(const Endpoint& to, std::span<const std::uint8_t> bytes) override;
   [[nodiscard]] std::optional<Datagram> receive(std::span<std::uint8_t> into) override;
   [[nodiscard]] Endpoint local() const override;
-  // Until there may be something to receive, wake() was called, or `patience` is over. By the thread that receives.
-  void wait(std::chrono::nanoseconds patience);
+  // Until there may be something to receive, wake() was called, or `patience` is over: false then. By the thread that receives.
+  bool wait(std::chrono::nanoseconds patience);
   // Ends a wait, the next one if none is under way. Any thread.
   void wake();
   // Any thread.

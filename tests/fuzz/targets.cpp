@@ -6,6 +6,7 @@
 
 #include "common/core/check.hpp"
 #include "common/wire/convert.hpp"
+#include "tests/fuzz/datagram_target.hpp"
 
 namespace osteon::fuzz {
 namespace {
@@ -94,6 +95,7 @@ std::vector<Target> targets() {
           {"look",
            parse_and_convert<v1::Look>,
            {bytes_of(wire::to_wire(Look{{1, 2, 3}, {4, 5, 6}, 0.001, 0.3}).SerializeAsString())}},
+          datagram_target(),
           {"mesh_block", decode_any_block, {a_block().bytes, a_seamed_block().bytes}}};
 }
 
