@@ -30,6 +30,7 @@ struct Cut {
   int level = 0;
   std::vector<QuantisedPose> path;  // at least one pose; the first is the previous cut's last
   std::uint32_t spindle_rpm = 0;
+  std::uint32_t path_us = 0;        // time in which the tool went this way
   friend bool operator==(const Cut&, const Cut&) = default;
 };
 

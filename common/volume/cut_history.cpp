@@ -65,6 +65,14 @@ std::vector<LevelLeaves> CutHistory::redo(CutField& field, std::span<const RoomS
   return rebuild(field, places, false);
 }
 
+void CutHistory::note_undone(std::span<const RoomSeq> places, bool undone) {
+  for (const RoomSeq place : places) {
+    if (!contains(place)) continue;
+    if (undone) undone_.insert(place);
+    else undone_.erase(place);
+  }
+}
+
 // The leaves of a cut are not kept beside it: a leaf lists its cuts already, and a cut's own follow from its path.
 CutHistory::Leaves CutHistory::reached(const CutField& field, const Part& part, RoomSeq place) {
   const Event& event = part.events.at(place);

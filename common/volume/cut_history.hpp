@@ -54,6 +54,8 @@ class CutHistory {
   // in that state already, are passed over. The field must be the one that the events were applied to.
   std::vector<LevelLeaves> undo(CutField& field, std::span<const RoomSeq> places);
   std::vector<LevelLeaves> redo(CutField& field, std::span<const RoomSeq> places);
+  // The same without a field: for one that will be brought as it is after them.
+  void note_undone(std::span<const RoomSeq> places, bool undone);
   [[nodiscard]] const RebuildCost& last_cost() const { return cost_; }
 
  private:

@@ -66,6 +66,7 @@ v1::Cut to_wire(const Cut& cut) {
     for (const std::int16_t r : pose.rotation) knot->add_rotation(r);
   }
   out.set_spindle_rpm(cut.spindle_rpm);
+  out.set_path_us(cut.path_us);
   return out;
 }
 
@@ -146,6 +147,7 @@ Result<Cut> from_wire(const v1::Cut& cut) {
     out.path.push_back(pose);
   }
   out.spindle_rpm = cut.spindle_rpm();
+  out.path_us = cut.path_us();
   return out;
 }
 

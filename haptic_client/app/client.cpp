@@ -51,6 +51,7 @@ struct Committed {
 struct Rejected {
   RoomSeq place;
   std::uint64_t author_seq;
+  std::uint64_t lease_epoch;
   std::string reason;
 };
 struct Noted {
@@ -161,7 +162,9 @@ class Client {
     events.scene = [pass](RoomSeq place, const std::vector<SceneItem>& items) { pass(SceneSet{place, items}); };
     events.tool = [pass](RoomSeq place) { pass(Noted{place}); };
     events.committed = [pass](RoomSeq place, const Cut& cut) { pass(Committed{place, cut}); };
-    events.rejected = [pass](RoomSeq place, std::uint64_t seq, const std::string& why) { pass(Rejected{place, seq, why}); };
+    events.rejected = [pass](RoomSeq place, std::uint64_t seq, std::uint64_t lease, const std::string& why) {
+      pass(Rejected{place, seq, lease, why});
+    };
     events.lost = [this](const Error& why) { give_up(why); };
     room_.open(std::move(events));
   }
@@ -321,10 +324,13 @@ class Client {
   }
   void take(const BonePart& part) {
     replica_.change(part.place, part.bodies, part.leaves);
-    if (part.lease_epoch <= lease_epoch_) return;
-    // What is on its way was cut on the sight of other bone: the room will reject it.
-    lease_epoch_ = part.lease_epoch;
-    replica_.lease(lease_epoch_);
+    follow_lease(part.lease_epoch);
+  }
+  // What is on its way was cut on the sight of other bone: the room will reject it.
+  void follow_lease(std::uint64_t epoch) {
+    if (epoch <= lease_epoch_) return;
+    lease_epoch_ = epoch;
+    replica_.lease(epoch);
   }
   void take(const Noted& noted) { replica_.note(noted.place); }
   void take(const SceneSet& scene) {
@@ -348,7 +354,9 @@ class Client {
   }
   void take(const Rejected& rejected) {
     confirm(rejected.author_seq, RoomSeq{});
-    if (!replica_.reject(rejected.place, rejected.author_seq)) return;  // it had fallen with an undo
+    const bool fell = replica_.reject(rejected.place, rejected.author_seq);
+    follow_lease(rejected.lease_epoch);
+    if (!fell) return;  // it had fallen with an undo, or with one before it
     // One now and then gives its bone back; a room that takes none makes further work pointless.
     constexpr int kMostInARow = 20;
     if (rejected_in_a_row_++ == 0) log::warn("cut rejected", {{"author_seq", rejected.author_seq}, {"reason", rejected.reason}});

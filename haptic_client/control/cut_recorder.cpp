@@ -1,10 +1,13 @@
 #include "haptic_client/control/cut_recorder.hpp"
 
+#include <utility>
+
 #include "common/geometry/segment.hpp"
 
 namespace osteon::haptic {
 
-Cut cut_of(const CutPiece& piece, const ToolModel& model, AuthorId author, std::uint64_t lease_epoch) {
+Cut cut_of(const CutPiece& piece, const ToolModel& model, AuthorId author, std::uint64_t lease_epoch,
+           std::uint32_t tick_us) {
   Cut cut;
   cut.author = author;
   cut.author_seq = piece.author_seq;
@@ -13,6 +16,7 @@ Cut cut_of(const CutPiece& piece, const ToolModel& model, AuthorId author, std::
   cut.level = model.cut_level;
   cut.path.assign(piece.path.begin(), piece.path.begin() + piece.knots);
   cut.spindle_rpm = piece.spindle_rpm;
+  cut.path_us = static_cast<std::uint32_t>(piece.ticks) * tick_us;
   return cut;
 }
 
@@ -22,9 +26,11 @@ void CutRecorder::begin(const Pose& pose_bone_tool, double cutting_length_mm) no
   last_ = quantise(pose_bone_tool);
   poses_[0] = dequantise(last_);
   count_ = 1;
+  ticks_ = 0;
 }
 
 void CutRecorder::add(const Pose& pose_bone_tool) noexcept {
+  ++ticks_;
   // A full buffer keeps its first and newest poses: the caller closes long before.
   if (count_ == kMostPoses) --count_;
   poses_[static_cast<std::size_t>(count_++)] = pose_bone_tool;
@@ -55,6 +61,7 @@ bool CutRecorder::close(CutPiece& piece) noexcept {
   last_ = piece.path[static_cast<std::size_t>(piece.knots - 1)];
   poses_[0] = dequantise(last_);
   count_ = 1;
+  piece.ticks = std::exchange(ticks_, 0);
   return piece.knots > 1;
 }
 

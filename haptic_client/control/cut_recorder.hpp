@@ -17,10 +17,12 @@ struct CutPiece {
   std::array<QuantisedPose, kMostKnots> path{};
   std::uint32_t spindle_rpm = 0;
   std::int64_t closed_tick = 0;
+  int ticks = 0;               // that the path took
 };
 
-// The whole cut; `model`: of the piece's tool.
-[[nodiscard]] Cut cut_of(const CutPiece& piece, const ToolModel& model, AuthorId author, std::uint64_t lease_epoch);
+// The whole cut; `model`: of the piece's tool, `tick_us`: of the loop that made it.
+[[nodiscard]] Cut cut_of(const CutPiece& piece, const ToolModel& model, AuthorId author, std::uint64_t lease_epoch,
+                         std::uint32_t tick_us = 1000);
 
 class CutRecorder {
  public:
@@ -43,7 +45,7 @@ class CutRecorder {
 
   static constexpr int kMostPoses = CutPiece::kMostKnots;
   std::array<Pose, kMostPoses> poses_;
-  int count_ = 0;
+  int count_ = 0, ticks_ = 0;
   bool recording_ = false;
   double cutting_length_mm_ = 0;
   QuantisedPose last_{};

@@ -260,7 +260,7 @@ Result<void> RoomSession::Impl::deliver(const v1::SessionResponse& response) {
     }
     case v1::SessionResponse::kRejected: {
       const v1::RejectedCut& row = response.rejected();
-      if (events.rejected) events.rejected(RoomSeq{row.room_seq()}, row.author_seq(), row.reason());
+      if (events.rejected) events.rejected(RoomSeq{row.room_seq()}, row.author_seq(), row.lease_epoch(), row.reason());
       return {};
     }
     default: return failure(ErrorCode::unsupported, "SessionResponse.message is not known to this client");

@@ -53,7 +53,8 @@ struct RoomEvents {
   std::function<void(const FieldLeaf& leaf)> leaf;
   std::function<void(const RoomAtJoin& room)> complete;
   std::function<void(RoomSeq place, const Cut& cut)> committed;  // of anyone, the caller's own included
-  std::function<void(RoomSeq place, std::uint64_t author_seq, const std::string& reason)> rejected;  // the caller's
+  // The caller's; what he cut on top of it falls too, and `lease_epoch` is that of his lease from now on.
+  std::function<void(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason)> rejected;
   std::function<void(BonePart&& part)> change;
   std::function<void(RoomSeq place, const std::vector<SceneItem>& items)> scene;  // all that stand from now on
   std::function<void(RoomSeq place)> tool;  // one was added

@@ -24,13 +24,16 @@ using namespace osteon;
 constexpr const char* kProgram = "osteon-server";
 constexpr std::chrono::seconds kHealthEvery{10};
 
+// What is asked of a hand over a network. A swept voxel takes about a nanosecond of a core; a cup reamer asks for 2e8.
+constexpr CutLimits kServedLimits{.time_slack = std::chrono::milliseconds(1000), .swept_voxels_per_s = 5e8};
+
 struct Options {
   std::filesystem::path case_folder;
   std::string listen = "127.0.0.1:0";
   std::filesystem::path address_file;
   std::filesystem::path summary_file;
   std::filesystem::path tools_folder;
-  std::filesystem::path save_file, resume_file;
+  std::filesystem::path save_file, resume_file, journal_file;
   Detail detail = Detail::automatic;
 };
 
@@ -110,15 +113,32 @@ Result<Room> make_room(const Options& options, const Case& bone) {
   const std::shared_ptr<ToolBox> tools = builtin_tool_box();  // shared by the room and its fields
   if (!options.tools_folder.empty())
     if (Result<void> loaded = load_tools(options.tools_folder, *tools); !loaded) return tl::unexpected(loaded.error());
-  if (options.resume_file.empty()) return Room(bone, {}, tools);
+  if (options.resume_file.empty()) return Room(bone, kServedLimits, tools);
   const Result<SavedFields> saved = load_fields(options.resume_file);
   if (!saved) return tl::unexpected(saved.error());
-  Result<Room> room = Room::resume(bone, *saved, {}, tools);
+  Result<Room> room = Room::resume(bone, *saved, kServedLimits, tools);
   if (!room) return failure(room.error().code, options.resume_file.string() + ": " + room.error().message);
   log::info("resumed", {{"file", options.resume_file.string()},
                         {"room_seq", saved->room_seq.value},
                         {"bodies", saved->bodies.size()}});
   return room;
+}
+
+// The room that the journal keeps, or a new one in a new journal.
+Result<Room> open_journal(const Options& options, const Case& bone, std::unique_ptr<RoomKeeper>& keeper) {
+  RoomKeeper::Options keeping{.name = options.journal_file.stem().string(), .limits = kServedLimits, .tools = builtin_tool_box(), .journal = {}};
+  if (!options.tools_folder.empty())
+    if (Result<void> loaded = load_tools(options.tools_folder, *keeping.tools); !loaded) return tl::unexpected(loaded.error());
+  Progress progress("journal");
+  Result<KeptRoom> kept = RoomKeeper::open(options.journal_file, bone, keeping, [&](double fraction) { progress.update(fraction); });
+  if (!kept) return tl::unexpected(kept.error());
+  log::info("journal", {{"file", options.journal_file.string()},
+                        {"made", kept->made},
+                        {"room_seq", kept->room.room_seq().value},
+                        {"evaluated", kept->evaluated},
+                        {"server_epoch", kept->keeper->server_epoch()}});
+  keeper = std::move(kept->keeper);
+  return std::move(kept->room);
 }
 
 Result<void> run(const Options& options, const StopSignal& stop) {
@@ -136,7 +156,8 @@ Result<void> run(const Options& options, const StopSignal& stop) {
                      {"volume_mm3", bone->volume_mm3()},
                      {"hash", to_hex(bone->hash())}});
 
-  Result<Room> room = make_room(options, *bone);
+  std::unique_ptr<RoomKeeper> keeper;
+  Result<Room> room = options.journal_file.empty() ? make_room(options, *bone) : open_journal(options, *bone, keeper);
   if (!room) return tl::unexpected(room.error());
 
   RoomServerOptions server_options;
@@ -146,7 +167,8 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   server_options.detail = options.detail;
   Result<std::unique_ptr<RoomServer>> server = [&] {
     Progress progress("surface");
-    return RoomServer::start(std::move(*room), server_options, [&](double fraction) { progress.update(fraction); });
+    return RoomServer::start(std::move(*room), server_options, [&](double fraction) { progress.update(fraction); },
+                             std::move(keeper));
   }();
   if (!server) return tl::unexpected(server.error());
   log::info("listening", {{"address", (*server)->address()},
@@ -181,8 +203,12 @@ int main(int argc, char** argv) {
                  "Folder of tool files (*.yaml, with the STL files they name) that the room knows beside the built-in tools");
   app.add_option("--save", options.save_file,
                  "The cut bone in all its bodies, the scene and added tools (.vdb), written at a clean stop and when a client asks");
-  app.add_option("--resume", options.resume_file,
-                 "What --save wrote: the room goes on from there; what came before cannot be undone");
+  CLI::Option* resume = app.add_option("--resume", options.resume_file,
+                                       "What --save wrote: the room goes on from there; what came before cannot be undone");
+  app.add_option("--journal", options.journal_file,
+                 "Every event of the room, on the disk before anyone is told of it; where the file is there, the room goes on, "
+                 "with all that can be undone")
+      ->excludes(resume);
   const std::map<std::string, Detail> details{{"auto", Detail::automatic}, {"full", Detail::full}, {"near", Detail::near}};
   app.add_option("--detail", options.detail,
                  "full: viewers are sent the whole bone at its own pitch; near: that only where they look and where tools "

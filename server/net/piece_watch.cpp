@@ -29,7 +29,7 @@ std::vector<Separation> PieceWatch::look() {
     const std::unique_lock lock(mutex_);
     changes = room_.take_changes();
     present = room_.bodies();
-    seen = room_.lease_epoch();
+    seen = room_.bone_epoch();
     next_body = room_.next_body().value;
   }
   std::erase_if(bodies_, [&](const auto& entry) { return !std::ranges::binary_search(present, entry.first); });

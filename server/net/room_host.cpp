@@ -4,6 +4,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <deque>
+#include <future>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -14,6 +15,7 @@
 
 #include "common/core/check.hpp"
 #include "common/field/kernel.hpp"
+#include "common/runtime/log.hpp"
 #include "common/runtime/memory_reserve.hpp"
 #include "common/runtime/periodic.hpp"
 #include "common/wire/convert.hpp"
@@ -36,17 +38,25 @@ constexpr std::size_t kLeafBatch = 64;
 // Lock order: room_mutex, then sessions_mutex or that of the surface or the board, then a stream's own, then jobs_mutex.
 // queue_mutex, pieces_mutex and stats_mutex are never held with another.
 struct RoomHost::Impl {
-  Impl(Room r, HostRates rates, Detail detail)
+  Impl(Room r, HostRates rates, Detail detail, Committer::Write write)
       : room(std::move(r)),
         rates_(rates),
-        mesh(room, room_mutex, {rates.mesh, rates.looks}, detail, [this] { return board.tool_tips_mm(); }) {}
+        room_began(Clock::now() - std::chrono::duration_cast<Clock::duration>(room.time())),
+        mesh(room, room_mutex, {rates.mesh, rates.looks}, detail, [this] { return board.tool_tips_mm(); }),
+        committer(std::move(write), [this](const Error& why) { close_room(why); }) {
+    authors = room.authors();
+  }
 
   void run_ticks();
   void run_jobs();
   void run_pieces();
   void decide(QueuedCut& queued);
   void decide(QueuedEvent& queued);
-  void publish(const RoomEvent& event);
+  void later(Committer::Tell tell) { tells.push_back(std::move(tell)); }  // [tick] when what was decided is durable
+  [[nodiscard]] MessageParts rows_of(const RoomEvent& event) const;
+  void close_room(const Error& why);
+  [[nodiscard]] std::optional<Error> closed() const;
+  void end_sessions(const std::string& why);
   void show_scene();
   void read_leaves(std::vector<FieldLeaf>& leaves);
 
@@ -64,6 +74,7 @@ struct RoomHost::Impl {
   std::shared_mutex room_mutex;
   std::optional<std::vector<Cut>> meanwhile;  // under room_mutex: cuts applied since copy_bone() began to copy
   const HostRates rates_;
+  const Clock::time_point room_began;     // the room's time 0, as if it had never been closed
   std::atomic<std::uint64_t> room_seq{0}, authors{0};
   std::atomic<bool> stopping{false};
 
@@ -96,6 +107,8 @@ struct RoomHost::Impl {
 
   std::optional<std::string> ended;       // under sessions_mutex: why new sessions end at once
   std::optional<BoneStatus> last_status;  // of the job thread
+  std::vector<Committer::Tell> tells;     // of the tick thread
+  Committer committer;                    // the last member with a thread: it tells the others
 
   std::thread tick_thread, piece_thread, job_thread;
 };
@@ -114,7 +127,9 @@ void RoomHost::Impl::run_ticks() {
       std::swap(batch, queue);
       queue_closed = last;
     }
+    room.set_time(Clock::now() - room_began);
     for (Queued& queued : batch) std::visit([this](auto& one) { decide(one); }, queued);
+    committer.commit(room.take_rows(), std::exchange(tells, {}));
     const bool decided = !batch.empty();
     batch.clear();
     board.publish(RoomSeq{room_seq});
@@ -136,6 +151,7 @@ void RoomHost::Impl::run_ticks() {
 }
 
 void RoomHost::Impl::decide(QueuedCut& queued) {
+  if (closed()) return later([sink = queued.sink](const Result<void>&) { sink->decided(); });
   Result<Outcome> outcome = [&] {
     const std::unique_lock lock(room_mutex);
     Result<Outcome> decision = room.submit(queued.cut);
@@ -143,62 +159,82 @@ void RoomHost::Impl::decide(QueuedCut& queued) {
     if (meanwhile && decision && decision->committed() && !decision->repeated) meanwhile->push_back(queued.cut);
     return decision;
   }();
-  if (!outcome) {
-    queued.sink->refuse(outcome.error());
-    queued.sink->decided();
-    return;
-  }
-
-  // Published at once, before the next cut is looked at: nobody waits for a timer.
-  v1::SessionResponse response;
-  if (outcome->committed()) {
-    v1::CommittedCut& row = *response.mutable_committed();
-    row.set_room_seq(outcome->room_seq.value);
-    *row.mutable_cut() = wire::to_wire(queued.cut);
-  } else {
-    v1::RejectedCut& row = *response.mutable_rejected();
-    row.set_room_seq(outcome->room_seq.value);
-    row.set_author_seq(queued.cut.author_seq);
-    row.set_reason(std::string(sentence(outcome->rejection)));
-  }
-  const Bytes row = serialised(response);
-  {
-    const std::lock_guard lock(sessions_mutex);
-    if (outcome->repeated)
-      queued.sink->answer(row);
-    else if (outcome->committed())
-      sessions.each([&](SessionSink& sink) { sink.offer(outcome->room_seq, row); });
-    else
-      queued.sink->offer(outcome->room_seq, row);
-  }
-  queued.sink->decided();
+  if (!outcome)
+    return later([sink = queued.sink, why = outcome.error()](const Result<void>&) {
+      sink->refuse(why);
+      sink->decided();
+    });
   if (!outcome->report.changed_leaves.empty()) mesh.changed(queued.arrived);
+  const Bytes row = outcome->committed() ? cut_row(outcome->room_seq, queued.cut)
+                                         : rejection_row(outcome->room_seq, queued.cut.author_seq, outcome->lease_epoch,
+                                                         outcome->rejection);
+  later([this, sink = queued.sink, row, place = outcome->room_seq, repeated = outcome->repeated,
+         to_all = outcome->committed()](const Result<void>& durable) {
+    if (durable) {
+      const std::lock_guard lock(sessions_mutex);
+      if (repeated)
+        sink->answer(row);
+      else if (to_all)
+        sessions.each([&](SessionSink& one) { one.offer(place, row); });
+      else
+        sink->offer(place, row);
+    }
+    sink->decided();
+  });
 }
 
 void RoomHost::Impl::decide(QueuedEvent& queued) {
-  const Result<RoomEvent> event = [&] {
+  Result<RoomEvent> event = [&]() -> Result<RoomEvent> {
+    if (const std::optional<Error> why = closed()) return tl::unexpected(*why);
     const std::unique_lock lock(room_mutex);
     Result<RoomEvent> decision = queued.change(room);
     room_seq = room.room_seq().value;
     return decision;
   }();
-  if (event && event->room_seq) publish(*event);
-  queued.answer(event);
-  if (event && event->bone) mesh.changed(queued.arrived);
+  MessageParts rows;
+  if (event && event->room_seq) {
+    rows = rows_of(*event);
+    event->leaves.clear();
+    if (event->scene || event->bone) show_scene();
+    if (event->bone) mesh.changed(queued.arrived);
+  }
+  later([this, rows = std::move(rows), event = std::move(event), answer = std::move(queued.answer)](const Result<void>& durable) {
+    if (!durable) return answer(tl::unexpected(durable.error()));
+    {
+      const std::lock_guard lock(sessions_mutex);
+      for (const Bytes& row : rows)
+        sessions.each([&](SessionSink& sink) { sink.offer(event->room_seq, row); });
+    }
+    answer(event);
+  });
 }
 
-void RoomHost::Impl::publish(const RoomEvent& event) {
+// [tick] What every session hears of an event that is not a cut. Only this thread changes the room.
+MessageParts RoomHost::Impl::rows_of(const RoomEvent& event) const {
   MessageParts rows;
   if (event.tool) rows.push_back(tool_row(event.room_seq, event.tool->tool));
   if (event.bone) rows = change_rows(event);
-  // Only this thread changes the room.
   if (event.scene) rows.push_back(scene_row(event.room_seq, room.items()));
-  {
-    const std::lock_guard lock(sessions_mutex);
-    for (const Bytes& row : rows)
-      sessions.each([&](SessionSink& sink) { sink.offer(event.room_seq, row); });
-  }
-  if (event.scene || event.bone) show_scene();
+  return rows;
+}
+
+// [committing thread] What was decided since the last transaction will not survive: nobody may build on it.
+void RoomHost::Impl::close_room(const Error& why) {
+  const std::string sentence = "the room takes no more cuts: " + why.message;
+  log::error("journal failed", {{"reason", why.message}});
+  end_sessions(sentence);
+}
+
+std::optional<Error> RoomHost::Impl::closed() const {
+  std::optional<Error> why = committer.failure();
+  if (why) *why = {ErrorCode::unavailable, "the room takes no more cuts: " + why->message};
+  return why;
+}
+
+void RoomHost::Impl::end_sessions(const std::string& why) {
+  const std::lock_guard lock(sessions_mutex);
+  ended = why;
+  sessions.each([&](SessionSink& sink) { sink.end(why); });
 }
 
 // What viewers draw beside the surface.
@@ -218,8 +254,9 @@ void RoomHost::Impl::run_jobs() {
   }
 }
 
-RoomHost::RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress, Detail detail)
-    : impl_(std::make_unique<Impl>(std::move(room), rates, detail)) {
+RoomHost::RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress, Detail detail,
+                   Committer::Write write)
+    : impl_(std::make_unique<Impl>(std::move(room), rates, detail, std::move(write))) {
   impl_->mesh.make_whole_surface(progress);
   impl_->room_seq = impl_->room.room_seq().value;
   impl_->show_scene();
@@ -233,9 +270,9 @@ RoomHost::~RoomHost() { stop(); }
 
 const Case& RoomHost::bone() const { return impl_->room.bone(); }
 RoomSeq RoomHost::room_seq() const { return RoomSeq{impl_->room_seq}; }
-std::uint64_t RoomHost::lease_epoch() const {
+std::uint64_t RoomHost::lease_epoch(AuthorId holder) const {
   const std::shared_lock lock(impl_->room_mutex);
-  return impl_->room.lease_epoch();
+  return impl_->room.lease_epoch(holder);
 }
 const ToolBox& RoomHost::tools() const { return *impl_->room.tools(); }
 std::vector<SceneItem> RoomHost::items() const {
@@ -281,11 +318,21 @@ void RoomHost::run_slowly(std::function<void()> job) {
   impl_->jobs_wake.notify_one();
 }
 
-AuthorId RoomHost::join(MemberKind kind) {
-  const std::unique_lock lock(impl_->room_mutex);
-  const AuthorId author = impl_->room.join(kind);
-  impl_->authors = author.value;
-  return author;
+Result<AuthorId> RoomHost::join(MemberKind kind, std::uint32_t person, const Digest& secret) {
+  std::promise<Result<AuthorId>> answer;
+  queue_event(
+      [&](Room& room) -> Result<RoomEvent> {
+        RoomEvent event;
+        event.kind = EventKind::join;
+        event.author = room.join(kind, person, secret);
+        event.room_seq = room.room_seq();
+        return event;
+      },
+      [this, &answer](const Result<RoomEvent>& event) {
+        if (event) impl_->authors = std::max<std::uint64_t>(impl_->authors, event->author.value);
+        answer.set_value(event ? Result<AuthorId>(event->author) : tl::unexpected(event.error()));
+      });
+  return answer.get_future().get();
 }
 
 Digest RoomHost::surface_hash() const { return impl_->mesh.surface_hash(); }
@@ -458,7 +505,7 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink) {
     before.push_back(scene_row(impl_->room.room_seq(), impl_->room.items()));
     v1::SessionResponse complete;
     complete.mutable_complete()->set_room_seq(impl_->room.room_seq().value);
-    complete.mutable_complete()->set_lease_epoch(impl_->room.lease_epoch());
+    complete.mutable_complete()->set_lease_epoch(impl_->room.lease_epoch(sink->author()));
     for (const BodyId body : impl_->room.bodies()) complete.mutable_complete()->add_bodies(body.value);
     const std::lock_guard lock(impl_->sessions_mutex);
     if (!impl_->open_authors.insert(sink->author()).second)
@@ -509,19 +556,18 @@ void RoomHost::queue_event(std::function<Result<RoomEvent>(Room&)> change,
 }
 
 void RoomHost::end_streams(const std::string& why) {
-  {
-    const std::lock_guard lock(impl_->sessions_mutex);
-    impl_->ended = why;
-    impl_->sessions.each([&](SessionSink& sink) { sink.end(why); });
-  }
+  impl_->end_sessions(why);
   impl_->mesh.end_streams(why);
   impl_->board.end_streams(why);
 }
+
+std::vector<FieldLeaf> RoomHost::all_leaves() const { return impl_->room.all_leaves(); }
 
 void RoomHost::stop() {
   // The last tick may still make blocks due, so the mesh thread ends after it.
   impl_->stopping = true;
   if (impl_->tick_thread.joinable()) impl_->tick_thread.join();
+  impl_->board.stop();
   impl_->mesh.stop();
   {
     const std::lock_guard lock(impl_->pieces_mutex);
@@ -535,6 +581,8 @@ void RoomHost::stop() {
       for (Separation& found : impl_->pieces.look()) (void)impl_->room.split(std::move(found));
     impl_->room_seq = impl_->room.room_seq().value;
     impl_->mesh.update(false);
+    impl_->committer.commit(impl_->room.take_rows(), {});
+    impl_->committer.drain();
   }
   {
     const std::lock_guard lock(impl_->jobs_mutex);

@@ -13,6 +13,7 @@
 #include "common/runtime/tick_stats.hpp"
 #include "common/surface/look.hpp"
 #include "server/net/mesh_room.hpp"
+#include "server/net/committer.hpp"
 #include "server/net/outbox.hpp"
 #include "server/net/state_board.hpp"
 #include "server/net/stream_sink.hpp"
@@ -68,14 +69,16 @@ class RoomHost {
   using Clock = std::chrono::steady_clock;
 
   // Makes the whole surface, then starts the threads. `progress` hears fractions from one thread at a time.
-  RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress, Detail detail = Detail::automatic);
+  // `write` makes rows durable before anyone hears of them; without it nothing is kept.
+  RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress, Detail detail = Detail::automatic,
+           Committer::Write write = {});
   ~RoomHost();
   RoomHost(const RoomHost&) = delete;
   RoomHost& operator=(const RoomHost&) = delete;
 
   [[nodiscard]] const Case& bone() const;
   [[nodiscard]] RoomSeq room_seq() const;
-  [[nodiscard]] std::uint64_t lease_epoch() const;
+  [[nodiscard]] std::uint64_t lease_epoch(AuthorId holder) const;
   [[nodiscard]] bool knows(AuthorId author) const;
   [[nodiscard]] const ToolBox& tools() const;
   [[nodiscard]] std::vector<SceneItem> items() const;
@@ -84,7 +87,9 @@ class RoomHost {
 
   // Runs `job` on the thread for slow requests, in order; it may call the functions below.
   void run_slowly(std::function<void()> job);
-  AuthorId join(MemberKind kind);
+  // Waits until it is durable, so not on the tick or the committing thread. Error unavailable: the room has stopped or
+  // keeps nothing any more.
+  [[nodiscard]] Result<AuthorId> join(MemberKind kind, std::uint32_t person = 0, const Digest& secret = {});
   [[nodiscard]] BoneStatus bone_status();
   void find_pieces();                        // waits until what was cut so far is looked through, and its pieces are bodies
   [[nodiscard]] SavedFields saved_fields();  // of all bodies, at its room_seq
@@ -111,6 +116,7 @@ class RoomHost {
 
   void end_streams(const std::string& why);  // those open now and those that come later
   void stop();                               // joins the threads; what is queued is decided before
+  [[nodiscard]] std::vector<FieldLeaf> all_leaves() const;  // Room::all_leaves(), of one that has stopped
 
  private:
   struct Impl;

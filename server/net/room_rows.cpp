@@ -32,6 +32,23 @@ Bytes block_message(const BlockKey& key, const StoredBlock& block) {
   return serialised(response);
 }
 
+Bytes cut_row(RoomSeq place, const Cut& cut) {
+  v1::SessionResponse response;
+  response.mutable_committed()->set_room_seq(place.value);
+  *response.mutable_committed()->mutable_cut() = wire::to_wire(cut);
+  return serialised(response);
+}
+
+Bytes rejection_row(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, Rejection reason) {
+  v1::SessionResponse response;
+  v1::RejectedCut& row = *response.mutable_rejected();
+  row.set_room_seq(place.value);
+  row.set_author_seq(author_seq);
+  row.set_lease_epoch(lease_epoch);
+  row.set_reason(std::string(sentence(reason)));
+  return serialised(response);
+}
+
 Bytes tool_row(RoomSeq place, const Tool& tool) {
   v1::SessionResponse response;
   response.mutable_tool()->set_room_seq(place.value);

@@ -11,6 +11,8 @@ namespace osteon {
 [[nodiscard]] Bytes block_message(const BlockKey& key, const StoredBlock& block);
 
 // Whole SessionResponses.
+[[nodiscard]] Bytes cut_row(RoomSeq place, const Cut& cut);
+[[nodiscard]] Bytes rejection_row(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, Rejection reason);
 [[nodiscard]] Bytes tool_row(RoomSeq place, const Tool& tool);
 [[nodiscard]] Bytes scene_row(RoomSeq place, const std::vector<SceneItem>& items);
 [[nodiscard]] MessageParts change_rows(const RoomEvent& event);  // at least one; each of a bounded size

@@ -13,6 +13,7 @@
 #include <system_error>
 #include <utility>
 
+#include "common/runtime/log.hpp"
 #include "server/net/services.hpp"
 
 namespace osteon {
@@ -107,12 +108,21 @@ constexpr int kShortestPingMs = 500;               // clients may ask that often
 }  // namespace
 
 struct RoomServer::Impl {
+  std::unique_ptr<RoomKeeper> keeper;  // outlives the host, which writes to it
   std::unique_ptr<RoomHost> host;
   std::vector<std::unique_ptr<grpc::Service>> services;
   std::unique_ptr<grpc::Server> server;
   std::string address;
   bool saves = false;
+  void close_journal();
 };
+
+// Nothing is lost where this fails: the next opening takes longer.
+void RoomServer::Impl::close_journal() {
+  Result<void> done = keeper->checkpoint(host->room_seq(), host->all_leaves());
+  if (done) done = keeper->close();
+  if (!done) log::warn("the journal was not closed cleanly", {{"reason", done.error().message}});
+}
 
 RoomServer::RoomServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
@@ -131,15 +141,19 @@ Result<void> RoomServer::check_listen(const std::string& listen) {
 }
 
 Result<std::unique_ptr<RoomServer>> RoomServer::start(Room room, const RoomServerOptions& options,
-                                                      const std::function<void(double)>& progress) {
+                                                      const std::function<void(double)>& progress,
+                                                      std::unique_ptr<RoomKeeper> keeper) {
   if (Result<void> usable = check_listen(options.listen); !usable) return tl::unexpected(usable.error());
   // What fails is told in one sentence by the caller, not in gRPC's own lines.
   gpr_set_log_function([](gpr_log_func_args*) {});
 
   auto impl = std::make_unique<Impl>();
   impl->saves = !options.save.empty();
-  impl->host = std::make_unique<RoomHost>(std::move(room), options.rates, progress, options.detail);
-  const std::uint64_t epoch = new_server_epoch();
+  Committer::Write write;
+  if (keeper) write = [kept = keeper.get()](std::span<const RoomRow> rows) { return kept->write(rows); };
+  const std::uint64_t epoch = keeper ? keeper->server_epoch() : new_server_epoch();
+  impl->keeper = std::move(keeper);
+  impl->host = std::make_unique<RoomHost>(std::move(room), options.rates, progress, options.detail, std::move(write));
   impl->services.push_back(make_room_service(*impl->host, {options.case_folder, options.save}, epoch));
   impl->services.push_back(make_cutting_service(*impl->host, epoch));
   impl->services.push_back(make_watch_service(*impl->host));
@@ -179,6 +193,7 @@ RoomServerSummary RoomServer::stop() {
   impl_->server->Wait();
   impl_->host->stop();
   impl_->server.reset();
+  if (impl_->keeper) impl_->close_journal();
   return {impl_->host->bone_status(), impl_->host->health(), impl_->saves ? impl_->host->saved_fields() : SavedFields{},
           impl_->host->surface_hash()};
 }

@@ -7,6 +7,7 @@
 
 #include "common/core/result.hpp"
 #include "server/net/room_host.hpp"
+#include "server/net/room_keeper.hpp"
 
 namespace osteon {
 
@@ -31,16 +32,17 @@ class RoomServer {
   [[nodiscard]] static Result<void> check_listen(const std::string& listen);
   // Errors: invalid_input (`listen` is not HOST:PORT, or not of this machine alone), exists (the port is in use),
   // unavailable (the system refuses for another reason, which the message gives).
-  // `progress` hears how far the first surface is.
+  // `progress` hears how far the first surface is. `keeper`: of this room; without one it is lost when the process ends.
   [[nodiscard]] static Result<std::unique_ptr<RoomServer>> start(Room room, const RoomServerOptions& options,
-                                                                 const std::function<void(double)>& progress);
+                                                                 const std::function<void(double)>& progress,
+                                                                 std::unique_ptr<RoomKeeper> keeper = nullptr);
   ~RoomServer();
   RoomServer(const RoomServer&) = delete;
   RoomServer& operator=(const RoomServer&) = delete;
 
   [[nodiscard]] const std::string& address() const;  // HOST:PORT with the real port
   [[nodiscard]] HostHealth health() const;
-  // Ends every stream with a status and joins all threads. Once.
+  // Ends every stream with a status and joins all threads; the journal is closed cleanly, with a checkpoint. Once.
   RoomServerSummary stop();
 
  private:

@@ -266,9 +266,11 @@ class RoomServiceImpl final : public RoomBase {
     const MemberKind kind = request->kind() == v1::CLIENT_KIND_HAPTIC ? MemberKind::surgeon : MemberKind::watcher;
     host_.run_slowly([this, reactor, response, kind] {
       const Case& bone = host_.bone();
-      response->set_author(host_.join(kind).value);
+      const Result<AuthorId> author = host_.join(kind);
+      if (!author) return reactor->Finish(status_of(author.error()));
+      response->set_author(author->value);
       response->set_server_epoch(server_epoch_);
-      response->set_lease_epoch(host_.lease_epoch());
+      response->set_lease_epoch(host_.lease_epoch(*author));
       response->set_case_hash(wire::to_wire(bone.hash()));
       response->set_case_title(bone.info().title);
       response->set_pitch_mm(bone.pitch_mm());

@@ -1,5 +1,6 @@
 #include "server/net/state_board.hpp"
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -7,31 +8,46 @@
 
 namespace osteon {
 
+StateBoard::StateBoard() : thread_([this] { run(); }) {}
+
+void StateBoard::stop() {
+  {
+    const std::lock_guard lock(states_mutex_);
+    end_ = true;
+    wake_.notify_one();
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
 void StateBoard::watch(CuttingSink& sink) {
-  const std::lock_guard lock(mutex_);
-  streams_.add(sink);
-  if (newest_) sink.offer(newest_);
+  const std::lock_guard lock(streams_mutex_);
+  Stream& stream = streams_.emplace_back(Stream{&sink, 0, {}});
+  std::unique_lock states_lock(states_mutex_);
+  const Bytes message = newest_;
+  const std::uint64_t number = number_;
+  states_lock.unlock();
+  if (message) offer(stream, number, message, Clock::now());
   if (ended_) sink.end(*ended_);
 }
 
 void StateBoard::leave(CuttingSink& sink) {
-  const std::lock_guard lock(mutex_);
-  streams_.remove(sink);
+  const std::lock_guard lock(streams_mutex_);
+  std::erase_if(streams_, [&](const Stream& stream) { return stream.sink == &sink; });
 }
 
 void StateBoard::end_streams(const std::string& why) {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(streams_mutex_);
   ended_ = why;
-  streams_.each([&](CuttingSink& sink) { sink.end(why); });
+  for (const Stream& stream : streams_) stream.sink->end(why);
 }
 
 std::size_t StateBoard::streams() const {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(streams_mutex_);
   return streams_.size();
 }
 
 void StateBoard::offer(CuttingState state) {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(states_mutex_);
   Shown& shown = states_[state.author];
   shown = {std::move(state)};
   changed_ = true;
@@ -39,7 +55,7 @@ void StateBoard::offer(CuttingState state) {
 
 // A tool whose hand is gone stands still: readers must not go on sounding and drawing its last moment.
 void StateBoard::session_over(AuthorId author) {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(states_mutex_);
   const auto shown = states_.find(author);
   if (shown == states_.end()) return;
   CuttingState& state = shown->second.state;
@@ -55,26 +71,68 @@ void StateBoard::show(const std::vector<SceneItem>& items, const std::vector<Bod
   v1::WatchCuttingResponse scene;
   for (const SceneItem& item : items) *scene.add_items() = wire::to_wire(item);
   for (const BodyId body : bodies) scene.add_bodies(body.value);
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(states_mutex_);
   scene_ = scene.SerializeAsString();
   changed_ = true;
 }
 
 void StateBoard::publish(RoomSeq room_seq) {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(states_mutex_);
   for (auto& [author, shown] : states_) shown.ticks_over += shown.over ? 1 : 0;
   if (std::erase_if(states_, [](const auto& entry) { return entry.second.ticks_over > kShowIdleTicks; }) > 0) changed_ = true;
-  if (!std::exchange(changed_, false)) return;
-  v1::WatchCuttingResponse response;
-  response.set_room_seq(room_seq.value);
-  for (const auto& [author, shown] : states_) *response.add_states() = wire::to_wire(shown.state);
-  // Two messages of one kind behind each other are one message with the fields of both.
-  newest_ = std::make_shared<const std::string>(response.SerializeAsString() + scene_);
-  streams_.each([&](CuttingSink& sink) { sink.offer(newest_); });
+  if (std::exchange(changed_, false)) {
+    v1::WatchCuttingResponse response;
+    response.set_room_seq(room_seq.value);
+    for (const auto& [author, shown] : states_) *response.add_states() = wire::to_wire(shown.state);
+    // Two messages of one kind behind each other are one message with the fields of both.
+    newest_ = std::make_shared<const std::string>(response.SerializeAsString() + scene_);
+    ++number_;
+    due_ = true;
+  }
+  due_ = due_ || owed_;
+  if (due_) wake_.notify_one();
+}
+
+void StateBoard::run() {
+  std::unique_lock lock(states_mutex_);
+  while (true) {
+    wake_.wait(lock, [&] { return due_ || end_; });
+    if (!std::exchange(due_, false)) return;
+    lock.unlock();
+    tell(Clock::now());
+    lock.lock();
+  }
+}
+
+// Where telling everyone takes longer than a tick, the next round brings the newest and skips what came between.
+void StateBoard::tell(Clock::time_point now) {
+  const std::lock_guard lock(streams_mutex_);
+  std::unique_lock states_lock(states_mutex_);
+  const Bytes message = newest_;
+  const std::uint64_t number = number_;
+  states_lock.unlock();
+  bool owed = false;
+  for (Stream& stream : streams_) {
+    if (stream.told == number) continue;
+    if (now < stream.next)
+      owed = true;
+    else
+      offer(stream, number, message, now);
+  }
+  states_lock.lock();
+  owed_ = owed;
+}
+
+void StateBoard::offer(Stream& stream, std::uint64_t number, const Bytes& message, Clock::time_point now) {
+  stream.told = number;
+  // In steps from the first one on: ticks beside them do not change how many there are.
+  stream.next += stream.sink->apart();
+  if (stream.next < now) stream.next = now + stream.sink->apart();
+  stream.sink->offer(message);
 }
 
 std::vector<Vec3> StateBoard::tool_tips_mm() const {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(states_mutex_);
   std::vector<Vec3> tips_mm;
   for (const auto& [author, shown] : states_)
     if (!shown.over) tips_mm.push_back(shown.state.pose_bone_tool.position_mm);

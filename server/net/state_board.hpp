@@ -1,9 +1,13 @@
-// What viewers and audio clients are shown beside the surface: the newest state of every tool, the scene, the bodies.
+// What viewers and audio clients are shown beside the surface: the newest state of every tool, the scene, the bodies. A
+// thread of its own tells them, so that the room's tick never waits for how many there are.
 #pragma once
+#include <chrono>
+#include <condition_variable>
 #include <map>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "common/core/id.hpp"
@@ -18,24 +22,33 @@ namespace osteon {
 class CuttingSink : public StreamSink {
  public:
   virtual void offer(const Bytes& message) = 0;  // a whole WatchCuttingResponse; newest wins
+  // It wants them no closer together, on average.
+  [[nodiscard]] virtual std::chrono::nanoseconds apart() const { return {}; }
 };
 
-// Any thread may call any function. Its lock is taken by itself or after the room's.
+// Lock order: the room's, then that of the streams, then a stream's own or that of the states.
 class StateBoard {
  public:
+  using Clock = std::chrono::steady_clock;
   // A tool whose session is over is shown idle for so many ticks, so that every reader sees it stop.
   static constexpr std::uint64_t kShowIdleTicks = 1200;
 
-  // The sink is offered the newest message at once, and every later one until it leaves or all streams end.
+  StateBoard();
+  ~StateBoard() { stop(); }
+  StateBoard(const StateBoard&) = delete;
+  StateBoard& operator=(const StateBoard&) = delete;
+  void stop();  // tells what was published, then joins the thread
+
+  // The sink is offered the newest message at once, and later ones until it leaves or all streams end.
   void watch(CuttingSink& sink);
   void leave(CuttingSink& sink);
   void end_streams(const std::string& why);  // those open now and those that come later
   [[nodiscard]] std::size_t streams() const;
 
-  void offer(CuttingState state);    // newest of its author wins
+  void offer(CuttingState state);  // newest of its author wins
   void session_over(AuthorId author);
   void show(const std::vector<SceneItem>& items, const std::vector<BodyId>& bodies);
-  // [tick] What changed since the last call, to everyone.
+  // [tick] What changed since the last call is told from now on, and what is still owed to those who want it seldom.
   void publish(RoomSeq room_seq);
   [[nodiscard]] std::vector<Vec3> tool_tips_mm() const;  // of the tools in a hand
 
@@ -45,13 +58,31 @@ class StateBoard {
     bool over = false;
     std::uint64_t ticks_over = 0;
   };
-  mutable std::mutex mutex_;
-  Audience<CuttingSink> streams_;
-  std::map<AuthorId, Shown> states_;
-  std::string scene_;                // a serialised WatchCuttingResponse of items and bodies alone
-  bool changed_ = false;
-  Bytes newest_;                     // for those who come later
+  struct Stream {
+    CuttingSink* sink;
+    std::uint64_t told;      // the newest message that it was offered
+    Clock::time_point next;  // not before then
+  };
+  void run();
+  void tell(Clock::time_point now);
+  static void offer(Stream& stream, std::uint64_t number, const Bytes& message, Clock::time_point now);
+
+  mutable std::mutex streams_mutex_;
+  std::vector<Stream> streams_;
   std::optional<std::string> ended_;
+
+  mutable std::mutex states_mutex_;
+  std::condition_variable wake_;
+  std::map<AuthorId, Shown> states_;
+  std::string scene_;         // a serialised WatchCuttingResponse of items and bodies alone
+  Bytes newest_;              // message
+  std::uint64_t number_ = 0;  // of the newest message, from 1
+  bool changed_ = false;      // since it was made
+  bool due_ = false;          // to be told
+  bool owed_ = false;         // someone lacks the newest, who wants it later
+  bool end_ = false;
+
+  std::thread thread_;
 };
 
 }  // namespace osteon

@@ -1,6 +1,7 @@
 // What viewers and audio clients subscribe to.
 #include <grpcpp/grpcpp.h>
 
+#include <chrono>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -52,8 +53,9 @@ class MeshStream final : public OutStream<WriteReactor>, public MeshSink {
 
 class CuttingStream final : public OutStream<WriteReactor>, public CuttingSink {
  public:
-  explicit CuttingStream(RoomHost& host) : host_(host) {}
+  CuttingStream(RoomHost& host, std::chrono::nanoseconds apart) : host_(host), apart_(apart) {}
 
+  std::chrono::nanoseconds apart() const override { return apart_; }
   void offer(const Bytes& message) override {
     const std::lock_guard lock(mutex_);
     if (closing()) return;
@@ -75,6 +77,7 @@ class CuttingStream final : public OutStream<WriteReactor>, public CuttingSink {
   void leave() override { host_.leave(*this); }
 
   RoomHost& host_;
+  const std::chrono::nanoseconds apart_;
   Bytes waiting_;
 };
 
@@ -119,7 +122,8 @@ class WatchServiceImpl final : public WatchBase {
     const auto request = parse<v1::WatchCuttingRequest>(*bytes);
     if (!request) return refused(invalid("the WatchCuttingRequest could not be parsed"));
     if (!host_.knows(AuthorId{request->author()})) return refused(not_joined("WatchCuttingRequest", request->author()));
-    CuttingStream* stream = CuttingStream::launch(std::make_shared<CuttingStream>(host_));
+    const std::chrono::nanoseconds apart{request->most_hz() == 0 ? 0 : 1'000'000'000 / request->most_hz()};
+    CuttingStream* stream = CuttingStream::launch(std::make_shared<CuttingStream>(host_, apart));
     host_.watch_cutting(*stream);
     return stream;
   }

@@ -1,15 +1,44 @@
 #include "server/room/room.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 
+#include "common/field/kernel.hpp"
 #include "common/surface/block_source.hpp"
 
 namespace osteon {
 namespace {
 
-// Names a cut's bytes: every field, in the order of the protocol.
+double norm(const QuantisedPose& knot) {
+  double sum = 0;
+  for (const std::int16_t value : knot.rotation) sum += static_cast<double>(value) * value;
+  return std::sqrt(sum) / 32767.0;
+}
+
+// Rounding to steps of 1/32767 moves the norm by less than 1e-4.
+constexpr double kUnitTolerance = 0.01;
+
+// The bound on swept voxels may be overdrawn by what it gives in so long: cuts come in bursts after a bad moment of the net.
+constexpr double kBurst_s = 3.0;
+
+double seconds(std::chrono::nanoseconds time) { return std::chrono::duration<double>(time).count(); }
+
+Digest begun(const Case& bone, const ToolBox& tools) {
+  Hasher hasher;
+  hasher.text("osteon-room-1");
+  hasher.bytes(std::as_bytes(std::span(bone.hash().bytes)));
+  hasher.number(bone.pitch_mm());
+  hasher.integer(kKernelVersion);
+  const auto entries = tools.entries();
+  hasher.integer(entries.size());
+  for (const ToolBox::Entry* entry : entries) hasher.bytes(std::as_bytes(std::span(entry->hash.bytes)));
+  return hasher.finish();
+}
+
+}  // namespace
+
 Digest cut_digest(const Cut& cut) {
   Hasher hasher;
   hasher.integer(cut.author.value);
@@ -25,19 +54,9 @@ Digest cut_digest(const Cut& cut) {
     for (const std::int16_t value : knot.rotation) whole(value);
   }
   hasher.integer(cut.spindle_rpm);
+  hasher.integer(cut.path_us);
   return hasher.finish();
 }
-
-double norm(const QuantisedPose& knot) {
-  double sum = 0;
-  for (const std::int16_t value : knot.rotation) sum += static_cast<double>(value) * value;
-  return std::sqrt(sum) / 32767.0;
-}
-
-// Rounding to steps of 1/32767 moves the norm by less than 1e-4.
-constexpr double kUnitTolerance = 0.01;
-
-}  // namespace
 
 std::string_view sentence(Rejection reason) {
   switch (reason) {
@@ -51,22 +70,51 @@ std::string_view sentence(Rejection reason) {
     case Rejection::place: return "the path leaves the surroundings of the bone";
     case Rejection::sweep: return "the path is longer than one cut may sweep";
     case Rejection::spindle: return "the spindle is faster than any tool turns";
+    case Rejection::time: return "the tool has worked longer than time has passed";
+    case Rejection::rate: return "the tool sweeps more than the room can follow";
+    case Rejection::power: return "the tool takes more bone than any motor can";
   }
   return "the reason is unknown";
 }
 
 Room::Room(Case bone, CutLimits limits, std::shared_ptr<ToolBox> tools)
-    : bone_(std::move(bone)), limits_(limits), tools_(std::move(tools)) {
+    : bone_(std::move(bone)), limits_(limits), tools_(std::move(tools)), genesis_(begun(bone_, *tools_)) {
   bodies_.emplace(BodyId{0}, Body{CutField(bone_, BodyId{0}, tools_), {}, SurfaceBlocks(BodyId{0}), bone_.bounds_samples()});
 }
 
-AuthorId Room::join(MemberKind kind) {
-  const AuthorId author{++authors_};
-  if (kind == MemberKind::surgeon) surgeons_[author];
+RoomRow Room::next_row(AuthorId by, decltype(RoomRow::what) what) {
+  return {RoomSeq{room_seq_.value + 1}, now_, by, std::move(what)};
+}
+
+RoomEvent Room::decide(AuthorId by, decltype(RoomRow::what) what) {
+  RoomRow row = next_row(by, std::move(what));
+  RoomEvent event = apply(row);
+  rows_.push_back(std::move(row));
+  return event;
+}
+
+AuthorId Room::join(MemberKind kind, std::uint32_t person, const Digest& secret) {
+  const AuthorId author{authors_ + 1};
+  decide(author, JoinRow{author, kind, person, secret});
   return author;
 }
 
 bool Room::knows(AuthorId author) const { return author && author.value <= authors_; }
+
+bool Room::proves(AuthorId author, const Digest& secret) const {
+  const auto given = secrets_.find(author);
+  return given != secrets_.end() && given->second == secret;
+}
+
+std::uint64_t Room::lease_epoch(AuthorId holder) const {
+  const auto surgeon = surgeons_.find(holder);
+  return surgeon == surgeons_.end() ? 0 : surgeon->second.epoch;
+}
+
+std::uint64_t Room::decided(AuthorId author) const {
+  const auto surgeon = surgeons_.find(author);
+  return surgeon == surgeons_.end() ? 0 : surgeon->second.decided.size();
+}
 
 Result<Outcome> Room::submit(const Cut& cut) {
   const auto refuse = [&](std::string why) -> Result<Outcome> {
@@ -76,48 +124,47 @@ Result<Outcome> Room::submit(const Cut& cut) {
   const auto surgeon = surgeons_.find(cut.author);
   if (surgeon == surgeons_.end())
     return refuse("cut.author " + std::to_string(cut.author.value) + " has not joined this room to cut");
-  std::vector<Decided>& rows = surgeon->second;
+  const std::vector<Decided>& rows = surgeon->second.decided;
   const std::uint64_t next = rows.size() + 1;
   if (cut.author_seq == 0 || cut.author_seq > next)
     return refuse("cut.author_seq is " + std::to_string(cut.author_seq) + " where " + std::to_string(next) + " comes next");
 
   // What was decided stays decided, so a cut may be sent again after a lost answer.
-  const Digest bytes = cut_digest(cut);
   if (cut.author_seq < next) {
     const Decided& row = rows[cut.author_seq - 1];
-    if (row.bytes != bytes)
+    if (row.bytes != cut_digest(cut))
       return refuse("cut.author_seq " + std::to_string(cut.author_seq) + " was used before for another cut");
     ++counts_.repeated;
-    return Outcome{row.room_seq, row.rejection, true, {}};
+    return Outcome{row.room_seq, row.rejection, true, surgeon->second.epoch, {}};
   }
 
   const Rejection rejection = judge(cut);
-  room_seq_ = RoomSeq{room_seq_.value + 1};
-  rows.push_back({bytes, room_seq_, rejection});
-  if (rejection != Rejection::none) {
-    ++counts_.rejected;
-    return Outcome{room_seq_, rejection, false, {}};
-  }
-  ++counts_.committed;
-  events_[room_seq_] = {.kind = EventKind::cut, .author = cut.author};
-  CutReport report;
-  report.level = cut.level;
-  for (auto& [id, body] : bodies_) {
-    CutReport part = body.field.apply(cut);
-    if (!part.reached_leaves.empty()) body.history.add(room_seq_, cut, part.reached_leaves);
-    if (!body.present) continue;  // nobody sees it, but it may come back
-    report.visited += part.visited;
-    report.computed += part.computed;
-    report.modified += part.modified;
-    report.changed_leaves.insert(report.changed_leaves.end(), part.changed_leaves.begin(), part.changed_leaves.end());
-    if (!part.changed_leaves.empty()) note_changed(id, {{cut.level, std::move(part.changed_leaves)}}, nullptr);
-  }
-  return Outcome{room_seq_, Rejection::none, false, std::move(report)};
+  RoomEvent event = rejection == Rejection::none
+                        ? decide(cut.author, CutRow{cut})
+                        : decide(cut.author, RejectionRow{cut.author, cut.author_seq, cut_digest(cut), rejection});
+  return Outcome{event.room_seq, rejection, false, surgeon->second.epoch, std::move(event.cut)};
+}
+
+void Room::note_decided(AuthorId author, const Digest& bytes, RoomSeq place, Rejection rejection) {
+  surgeons_.at(author).decided.push_back({bytes, place, rejection});
 }
 
 Rejection Room::judge(const Cut& cut) const {
   if (!exists(cut.body)) return Rejection::body;
-  if (cut.lease_epoch != lease_epoch()) return Rejection::lease;
+  const Surgeon& surgeon = surgeons_.at(cut.author);
+  if (cut.lease_epoch != surgeon.epoch) return Rejection::lease;
+  if (const Rejection form = judge_form(cut); form != Rejection::none) return form;
+  if (limits_.time_slack.count() > 0 &&
+      surgeon.claimed + std::chrono::microseconds(cut.path_us) > now_ - surgeon.granted + limits_.time_slack)
+    return Rejection::time;
+  if (limits_.swept_voxels_per_s > 0 &&
+      voxels_spent(surgeon) + swept_voxels(cut) > kBurst_s * limits_.swept_voxels_per_s)
+    return Rejection::rate;
+  return Rejection::none;
+}
+
+// What of a cut depends on no other.
+Rejection Room::judge_form(const Cut& cut) const {
   const ToolBox::Entry* entry = tools_->find(cut.tool);
   if (!entry || !entry->body.cuts()) return Rejection::tool;
   if (cut.level < 0 || cut.level > std::min(entry->tool.cut_level, finest_level(bone().pitch_mm()))) return Rejection::level;
@@ -132,14 +179,34 @@ Rejection Room::judge(const Cut& cut) const {
       if (at_mm < room.min_mm[axis] || at_mm > room.max_mm[axis]) return Rejection::place;
     }
   }
-  // No point of the cutting part goes further than its tip plus the arc of its far end.
+  return swept_mm(cut, *entry) > limits_.swept_mm ? Rejection::sweep : Rejection::none;
+}
+
+// No point of the cutting part goes further than its tip plus the arc of its far end.
+double Room::swept_mm(const Cut& cut, const ToolBox::Entry& tool) const {
   double swept_mm = 0;
   for (std::size_t i = 1; i < cut.path.size(); ++i) {
     const Pose from = dequantise(cut.path[i - 1]), to = dequantise(cut.path[i]);
-    swept_mm += (to.position_mm - from.position_mm).norm() +
-                from.rotation.angularDistance(to.rotation) * entry->body.reach_mm();
+    swept_mm +=
+        (to.position_mm - from.position_mm).norm() + from.rotation.angularDistance(to.rotation) * tool.body.reach_mm();
   }
-  return swept_mm > limits_.swept_mm ? Rejection::sweep : Rejection::none;
+  return swept_mm;
+}
+
+// Samples of its level in the box of the cutting part, drawn out by the way that it goes and grown by the band: at least
+// what the kernel looks at.
+double Room::swept_voxels(const Cut& cut) const {
+  const ToolBox::Entry& tool = *tools_->find(cut.tool);
+  const double pitch_mm = level_pitch_mm(bone().pitch_mm(), cut.level);
+  std::array<double, 3> edge_mm{};
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    edge_mm[axis] = (tool.body.highest[axis] - tool.body.lowest[axis]) * kQuantum_mm + 2 * kBandVoxels * pitch_mm;
+  std::ranges::sort(edge_mm);
+  return (edge_mm[0] + swept_mm(cut, tool)) * edge_mm[1] * edge_mm[2] / (pitch_mm * pitch_mm * pitch_mm);
+}
+
+double Room::voxels_spent(const Surgeon& surgeon) const {
+  return std::max(0.0, surgeon.swept_voxels - seconds(now_ - surgeon.spent) * limits_.swept_voxels_per_s);
 }
 
 std::vector<BlockKey> Room::take_stale_blocks() {

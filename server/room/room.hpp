@@ -1,12 +1,14 @@
 // The room: owns the bone and the scene, puts cuts and all other events in one order, judges them, applies them. A
-// function of what it was given: no clock, thread, log, file or network, so a test runs it on virtual time.
+// function of what it was given: no clock, thread, log, file or network, so a test runs it on virtual time. What it decides
+// are rows (room_row.hpp): applied to a room as it began, in order, they make the same room again.
 #pragma once
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <optional>
 #include <set>
 #include <span>
-#include <string_view>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -21,11 +23,9 @@
 #include "common/volume/field_file.hpp"
 #include "common/volume/fragments.hpp"
 #include "server/room/block_store.hpp"
+#include "server/room/room_row.hpp"
 
 namespace osteon {
-
-// What a client may do here: only a surgeon's cuts are taken.
-enum class MemberKind : std::uint8_t { surgeon, watcher };
 
 // Bounds on a cut, checked before any of it is evaluated.
 struct CutLimits {
@@ -33,32 +33,22 @@ struct CutLimits {
   double beyond_bone_mm = 60.0;     // how far outside the bone's box a tool's tip may be
   double swept_mm = 25.0;           // way of the cutting part in one cut, its turning included
   std::uint32_t spindle_rpm = 120000;
+  // Bounds over time, of one author; none where zero. Time is what set_time() says.
+  std::chrono::nanoseconds time_slack{};   // tool time that may be claimed beyond what passed since joining
+  double swept_voxels_per_s = 0;           // of the cut's level: what the kernel is asked to look at
 };
-
-enum class Rejection : std::uint8_t {
-  none,
-  body,       // no such body
-  lease,      // made under a lease that is over
-  tool,       // not a registered tool, or one that does not cut
-  level,      // finer than the tool or the case allows
-  path,       // no knots or too many
-  rotation,   // a quaternion far from unit
-  place,      // too far from the bone
-  sweep,      // too long a way for one cut
-  spindle,    // faster than any spindle
-};
-[[nodiscard]] std::string_view sentence(Rejection reason);
 
 // A decided cut: its place in the room's order and whether it was applied there.
 struct Outcome {
   RoomSeq room_seq;
   Rejection rejection = Rejection::none;
   bool repeated = false;   // decided before: this is its first outcome
+  std::uint64_t lease_epoch = 0;  // of its author from now on
   CutReport report;        // of an applied cut, of all bodies together
   [[nodiscard]] bool committed() const { return rejection == Rejection::none; }
 };
 
-enum class EventKind : std::uint8_t { cut, split, undo, redo, remove_body, scene, tool };
+enum class EventKind : std::uint8_t { cut, split, undo, redo, remove_body, scene, tool, join, mark };
 
 // A decided event that is not a cut, with what every holder of the bone must take over.
 struct RoomEvent {
@@ -69,11 +59,12 @@ struct RoomEvent {
   bool scene = false;                     // items changed
   std::vector<BodyId> bodies;             // that exist from now on
   std::vector<FieldLeaf> leaves;          // changed ones as they are now, and all of a body that is new
-  std::uint64_t lease_epoch = 0;          // from now on
+  std::uint64_t lease_epoch = 0;          // of every lease that was granted before, from now on; 0: as they were
   const ToolBox::Entry* tool = nullptr;   // one that was added
   std::uint32_t item = 0;                 // one that was set or taken out
   std::optional<Placed> set;              // as it stands now, where it was set
   std::vector<RoomSeq> places;            // undo, redo: of the events taken back or done again, oldest first
+  CutReport cut;                          // of all bodies together
 };
 
 // What has come apart from a body. `fields`: for each piece that is no debris, in order, the field that it will have, made
@@ -82,7 +73,7 @@ struct RoomEvent {
 struct Separation {
   BodyId parent;
   std::vector<Fragment> fragments;
-  std::uint64_t seen = 0;        // lease_epoch() when it was looked for
+  std::uint64_t seen = 0;        // bone_epoch() when it was looked for
   std::vector<CutField> fields = {};
 };
 
@@ -100,7 +91,7 @@ struct RoomCounts {
   std::uint64_t refused = 0;  // breaches that got no place in the order
 };
 
-inline constexpr std::size_t kMostItems = 256, kMostTools = 1024, kMostBodies = 64;
+inline constexpr std::size_t kMostItems = 256, kMostTools = 1024, kMostBodies = 64, kMostLabelBytes = 256, kMostMarks = 4096;
 
 // Every body holds every cut, those that were taken away too: all bodies share the case's lattice and frame, a piece has
 // all but itself taken away, and a cut is applied to each of them, so the server, every replica and the undo of a split need
@@ -113,12 +104,24 @@ class Room {
   static Result<Room> resume(Case bone, const SavedFields& saved, CutLimits limits = {},
                              std::shared_ptr<ToolBox> tools = builtin_tool_box());
 
+  // The time of what is decided from now on, since the room was made; never falls.
+  void set_time(std::chrono::nanoseconds now) { now_ = std::max(now_, now); }
+  [[nodiscard]] std::chrono::nanoseconds time() const { return now_; }
+
   // A new identity, never given twice.
-  AuthorId join(MemberKind kind);
+  AuthorId join(MemberKind kind, std::uint32_t person = 0, const Digest& secret = {});
   [[nodiscard]] bool knows(AuthorId author) const;
+  [[nodiscard]] std::uint64_t authors() const { return authors_; }  // so many have joined
   [[nodiscard]] bool may_cut(AuthorId author) const { return surgeons_.contains(author); }
-  // Rises with every undo and redo: what was cut on the sight of bone that has come back is void.
-  [[nodiscard]] std::uint64_t lease_epoch() const { return lease_epoch_; }
+  // Rises when bone comes back (undo, redo), for everyone, and with a rejection for its author: what was cut on the sight
+  // of what is not there is void. Cuts are taken under the present one only. 0: no such surgeon.
+  [[nodiscard]] std::uint64_t lease_epoch(AuthorId holder) const;
+  // The secret that the author was given is the one of which this is the digest.
+  [[nodiscard]] bool proves(AuthorId author, const Digest& secret) const;
+  // Newest author_seq that was decided.
+  [[nodiscard]] std::uint64_t decided(AuthorId author) const;
+  // Rises with every undo and redo that changes the bone: what was seen of it before is of another bone.
+  [[nodiscard]] std::uint64_t bone_epoch() const { return bone_epoch_; }
 
   // Gives the cut its place and applies it to every body. Error invalid_input, without a place in the order: an author
   // that may not cut, a gap in author_seq, or a number that was decided with other bytes.
@@ -131,17 +134,35 @@ class Room {
   // a body that it had reached, and what was done to the piece as such; cuts made since stay in the bone.
   Result<RoomEvent> undo(AuthorId by, std::span<const RoomSeq> places);
   Result<RoomEvent> undo_last(AuthorId by, std::size_t count, AuthorId of);
+  Result<RoomEvent> undo_to(AuthorId by, RoomSeq mark);         // all that came after it
   Result<RoomEvent> redo_last(AuthorId by, std::size_t count);  // the newest undo events that still stand
+  Result<RoomEvent> mark(AuthorId by, std::string label);       // of 1 to kMostLabelBytes bytes
   Result<RoomEvent> remove_body(AuthorId by, BodyId body);
   // By the rules of common/tools/scene.hpp, which also say whether it is seated. id 0: a new one.
   Result<RoomEvent> set_item(AuthorId by, SceneItem item, const Placing& placing = {});
   Result<RoomEvent> remove_item(AuthorId by, std::uint32_t item);  // not a guide that pins fix
-  // What a FragmentFinder has found in `parent`; `seen`: the lease_epoch() when it looked.
+  // What a FragmentFinder has found in `parent`; `seen`: the bone_epoch() when it looked.
   Result<RoomEvent> split(BodyId parent, std::vector<Fragment> fragments, std::uint64_t seen) {
     return split({parent, std::move(fragments), seen});
   }
   Result<RoomEvent> split(Separation found);
   [[nodiscard]] BodyId next_body() const { return BodyId{last_body_ + 1}; }
+
+  // What was decided since the last call, in order: for the journal, before anyone is told.
+  [[nodiscard]] std::vector<RoomRow> take_rows() { return std::exchange(rows_, {}); }
+  // The next row of a room that began as this one did. Judges nothing; take_rows() does not give it again. `fields` leave:
+  // cuts are noted but not evaluated, until set_fields() brings what they have made. Error invalid_input: not the next
+  // row, or one that cannot follow what is here.
+  enum class Fields : bool { evaluate, leave };
+  Result<void> replay(const RoomRow& row, Fields fields = Fields::evaluate);
+  // The leaves of all bodies, those that were taken away too, as they were at room_seq(): what all_leaves() gave.
+  Result<void> set_fields(std::span<const FieldLeaf> leaves);
+  [[nodiscard]] std::vector<FieldLeaf> all_leaves() const;
+  // What began here: case, pitch, kernel version, tools.
+  [[nodiscard]] const Digest& genesis() const { return genesis_; }
+  // Names all of the room: rooms of one hash go on alike.
+  [[nodiscard]] Digest room_hash() const;
+  [[nodiscard]] std::vector<std::pair<RoomSeq, std::string>> marks() const;
 
   [[nodiscard]] RoomSeq room_seq() const { return room_seq_; }
   [[nodiscard]] const RoomCounts& counts() const { return counts_; }
@@ -176,6 +197,13 @@ class Room {
     RoomSeq room_seq;
     Rejection rejection = Rejection::none;
   };
+  struct Surgeon {
+    std::uint64_t epoch = 1;                 // of the lease
+    std::chrono::nanoseconds granted{}, claimed{};  // when, and tool time of its cuts since
+    double swept_voxels = 0;                 // spent of the bound, at `spent`
+    std::chrono::nanoseconds spent{};
+    std::vector<Decided> decided;            // row author_seq − 1
+  };
   struct Body {
     CutField field;
     CutHistory history;
@@ -183,60 +211,84 @@ class Room {
     CoordBox reach;       // samples of level 0 that its bone was in when it came to be
     bool present = true;  // false: taken away
   };
-  // One piece of a split, or debris.
-  struct Piece {
-    BodyId body;  // of debris null
-    CoordBox reach;
-    Mask left;
-  };
   struct Event {
     EventKind kind = EventKind::cut;
     AuthorId author{};
     bool undone = false;
     BodyId body{};                      // split: its parent; remove_body
     Mask taken = {};                    // split
-    std::vector<Piece> pieces = {};
+    std::vector<SplitPiece> pieces = {};
     std::uint32_t item = 0;             // scene
     std::vector<RoomSeq> places = {};   // undo
+    std::string label = {};             // mark
   };
   // What an item was set to; nothing: taken out.
-  struct ItemRow {
+  struct ItemState {
     RoomSeq place;
     std::optional<SceneItem> item;
   };
 
   [[nodiscard]] Rejection judge(const Cut& cut) const;
+  [[nodiscard]] Rejection judge_form(const Cut& cut) const;
+  [[nodiscard]] double swept_mm(const Cut& cut, const ToolBox::Entry& tool) const;
+  [[nodiscard]] double swept_voxels(const Cut& cut) const;
+  [[nodiscard]] double voxels_spent(const Surgeon& surgeon) const;
   [[nodiscard]] Result<void> check_member(AuthorId by) const;
   [[nodiscard]] bool exists(BodyId body) const;
   [[nodiscard]] std::vector<Standing> with_tools(const std::vector<SceneItem>& items) const;
-  Result<void> know(const Tool& tool);
   [[nodiscard]] std::set<RoomSeq> with_what_falls_too(std::set<RoomSeq> places) const;
-  RoomEvent begin_event(EventKind kind, AuthorId by, Event row);
+  // Deciding: a row with the next place. Applying it is the same for one just decided and for one of a journal.
+  RoomRow next_row(AuthorId by, decltype(RoomRow::what) what);
+  RoomEvent decide(AuthorId by, decltype(RoomRow::what) what);
+  [[nodiscard]] Result<void> can_follow(const RoomRow& row) const;
+  RoomEvent apply(const RoomRow& row);
+  void apply(const RoomRow& row, const JoinRow& join, RoomEvent& event);
+  void apply(const RoomRow& row, const CutRow& cut, RoomEvent& event);
+  void apply(const RoomRow& row, const RejectionRow& rejection, RoomEvent& event);
+  void apply(const RoomRow& row, const SplitRow& split, RoomEvent& event);
+  void apply(const RoomRow& row, const UndoRow& undo, RoomEvent& event);
+  void apply(const RoomRow& row, const RedoRow& redo, RoomEvent& event);
+  void apply(const RoomRow& row, const RemoveBodyRow& removal, RoomEvent& event);
+  void apply(const RoomRow& row, const ItemRow& item, RoomEvent& event);
+  void apply(const RoomRow& row, const ToolRow& tool, RoomEvent& event);
+  void apply(const RoomRow& row, const MarkRow& mark, RoomEvent& event);
+  void bone_came_back(RoomEvent& event);
+  void grant(Surgeon& surgeon);
+  Event& add_event(const RoomRow& row, EventKind kind);
   void finish_event(RoomEvent& event) const;  // says what exists after it
+  void note_decided(AuthorId author, const Digest& bytes, RoomSeq place, Rejection rejection);
   void note_changed(BodyId body, const std::vector<LevelLeaves>& changed, RoomEvent* event);
   void add_body(BodyId id, CutField field, CutHistory history, const CoordBox& reach);
   void show_whole(BodyId body, RoomEvent& event);
   [[nodiscard]] std::set<BlockKey> focused(Body& body) const;  // what its focus makes stale
-  [[nodiscard]] CutField made_piece(const Body& parent, const Piece& piece) const;
+  [[nodiscard]] CutField made_piece(const Body& parent, const SplitPiece& piece) const;
   void catch_up(const Body& parent, CutField& field) const;
-  void cut_apart(RoomSeq place, Event& row, RoomEvent& event, std::vector<CutField> fields = {});
+  void cut_apart(RoomSeq place, Event& row, RoomEvent& event);
   void list_blocks(BodyId id, const Body& body, std::vector<BlockKey>& keys) const;
-  RoomEvent take_back(AuthorId by, const std::set<RoomSeq>& falls);
+  [[nodiscard]] Result<void> know(const Tool& tool) const;
+  [[nodiscard]] bool can_be_undone(RoomSeq place) const;
+  RoomEvent take_back(AuthorId by, std::set<RoomSeq> places);
 
   Case bone_;
   CutLimits limits_;
   std::shared_ptr<ToolBox> tools_;  // shared with the fields and, beyond the room, with those that list tools
   std::map<BodyId, Body> bodies_;
   std::uint32_t last_body_ = 0, last_item_ = 0;
-  std::map<std::uint32_t, std::vector<ItemRow>> items_;  // rows in order
+  std::map<std::uint32_t, std::vector<ItemState>> items_;  // rows in order
   std::map<RoomSeq, Event> events_;                      // committed ones, tombstones included
   std::vector<Focus> focuses_;
   std::set<BlockKey> stale_;
   std::vector<BodyLeaves> changes_;
   RoomSeq room_seq_;
-  std::uint64_t authors_ = 0, lease_epoch_ = 1, bone_changes_ = 0;
-  std::map<AuthorId, std::vector<Decided>> surgeons_;  // row author_seq − 1
+  std::chrono::nanoseconds now_{};
+  std::uint64_t authors_ = 0, bone_epoch_ = 1, bone_changes_ = 0;
+  std::map<AuthorId, Digest> secrets_;
+  std::map<AuthorId, Surgeon> surgeons_;
   RoomCounts counts_;
+  Digest genesis_;
+  std::vector<RoomRow> rows_;   // decided since take_rows()
+  Fields fields_ = Fields::evaluate;
+  std::vector<CutField> ready_;  // while a split is applied: fields that were made for its pieces
 };
 
 }  // namespace osteon

@@ -107,7 +107,7 @@ int run(const char* folder, int frames, const char* vertices) {
       const Vec3 from = deep + 0.12 * static_cast<double>(i) * along;
       Cut cut = straight_cut(*burr, from, from + 0.12 * along, -at.out, ++seq);
       cut.author = surgeon;
-      cut.lease_epoch = room.lease_epoch();
+      cut.lease_epoch = room.lease_epoch(cut.author);
       cut.level = level;
       const auto before = std::chrono::steady_clock::now();
       const auto outcome = room.submit(cut);

@@ -27,7 +27,7 @@ TEST(Replay, ARoomComesToTheRecordedField) {
   const AuthorId author = room.join(MemberKind::surgeon);
   for (Cut cut : session.cuts) {
     cut.author = author;
-    cut.lease_epoch = room.lease_epoch();
+    cut.lease_epoch = room.lease_epoch(cut.author);
     const auto outcome = room.submit(cut);
     ASSERT_TRUE(outcome) << outcome.error().message;
     ASSERT_TRUE(outcome->committed());
@@ -73,7 +73,7 @@ TEST(Replay, TwoReplicasThatHearOfEachOtherLateComeToTheRecordedField) {
     Cut cut = session.cuts[i];
     cut.author = surgeon.author;
     cut.author_seq = ++surgeon.author_seq;
-    cut.lease_epoch = room.lease_epoch();
+    cut.lease_epoch = room.lease_epoch(cut.author);
     surgeon.replica.add_own(cut);
     ASSERT_TRUE(room.submit(cut)->committed());
     committed.push_back(cut);

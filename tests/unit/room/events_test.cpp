@@ -58,7 +58,7 @@ TEST(RoomUndo, LeavesTheBoneOfTheOtherCuts) {
   const RoomSeq second[] = {places[1]};
   const auto undone = room.undo(surgeon, second);
   ASSERT_TRUE(undone) << undone.error().message;
-  EXPECT_EQ(undone->room_seq.value, 6u);
+  EXPECT_EQ(undone->room_seq.value, 7u) << "after a surgeon who came and five cuts";
   EXPECT_EQ(undone->places, std::vector<RoomSeq>{places[1]});
   EXPECT_EQ(room.field_hash(), bone_after({cuts[0], cuts[2], cuts[3], cuts[4]}));
   EXPECT_FALSE(room.undo(surgeon, second)) << "it is undone already";
@@ -94,11 +94,11 @@ TEST(RoomUndo, EndsTheLeasesUnderWhichOthersCut) {
   const AuthorId surgeon = room.join(MemberKind::surgeon);
   auto cuts = strokes(surgeon, 3, 34);
   commit(room, cuts[0]);
-  const std::uint64_t before = room.lease_epoch();
+  const std::uint64_t before = room.lease_epoch(surgeon);
   ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
-  EXPECT_GT(room.lease_epoch(), before);
+  EXPECT_GT(room.lease_epoch(surgeon), before);
   EXPECT_EQ(room.submit(cuts[1])->rejection, Rejection::lease);
-  cuts[2].lease_epoch = room.lease_epoch();
+  cuts[2].lease_epoch = room.lease_epoch(surgeon);
   commit(room, cuts[2]);
 }
 
@@ -138,7 +138,7 @@ TEST(RoomUndo, NamesEveryBlockThatItMakesStale) {
   }
   ASSERT_TRUE(room.undo_last(surgeon, 3, {}));
   refresh(room.take_stale_blocks());
-  ASSERT_TRUE(room.split(BodyId{0}, {half(room.bone(), true)}, room.lease_epoch()));
+  ASSERT_TRUE(room.split(BodyId{0}, {half(room.bone(), true)}, room.bone_epoch()));
   refresh(room.take_stale_blocks());
   int of_piece = 0;
   for (const BlockKey& key : keys) {
@@ -157,7 +157,7 @@ TEST(RoomSplit, MakesABodyOfThePieceAndCutsReachBoth) {
   const RoomSeq saw = commit(room, cuts[0]);
   commit(room, cuts[1]);
   const double before_mm3 = room.field().removed_mm3();
-  const auto split = room.split(BodyId{0}, {half(room.bone(), true)}, room.lease_epoch());
+  const auto split = room.split(BodyId{0}, {half(room.bone(), true)}, room.bone_epoch());
   ASSERT_TRUE(split) << split.error().message;
   EXPECT_EQ(split->bodies, (std::vector<BodyId>{BodyId{0}, BodyId{1}}));
   ASSERT_NE(room.find_field(BodyId{1}), nullptr);
@@ -208,7 +208,7 @@ TEST(RoomSplit, TakesAPieceThatWasMadeBeforehand) {
     commit(slow, cuts[i]);
     commit(fast, cuts[i]);
   }
-  Separation found{BodyId{0}, {half(fast.bone(), true)}, fast.lease_epoch()};
+  Separation found{BodyId{0}, {half(fast.bone(), true)}, fast.bone_epoch()};
   found.fields.emplace_back(fast.bone(), fast.next_body(), fast.tools());
   (void)fast.take_changes();
   for (FieldLeaf leaf : fast.field().leaves()) found.fields[0].restore(leaf);
@@ -219,7 +219,7 @@ TEST(RoomSplit, TakesAPieceThatWasMadeBeforehand) {
   }
   const auto split = fast.split(std::move(found));
   ASSERT_TRUE(split) << split.error().message;
-  ASSERT_TRUE(slow.split(BodyId{0}, {half(slow.bone(), true)}, slow.lease_epoch()));
+  ASSERT_TRUE(slow.split(BodyId{0}, {half(slow.bone(), true)}, slow.bone_epoch()));
   EXPECT_EQ(fast.find_field(BodyId{1})->hash(), slow.find_field(BodyId{1})->hash());
   EXPECT_EQ(fast.field_hash(), slow.field_hash());
   // Its history goes its own way.
@@ -234,7 +234,7 @@ TEST(RoomSplit, TakesAPieceThatWasMadeBeforehand) {
 
 TEST(RoomSplit, DebrisVanishesInTheSameEvent) {
   Room room(test_block());
-  const auto split = room.split(BodyId{0}, {half(room.bone(), true, 0.5)}, room.lease_epoch());
+  const auto split = room.split(BodyId{0}, {half(room.bone(), true, 0.5)}, room.bone_epoch());
   ASSERT_TRUE(split);
   EXPECT_EQ(room.bodies(), std::vector<BodyId>{BodyId{0}});
   EXPECT_GT(room.field().solid_mm({6, 0, -6}), 0.0);
@@ -247,18 +247,18 @@ TEST(RoomSplit, IsRefusedWhereBoneHasComeBackMeanwhile) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
   commit(room, strokes(surgeon, 1, 38)[0]);
-  const std::uint64_t seen = room.lease_epoch();
+  const std::uint64_t seen = room.bone_epoch();
   ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
   EXPECT_FALSE(room.split(BodyId{0}, {half(room.bone(), true)}, seen));
-  EXPECT_FALSE(room.split(BodyId{5}, {half(room.bone(), true)}, room.lease_epoch()));
-  EXPECT_FALSE(room.split(BodyId{0}, {}, room.lease_epoch()));
+  EXPECT_FALSE(room.split(BodyId{5}, {half(room.bone(), true)}, room.bone_epoch()));
+  EXPECT_FALSE(room.split(BodyId{0}, {}, room.bone_epoch()));
 }
 
 TEST(RoomSplit, APieceIsTakenAwayAndComesBack) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
   EXPECT_FALSE(room.remove_body(surgeon, BodyId{0})) << "the last one stays";
-  ASSERT_TRUE(room.split(BodyId{0}, {half(room.bone(), true)}, room.lease_epoch()));
+  ASSERT_TRUE(room.split(BodyId{0}, {half(room.bone(), true)}, room.bone_epoch()));
   const Digest parted = room.field_hash();
   const auto removed = room.remove_body(surgeon, BodyId{1});
   ASSERT_TRUE(removed) << removed.error().message;
@@ -277,8 +277,8 @@ TEST(RoomSplit, OfTwoPiecesOfABodyTheLaterFallsWithTheEarlier) {
   const AuthorId surgeon = room.join(MemberKind::surgeon);
   const auto cuts = strokes(surgeon, 2, 38);
   for (const Cut& cut : cuts) commit(room, cut);
-  const auto first = room.split(BodyId{0}, {part(room.bone(), [](int x) { return x >= 6; })}, room.lease_epoch());
-  const auto second = room.split(BodyId{0}, {part(room.bone(), [](int x) { return x < -6; })}, room.lease_epoch());
+  const auto first = room.split(BodyId{0}, {part(room.bone(), [](int x) { return x >= 6; })}, room.bone_epoch());
+  const auto second = room.split(BodyId{0}, {part(room.bone(), [](int x) { return x < -6; })}, room.bone_epoch());
   ASSERT_TRUE(first && second);
   ASSERT_EQ(room.bodies().size(), 3u);
   const Digest parted = room.field_hash();
@@ -309,14 +309,14 @@ TEST(RoomSplit, ABodyThatIsAwayMissesNoCut) {
   const AuthorId surgeon = room.join(MemberKind::surgeon);
   const auto cuts = strokes(surgeon, 2, 39);
   for (const Cut& cut : cuts) commit(room, cut);
-  const auto split = room.split(BodyId{0}, {half(room.bone(), true)}, room.lease_epoch());
+  const auto split = room.split(BodyId{0}, {half(room.bone(), true)}, room.bone_epoch());
   ASSERT_TRUE(split);
   const auto away = room.remove_body(surgeon, BodyId{0});
   ASSERT_TRUE(away) << away.error().message;
   Cut across = test::straight_cut(tool_named("burr-round-5"), {-4, 0, -1}, {4, 0, -1}, {0, 0, -1}, 3);
   across.author = surgeon;
   across.body = BodyId{1};
-  across.lease_epoch = room.lease_epoch();
+  across.lease_epoch = room.lease_epoch(surgeon);
   commit(room, across);
 
   const RoomSeq back[] = {away->room_seq};
@@ -347,7 +347,7 @@ TEST(RoomScene, KeepsWhatWasSetAndTakesItBack) {
   EXPECT_FALSE(room.items()[0].seated) << "without pins, whatever it says of itself";
   ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
   EXPECT_EQ(room.items()[0].pose_bone_item.position_mm.x(), 1);
-  EXPECT_EQ(room.lease_epoch(), 1u) << "no bone came back";
+  EXPECT_EQ(room.lease_epoch(surgeon), 1u) << "no bone came back";
   ASSERT_TRUE(room.redo_last(surgeon, 1));
   EXPECT_EQ(room.items()[0].pose_bone_item.position_mm.x(), 3);
 
@@ -442,13 +442,13 @@ TEST(RoomScene, RefusesItemsThatCannotStandHere) {
   EXPECT_TRUE(refused([](SceneItem& i) { i.id = 4; }));
   EXPECT_TRUE(refused([](SceneItem& i) { i.pose_bone_item.position_mm.x() = 900; }));
   EXPECT_FALSE(room.set_item(AuthorId{9}, item));
-  EXPECT_EQ(room.room_seq().value, 0u);
+  EXPECT_EQ(room.room_seq().value, 1u) << "nobody but a surgeon who came";
 }
 
 TEST(RoomScene, AnItemGoesWithItsBody) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
-  ASSERT_TRUE(room.split(BodyId{0}, {half(room.bone(), true)}, room.lease_epoch()));
+  ASSERT_TRUE(room.split(BodyId{0}, {half(room.bone(), true)}, room.bone_epoch()));
   SceneItem screw;
   screw.tool = tool_named("screw-1").hash();
   screw.body = BodyId{1};
@@ -470,9 +470,10 @@ TEST(RoomTools, AToolIsAddedOnceAndCutsFromThenOn) {
   EXPECT_EQ(room.submit(cut)->rejection, Rejection::tool);
   const auto added = room.add_tool(surgeon, burr);
   ASSERT_TRUE(added) << added.error().message;
-  EXPECT_EQ(added->room_seq.value, 2u);
+  EXPECT_EQ(added->room_seq.value, 3u);
   EXPECT_EQ(added->tool->hash, burr.hash());
   cut.author_seq = 2;
+  cut.lease_epoch = room.lease_epoch(surgeon);
   commit(room, cut);
 
   EXPECT_EQ(room.add_tool(surgeon, burr)->room_seq, RoomSeq{}) << "known, so no event";
@@ -480,7 +481,7 @@ TEST(RoomTools, AToolIsAddedOnceAndCutsFromThenOn) {
   burr.diameter_mm = burr.cutting_length_mm = 4.4;
   EXPECT_EQ(room.add_tool(surgeon, burr).error().code, ErrorCode::exists) << "another tool of that name";
   EXPECT_FALSE(room.add_tool(AuthorId{9}, burr));
-  EXPECT_EQ(room.room_seq().value, 3u);
+  EXPECT_EQ(room.room_seq().value, 4u);
 }
 
 // A prediction that an undo overtakes falls, and the replica is the room's when all is heard.
@@ -499,8 +500,8 @@ TEST(RoomReplica, DropsWhatWasPredictedOnFallenBone) {
   EXPECT_EQ(room.submit(cuts[3])->rejection, Rejection::lease);
   hear(replica, *undo);
   EXPECT_EQ(replica.unconfirmed(), 0u);
-  EXPECT_FALSE(replica.reject(RoomSeq{4}, 3)) << "it has fallen already";
-  EXPECT_FALSE(replica.reject(RoomSeq{5}, 4));
+  EXPECT_FALSE(replica.reject(RoomSeq{6}, 3)) << "it has fallen already";
+  EXPECT_FALSE(replica.reject(RoomSeq{7}, 4));
   replica.settle();
   EXPECT_EQ(replica.hash(), room.field_hash());
   EXPECT_EQ(replica.hash(), bone_after({cuts[0]}));
@@ -514,7 +515,7 @@ TEST(RoomReplica, PredictsInPiecesThatItHearsOfLate) {
   const auto cuts = strokes(a, 12, 41);
   Replica replica(room.bone(), BodyId{0});
   for (const Cut& cut : cuts) replica.add_own(cut);
-  const auto split = room.split(BodyId{0}, {half(room.bone(), false)}, room.lease_epoch());
+  const auto split = room.split(BodyId{0}, {half(room.bone(), false)}, room.bone_epoch());
   ASSERT_TRUE(split);
   hear(replica, *split);
   EXPECT_EQ(replica.bodies().size(), 2u);
@@ -545,14 +546,14 @@ TEST(RoomReplica, EveryHolderHasTheRoomsHashAfterAnyEvents) {
         case 0: event = room.undo_last(hands[who], 1 + random() % 3, {}); break;
         case 1: event = room.redo_last(hands[who], 1); break;
         case 2:
-          if (room.bodies().size() == 1) event = room.split(BodyId{0}, {half(room.bone(), upper = !upper)}, room.lease_epoch());
+          if (room.bodies().size() == 1) event = room.split(BodyId{0}, {half(room.bone(), upper = !upper)}, room.bone_epoch());
           break;
         case 3:
           if (room.bodies().size() > 1) event = room.remove_body(hands[who], room.bodies().back());
           break;
         default: {
           Cut& cut = cuts[who][next[who]++];
-          cut.lease_epoch = room.lease_epoch();
+          cut.lease_epoch = room.lease_epoch(cut.author);
           const RoomSeq place = commit(room, cut);
           for (Replica& holder : holders) holder.commit(place, cut, false);
         }
@@ -581,7 +582,7 @@ TEST(RoomResume, GoesOnFromWhatWasSaved) {
   const AuthorId surgeon = room.join(MemberKind::surgeon);
   const auto cuts = strokes(surgeon, 6, 42);
   for (int i = 0; i < 3; ++i) commit(room, cuts[static_cast<std::size_t>(i)]);
-  ASSERT_TRUE(room.split(BodyId{0}, {half(room.bone(), true)}, room.lease_epoch()));
+  ASSERT_TRUE(room.split(BodyId{0}, {half(room.bone(), true)}, room.bone_epoch()));
   SavedFields saved;
   saved.case_hash = room.bone().hash();
   saved.kernel_version = kKernelVersion;

@@ -61,7 +61,7 @@ class FakeSession final : public SessionSink {
       if (response.has_change()) take(response.change());
       if (response.has_scene()) seq_ = std::max(seq_, RoomSeq{response.scene().room_seq()});
       if (!response.has_committed()) continue;
-      EXPECT_EQ(response.committed().room_seq(), seq_.value + 1) << "every row once and in order";
+      EXPECT_GT(response.committed().room_seq(), seq_.value) << "every row once and in order";
       replica_.commit(RoomSeq{response.committed().room_seq()}, wire::from_wire(response.committed().cut()).value(), false);
       seq_ = RoomSeq{response.committed().room_seq()};
     }
@@ -71,7 +71,7 @@ class FakeSession final : public SessionSink {
     for (const std::uint32_t body : change.bodies()) bodies.push_back(BodyId{body});
     std::vector<FieldLeaf> leaves;
     for (const v1::FieldLeaf& leaf : change.leaves()) leaves.push_back(wire::from_wire(leaf).value());
-    EXPECT_EQ(change.room_seq(), seq_.value + 1);
+    EXPECT_GT(change.room_seq(), seq_.value);
     replica_.change(RoomSeq{change.room_seq()}, bodies, leaves);
     if (change.last()) seq_ = RoomSeq{change.room_seq()};
   }
@@ -118,7 +118,7 @@ TEST(RoomHost, EverySinkEndsWithTheRoomsBoneAndSurface) {
   RoomHost host(Room(bone), {.tick = 1ms, .mesh = 3ms, .pieces = 0ns}, {});
   std::vector<std::shared_ptr<FakeSession>> sessions;
   for (int i = 0; i < 3; ++i) {
-    sessions.push_back(std::make_shared<FakeSession>(host.join(MemberKind::surgeon), bone));
+    sessions.push_back(std::make_shared<FakeSession>(host.join(MemberKind::surgeon).value(), bone));
     ASSERT_TRUE(host.open_session(sessions.back()));
   }
   EXPECT_FALSE(host.open_session(sessions.front())) << "one session for each author";
@@ -139,7 +139,7 @@ TEST(RoomHost, EverySinkEndsWithTheRoomsBoneAndSurface) {
     });
   std::vector<std::shared_ptr<FakeSession>> late;
   for (int i = 0; i < 5; ++i) {
-    late.push_back(std::make_shared<FakeSession>(host.join(MemberKind::surgeon), bone));
+    late.push_back(std::make_shared<FakeSession>(host.join(MemberKind::surgeon).value(), bone));
     ASSERT_TRUE(host.open_session(late.back()));
     FakeMesh visitor;
     host.watch_mesh(visitor);
@@ -155,7 +155,8 @@ TEST(RoomHost, EverySinkEndsWithTheRoomsBoneAndSurface) {
   host.watch_mesh(after);
   EXPECT_EQ(early.hashes(), after.hashes());
   const BoneStatus status = host.bone_status();
-  EXPECT_EQ(status.room_seq.value, 2u * kCuts);
+  EXPECT_EQ(status.counts.committed, 2u * kCuts);
+  EXPECT_EQ(status.room_seq.value, 2u * kCuts + 3 + 5) << "each who came has a place too";
   for (unsigned who = 0; who < 2; ++who) EXPECT_EQ(sessions[who]->decided_cuts(), kCuts);
   for (const auto& list : {sessions, late})
     for (const auto& session : list) {
@@ -178,7 +179,7 @@ TEST(RoomHost, EverySinkEndsWithTheRoomsBoneAndSurface) {
 TEST(RoomHost, CopiesOfTheBoneAreRightWhileItIsCut) {
   const Case bone = test::test_block();
   RoomHost host(Room(bone), {.tick = 200us, .mesh = 50ms, .pieces = 0ns}, {});
-  const auto hand = std::make_shared<FakeSession>(host.join(MemberKind::surgeon), bone);
+  const auto hand = std::make_shared<FakeSession>(host.join(MemberKind::surgeon).value(), bone);
   ASSERT_TRUE(host.open_session(hand));
   constexpr std::uint64_t kCuts = 60;
   std::vector<Cut> cuts = strokes(hand->author(), static_cast<int>(kCuts), 21);
@@ -191,10 +192,10 @@ TEST(RoomHost, CopiesOfTheBoneAreRightWhileItIsCut) {
   });
   std::vector<BoneStatus> said;
   std::vector<std::shared_ptr<FakeSession>> late;
-  while (host.room_seq().value < kCuts) {
+  while (host.health().counts.committed < kCuts) {
     if (BoneStatus status = host.bone_status(); said.empty() || said.back().room_seq < status.room_seq) said.push_back(status);
     if (late.size() >= 4) continue;
-    late.push_back(std::make_shared<FakeSession>(host.join(MemberKind::surgeon), bone));
+    late.push_back(std::make_shared<FakeSession>(host.join(MemberKind::surgeon).value(), bone));
     ASSERT_TRUE(host.open_session(late.back()));
   }
   cutting.join();
@@ -204,9 +205,8 @@ TEST(RoomHost, CopiesOfTheBoneAreRightWhileItIsCut) {
   CutField alone(bone, BodyId{0});
   std::uint64_t applied = 0;
   for (const BoneStatus& status : said) {
-    while (applied < status.room_seq.value) alone.apply(cuts[applied++]);
+    while (applied < status.counts.committed) alone.apply(cuts[applied++]);
     EXPECT_EQ(status.field_hash, alone.hash()) << "at " << applied;
-    EXPECT_EQ(status.counts.committed, applied);
   }
   EXPECT_EQ(applied, kCuts);
   for (const auto& session : late) EXPECT_EQ(session->hash(), alone.hash());

@@ -59,12 +59,12 @@ class Surgeon {
                             own_ += cut.author == session_->room().author;
                           });
                         },
-                    .rejected = [this](RoomSeq, std::uint64_t, const std::string& reason) { on([&] { rejected_ = reason; }); },
+                    .rejected = [this](RoomSeq, std::uint64_t, std::uint64_t lease, const std::string& reason) { on([&] { rejected_ = reason, lease_ = lease; }); },
                     .change =
                         [this](BonePart&& part) {
                           on([&] {
                             replica_->change(part.place, part.bodies, part.leaves);
-                            if (part.last) seq_ = part.place, lease_ = part.lease_epoch, bodies_ = part.bodies;
+                            if (part.last) seq_ = part.place, lease_ = std::max(lease_, part.lease_epoch), bodies_ = part.bodies;
                           });
                         },
                     .scene =

@@ -119,14 +119,14 @@ HostRates fast() { return {.tick = 1ms, .mesh = 3ms, .looks = 5ms}; }
 TEST(NearDetail, FollowsTheLooksOfAllViewers) {
   RoomHost host(Room(ball()), fast(), {}, Detail::near);
   RoomHost in_full(Room(ball()), fast(), {}, Detail::full);
-  Reader full(in_full.join(MemberKind::watcher));
+  Reader full(in_full.join(MemberKind::watcher).value());
   in_full.watch_mesh(full);
   EXPECT_EQ(full.levels(), std::set<int>{0});
   EXPECT_EQ(full.open_edges(), 0);
 
   // Nobody has looked yet: the one who joins is sent the coarse bone at once and then what it looks at.
   const Vec3 north(0, 0, kRadius_mm), east(kRadius_mm, 0, 0), south(0, 0, -kRadius_mm);
-  Reader one(host.join(MemberKind::watcher));
+  Reader one(host.join(MemberKind::watcher).value());
   host.watch_mesh(one, close_to(north, 8));
   EXPECT_EQ(one.first_levels(), std::set<int>{kCoarsestLevel});
   ASSERT_TRUE(test::wait_until([&] { return one.level_at(north) == 0; }, 20s));
@@ -139,7 +139,7 @@ TEST(NearDetail, FollowsTheLooksOfAllViewers) {
   host.look(one.author(), close_to(east, 8));
   ASSERT_TRUE(test::wait_until([&] { return one.level_at(east) == 0 && one.level_at(north) < 0; }, 20s));
   EXPECT_EQ(one.open_edges(), 0);
-  Reader two(host.join(MemberKind::watcher));
+  Reader two(host.join(MemberKind::watcher).value());
   host.watch_mesh(two, close_to(south, 8));
   EXPECT_EQ(two.hash(), host.surface_hash()) << "as it is at the moment";
   EXPECT_EQ(two.first_levels(), one.levels());
@@ -151,14 +151,14 @@ TEST(NearDetail, FollowsTheLooksOfAllViewers) {
 
   // A tool is seen in full wherever it works.
   CuttingState state;
-  state.author = host.join(MemberKind::surgeon);
+  state.author = host.join(MemberKind::surgeon).value();
   state.pose_bone_tool = pose_along(north, {0, 0, -1});
   host.offer_state(state);
   ASSERT_TRUE(test::wait_until([&] { return one.level_at(north) == 0; }, 20s));
   EXPECT_EQ(one.open_edges(), 0);
 
   // One that never says where it looks is sent all, to the bytes of a room that draws everything in full.
-  Reader all(host.join(MemberKind::watcher));
+  Reader all(host.join(MemberKind::watcher).value());
   host.watch_mesh(all);
   ASSERT_TRUE(test::wait_until([&] { return all.hash() == full.hash(); }, 20s));
   EXPECT_EQ(one.hash(), full.hash());
@@ -179,12 +179,12 @@ Fragment cap(const Case& bone, double from_mm, double to_mm) {
 TEST(NearDetail, ABodyTakesAllItsBlocksAndNoOthers) {
   Room room(ball());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
-  ASSERT_TRUE(room.split(BodyId{0}, {cap(room.bone(), 15, 99)}, room.lease_epoch()));
-  ASSERT_TRUE(room.split(BodyId{0}, {cap(room.bone(), -99, -15)}, room.lease_epoch()));
+  ASSERT_TRUE(room.split(BodyId{0}, {cap(room.bone(), 15, 99)}, room.bone_epoch()));
+  ASSERT_TRUE(room.split(BodyId{0}, {cap(room.bone(), -99, -15)}, room.bone_epoch()));
   HostRates rates = fast();
   rates.pieces = 0ms;
   RoomHost host(std::move(room), rates, {}, Detail::near);
-  Reader one(host.join(MemberKind::watcher));
+  Reader one(host.join(MemberKind::watcher).value());
   host.watch_mesh(one, close_to({0, 0, kRadius_mm}, 8));  // so that both pieces are far
   ASSERT_TRUE(test::wait_until([&] { return one.level_at({0, 0, kRadius_mm}) == 0; }, 20s));
   const auto remove = [&](BodyId body) {

@@ -30,12 +30,12 @@ TEST(Room, GivesNoAuthorTwiceAndEveryCutTheNextPlace) {
   EXPECT_FALSE(room.knows(AuthorId{}));
 
   const auto of_a = strokes(a, 3, 1), of_b = strokes(b, 3, 2);
-  std::uint64_t place = 0;
+  std::uint64_t place = 3;  // those who came have each a place too
   for (int i = 0; i < 3; ++i) {
     EXPECT_EQ(commit(room, of_b[static_cast<std::size_t>(i)]).room_seq.value, ++place);
     EXPECT_EQ(commit(room, of_a[static_cast<std::size_t>(i)]).room_seq.value, ++place);
   }
-  EXPECT_EQ(room.room_seq().value, 6u);
+  EXPECT_EQ(room.room_seq().value, 9u);
 }
 
 // The bone is a function of the set of cuts: any interleaving of two hands leaves the same bone.
@@ -60,6 +60,7 @@ TEST(Room, AnswersACutSentAgainWithItsFirstOutcome) {
   const RoomSeq first = commit(room, cuts[0]).room_seq;
   const Outcome second = room.submit(cuts[1]).value();
   EXPECT_EQ(second.rejection, Rejection::level);
+  cuts[2].lease_epoch = second.lease_epoch;
   commit(room, cuts[2]);
   const Digest hash = room.field_hash();
 
@@ -70,7 +71,7 @@ TEST(Room, AnswersACutSentAgainWithItsFirstOutcome) {
   EXPECT_TRUE(rejected_again.repeated);
   EXPECT_EQ(rejected_again.rejection, Rejection::level);
   EXPECT_EQ(rejected_again.room_seq, second.room_seq);
-  EXPECT_EQ(room.room_seq().value, 3u);
+  EXPECT_EQ(room.room_seq().value, 4u);
   EXPECT_EQ(room.field_hash(), hash);
   EXPECT_EQ(room.counts().repeated, 2u);
 }
@@ -97,9 +98,9 @@ TEST(Room, RefusesWhatBreaksTheOrderOfAnAuthor) {
   EXPECT_FALSE(room.submit(stranger));
 
   EXPECT_EQ(room.counts().refused, 5u);
-  EXPECT_EQ(room.room_seq().value, 1u) << "a breach gets no place in the order";
+  EXPECT_EQ(room.room_seq().value, 3u) << "a breach gets no place in the order";
   EXPECT_EQ(room.field_hash(), hash);
-  EXPECT_EQ(commit(room, cuts[1]).room_seq.value, 2u) << "the author goes on";
+  EXPECT_EQ(commit(room, cuts[1]).room_seq.value, 4u) << "the author goes on";
 }
 
 struct Breach {
@@ -118,11 +119,12 @@ TEST_P(RoomLimits, RejectTheCutAsARowAndLeaveTheBone) {
   const Result<Outcome> outcome = room.submit(cuts[0]);
   ASSERT_TRUE(outcome.has_value()) << outcome.error().message;
   EXPECT_EQ(outcome->rejection, GetParam().expected) << sentence(outcome->rejection);
-  EXPECT_EQ(outcome->room_seq.value, 1u);
+  EXPECT_EQ(outcome->room_seq.value, 2u);
   EXPECT_EQ(room.counts().rejected, 1u);
   EXPECT_EQ(room.field_hash(), uncut);
   EXPECT_EQ(room.stale_blocks(), 0u);
-  EXPECT_EQ(commit(room, cuts[1]).room_seq.value, 2u);
+  cuts[1].lease_epoch = outcome->lease_epoch;
+  EXPECT_EQ(commit(room, cuts[1]).room_seq.value, 3u);
 }
 
 QuantisedPose at(const Vec3& tip_mm) { return quantise(pose_along(tip_mm, {0, 0, -1})); }
@@ -164,6 +166,7 @@ TEST(Room, TakesNoCutFinerThanTheCaseAllows) {
   EXPECT_EQ(room.submit(cuts[0])->rejection, Rejection::level);
   EXPECT_EQ(room.field_hash(), uncut);
   cuts[1].level = 1;  // 0.15 mm
+  cuts[1].lease_epoch = room.lease_epoch(cuts[1].author);
   commit(room, cuts[1]);
 }
 

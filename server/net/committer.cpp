@@ -1,0 +1,88 @@
+#include "server/net/committer.hpp"
+
+#include <chrono>
+#include <iterator>
+#include <utility>
+
+namespace osteon {
+
+Committer::Committer(Write write, std::function<void(const Error&)> failed)
+    : write_(std::move(write)), failed_(std::move(failed)) {
+  if (write_) thread_ = std::thread([this] { run(); });
+}
+
+Committer::~Committer() {
+  {
+    const std::lock_guard lock(mutex_);
+    end_ = true;
+    wake_.notify_all();
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+void Committer::commit(std::vector<RoomRow> rows, std::vector<Tell> tells) {
+  if (!write_) {
+    for (const Tell& tell : tells) tell({});
+    return;
+  }
+  if (rows.empty() && tells.empty()) return;
+  const std::lock_guard lock(mutex_);
+  std::ranges::move(rows, std::back_inserter(rows_));
+  std::ranges::move(tells, std::back_inserter(tells_));
+  wake_.notify_all();
+}
+
+void Committer::drain() {
+  if (!write_) return;
+  std::unique_lock lock(mutex_);
+  wake_.wait(lock, [&] { return !busy_ && rows_.empty() && tells_.empty(); });
+}
+
+std::size_t Committer::waiting() const {
+  const std::lock_guard lock(mutex_);
+  return rows_.size() + writing_;
+}
+
+DurationHistogram Committer::commit_times() const {
+  const std::lock_guard lock(mutex_);
+  return times_;
+}
+
+std::optional<Error> Committer::failure() const {
+  const std::lock_guard lock(mutex_);
+  return failure_;
+}
+
+void Committer::run() {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    wake_.wait(lock, [&] { return end_ || !rows_.empty() || !tells_.empty(); });
+    if (rows_.empty() && tells_.empty()) return;
+    const std::vector<RoomRow> rows = std::exchange(rows_, {});
+    const std::vector<Tell> tells = std::exchange(tells_, {});
+    writing_ = rows.size();
+    busy_ = true;
+    Result<void> durable = failure_ ? Result<void>(tl::unexpected(*failure_)) : Result<void>{};
+    lock.unlock();
+
+    const auto begun = std::chrono::steady_clock::now();
+    const bool writes = durable && !rows.empty();
+    if (writes) durable = write_(rows);
+    const auto took = std::chrono::steady_clock::now() - begun;
+    if (writes && !durable) {
+      lock.lock();
+      failure_ = durable.error();
+      lock.unlock();
+      if (failed_) failed_(durable.error());
+    }
+    for (const Tell& tell : tells) tell(durable);
+
+    lock.lock();
+    if (writes) times_.record(took);
+    writing_ = 0;
+    busy_ = false;
+    wake_.notify_all();
+  }
+}
+
+}  // namespace osteon

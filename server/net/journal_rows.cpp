@@ -1,0 +1,262 @@
+#include "server/net/journal_rows.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "common/field/kernel.hpp"
+#include "common/wire/convert.hpp"
+#include "osteon/v1/journal.pb.h"
+
+namespace osteon {
+namespace {
+
+constexpr std::uint32_t kGenesisVersion = 1;
+
+tl::unexpected<Error> bad(std::string what) { return failure(ErrorCode::invalid_input, std::move(what)); }
+
+template <class List>
+void put(const std::vector<RoomSeq>& places, List& out) {
+  for (const RoomSeq place : places) out.Add(place.value);
+}
+template <class List>
+std::vector<RoomSeq> places_of(const List& list) {
+  std::vector<RoomSeq> places;
+  for (const std::uint64_t place : list) places.push_back(RoomSeq{place});
+  return places;
+}
+
+template <class List>
+void put(const Mask& mask, List& out) {
+  for (const FieldLeaf& leaf : *mask) *out.Add() = wire::to_wire(leaf);
+}
+template <class List>
+Result<Mask> mask_of(const List& list) {
+  auto mask = std::make_shared<std::vector<FieldLeaf>>();
+  for (const v1::FieldLeaf& leaf : list) {
+    Result<FieldLeaf> one = wire::from_wire(leaf);
+    if (!one) return tl::unexpected(one.error());
+    mask->push_back(std::move(*one));
+  }
+  return Mask(std::move(mask));
+}
+
+// A float holds no pose to the last bit, and a replayed room must have the hash of the one it replays.
+void put(const Pose& pose, google::protobuf::RepeatedField<double>& out) {
+  for (const double part : pose.position_mm) out.Add(part);
+  for (const double part : pose.rotation.coeffs()) out.Add(part);
+}
+Result<Pose> pose_of(const google::protobuf::RepeatedField<double>& parts) {
+  if (parts.size() != 7 || !std::ranges::all_of(parts, [](double part) { return std::isfinite(part); }))
+    return bad("item.pose_bone_item has not 7 finite numbers");
+  Pose pose{{parts[0], parts[1], parts[2]}, Eigen::Quaterniond(parts[6], parts[3], parts[4], parts[5])};
+  if (std::abs(pose.rotation.norm() - 1.0) > 1e-3) return bad("item.pose_bone_item is not a unit quaternion");
+  return pose;
+}
+
+struct Writer {
+  v1::JournalRow& out;
+
+  void operator()(const JoinRow& join) const {
+    v1::JournalJoin& row = *out.mutable_join();
+    row.set_author(join.author.value);
+    row.set_kind(static_cast<std::uint32_t>(join.kind));
+    row.set_person(join.person);
+    row.set_secret(wire::to_wire(join.secret));
+  }
+  void operator()(const CutRow& cut) const { *out.mutable_cut() = wire::to_wire(cut.cut); }
+  void operator()(const RejectionRow& rejection) const {
+    v1::JournalRejection& row = *out.mutable_rejection();
+    row.set_author(rejection.author.value);
+    row.set_author_seq(rejection.author_seq);
+    row.set_digest(wire::to_wire(rejection.bytes));
+    row.set_reason(static_cast<std::uint32_t>(rejection.reason));
+  }
+  void operator()(const SplitRow& split) const {
+    v1::JournalSplit& row = *out.mutable_split();
+    row.set_parent(split.parent.value);
+    put(split.taken, *row.mutable_taken());
+    for (const SplitPiece& piece : split.pieces) {
+      v1::JournalPiece& one = *row.add_pieces();
+      one.set_body(piece.body.value);
+      *one.mutable_reach_min() = wire::to_wire(piece.reach.min);
+      *one.mutable_reach_max() = wire::to_wire(piece.reach.max);
+      put(piece.left, *one.mutable_left());
+    }
+  }
+  void operator()(const UndoRow& undo) const { put(undo.places, *out.mutable_undo()->mutable_places()); }
+  void operator()(const RedoRow& redo) const {
+    put(redo.undos, *out.mutable_redo()->mutable_undos());
+    put(redo.places, *out.mutable_redo()->mutable_places());
+  }
+  void operator()(const RemoveBodyRow& removal) const { out.mutable_removal()->set_body(removal.body.value); }
+  void operator()(const ItemRow& item) const {
+    v1::JournalItem& row = *out.mutable_item();
+    row.set_item(item.item);
+    if (!item.set) return;
+    *row.mutable_set() = wire::to_wire(*item.set);
+    row.mutable_set()->clear_pose_bone_item();
+    put(item.set->pose_bone_item, *row.mutable_pose_bone_item());
+  }
+  void operator()(const ToolRow& tool) const { *out.mutable_tool() = wire::to_wire(tool.tool); }
+  void operator()(const MarkRow& mark) const { out.mutable_mark()->set_label(mark.label); }
+};
+
+using What = decltype(RoomRow::what);
+
+Result<What> read(const v1::JournalJoin& row) {
+  if (row.kind() > static_cast<std::uint32_t>(MemberKind::watcher)) return bad("join.kind is not known");
+  const Result<Digest> secret = wire::digest_from_wire(row.secret());
+  if (!secret) return bad("join.secret: " + secret.error().message);
+  return JoinRow{AuthorId{row.author()}, static_cast<MemberKind>(row.kind()), row.person(), *secret};
+}
+
+Result<What> read(const v1::Cut& row) {
+  Result<Cut> cut = wire::from_wire(row);
+  if (!cut) return tl::unexpected(cut.error());
+  return CutRow{std::move(*cut)};
+}
+
+Result<What> read(const v1::JournalRejection& row) {
+  const Result<Digest> bytes = wire::digest_from_wire(row.digest());
+  if (!bytes) return bad("rejection.digest: " + bytes.error().message);
+  if (row.reason() >= static_cast<std::uint32_t>(kRejections)) return bad("rejection.reason is not known");
+  return RejectionRow{AuthorId{row.author()}, row.author_seq(), *bytes, static_cast<Rejection>(row.reason())};
+}
+
+Result<What> read(const v1::JournalSplit& row) {
+  SplitRow split;
+  split.parent = BodyId{row.parent()};
+  Result<Mask> taken = mask_of(row.taken());
+  if (!taken) return bad("split.taken: " + taken.error().message);
+  split.taken = std::move(*taken);
+  for (const v1::JournalPiece& one : row.pieces()) {
+    Result<Mask> left = mask_of(one.left());
+    if (!left) return bad("split.pieces.left: " + left.error().message);
+    const CoordBox reach{wire::from_wire(one.reach_min()), wire::from_wire(one.reach_max())};
+    split.pieces.push_back({BodyId{one.body()}, reach, std::move(*left)});
+  }
+  return split;
+}
+
+Result<What> read(const v1::JournalItem& row) {
+  if (!row.has_set()) return ItemRow{row.item(), std::nullopt};
+  const Result<Pose> pose = pose_of(row.pose_bone_item());
+  if (!pose) return tl::unexpected(pose.error());
+  v1::SceneItem set = row.set();
+  *set.mutable_pose_bone_item() = wire::to_wire(Pose{});
+  Result<SceneItem> item = wire::from_wire(set);
+  if (!item) return tl::unexpected(item.error());
+  item->pose_bone_item = *pose;
+  return ItemRow{row.item(), std::move(*item)};
+}
+
+Result<What> read(const v1::ToolDefinition& row) {
+  Result<Tool> tool = wire::from_wire(row);
+  if (!tool) return tl::unexpected(tool.error());
+  return ToolRow{std::move(*tool)};
+}
+
+Result<What> read(const v1::JournalRow& row) {
+  switch (row.what_case()) {
+    case v1::JournalRow::kJoin: return read(row.join());
+    case v1::JournalRow::kCut: return read(row.cut());
+    case v1::JournalRow::kRejection: return read(row.rejection());
+    case v1::JournalRow::kSplit: return read(row.split());
+    case v1::JournalRow::kUndo: return UndoRow{places_of(row.undo().places())};
+    case v1::JournalRow::kRedo: return RedoRow{places_of(row.redo().undos()), places_of(row.redo().places())};
+    case v1::JournalRow::kRemoval: return RemoveBodyRow{BodyId{row.removal().body()}};
+    case v1::JournalRow::kItem: return read(row.item());
+    case v1::JournalRow::kTool: return read(row.tool());
+    case v1::JournalRow::kMark: return MarkRow{row.mark().label()};
+    case v1::JournalRow::WHAT_NOT_SET: break;
+  }
+  return failure(ErrorCode::unsupported, "its event is of a kind that this release does not know");
+}
+
+}  // namespace
+
+RoomGenesis genesis_of(const Room& room, std::string name) {
+  RoomGenesis genesis;
+  genesis.case_hash = room.bone().hash();
+  genesis.kernel_version = kKernelVersion;
+  for (const ToolBox::Entry* entry : room.tools()->entries()) genesis.tools.push_back(entry->tool);
+  genesis.room_genesis = room.genesis();
+  genesis.room = std::move(name);
+  return genesis;
+}
+
+std::string to_bytes(const RoomGenesis& genesis) {
+  v1::JournalGenesis out;
+  out.set_version(kGenesisVersion);
+  out.set_case_hash(wire::to_wire(genesis.case_hash));
+  out.set_kernel_version(genesis.kernel_version);
+  for (const Tool& tool : genesis.tools) *out.add_tools() = wire::to_wire(tool);
+  out.set_room_genesis(wire::to_wire(genesis.room_genesis));
+  out.set_room(genesis.room);
+  out.set_parent(genesis.parent);
+  out.set_parent_room_seq(genesis.parent_room_seq.value);
+  if (!genesis.parent.empty()) out.set_parent_chain(wire::to_wire(genesis.parent_chain));
+  return out.SerializeAsString();
+}
+
+Result<RoomGenesis> genesis_from_bytes(std::string_view bytes) {
+  v1::JournalGenesis in;
+  if (!in.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return bad("the journal does not say what its room began as");
+  if (in.version() != kGenesisVersion)
+    return failure(ErrorCode::unsupported, "the journal is of version " + std::to_string(in.version()) + " and this release knows " +
+                                               std::to_string(kGenesisVersion));
+  RoomGenesis genesis;
+  const Result<Digest> hash = wire::digest_from_wire(in.case_hash()), began = wire::digest_from_wire(in.room_genesis());
+  if (!hash || !began) return bad("the journal does not name its case");
+  genesis.case_hash = *hash;
+  genesis.room_genesis = *began;
+  genesis.kernel_version = in.kernel_version();
+  for (const v1::ToolDefinition& tool : in.tools()) {
+    Result<Tool> one = wire::from_wire(tool);
+    if (!one) return bad("a tool of the journal: " + one.error().message);
+    genesis.tools.push_back(std::move(*one));
+  }
+  genesis.room = in.room();
+  genesis.parent = in.parent();
+  genesis.parent_room_seq = RoomSeq{in.parent_room_seq()};
+  if (const Result<Digest> chain = wire::digest_from_wire(in.parent_chain())) genesis.parent_chain = *chain;
+  return genesis;
+}
+
+Result<Room> begin_room(const Case& bone, const RoomGenesis& genesis, const CutLimits& limits) {
+  if (genesis.case_hash != bone.hash())
+    return failure(ErrorCode::unsupported, "the journal is of the case " + to_hex(genesis.case_hash) + " and not of " +
+                                               to_hex(bone.hash()) + "; start the server with that case");
+  if (genesis.kernel_version != kKernelVersion)
+    return failure(ErrorCode::unsupported, "the journal is of cut kernel version " + std::to_string(genesis.kernel_version) +
+                                               " and this server's is " + std::to_string(kKernelVersion) +
+                                               "; go on with the release that made it");
+  // Not the server's own box: another release's may hold other tools.
+  auto tools = std::make_shared<ToolBox>();
+  for (const Tool& tool : genesis.tools) tools->add(tool);
+  Room room(bone, limits, std::move(tools));
+  if (room.genesis() != genesis.room_genesis) return bad("the journal's tools are not those that its room began with");
+  return room;
+}
+
+std::string to_bytes(const RoomRow& row) {
+  v1::JournalRow out;
+  out.set_author(row.author.value);
+  std::visit(Writer{out}, row.what);
+  return out.SerializeAsString();
+}
+
+Result<RoomRow> row_from_bytes(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes) {
+  const auto in_row = [&](const Error& error) {
+    return failure(error.code, "row " + std::to_string(place.value) + ": " + error.message);
+  };
+  v1::JournalRow in;
+  if (!in.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
+    return in_row({ErrorCode::invalid_input, "it is no row of a room"});
+  Result<What> what = read(in);
+  if (!what) return in_row(what.error());
+  return RoomRow{place, at, AuthorId{in.author()}, std::move(*what)};
+}
+
+}  // namespace osteon

@@ -1,0 +1,36 @@
+// A room's rows as bytes of its journal, and back.
+#pragma once
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/core/result.hpp"
+#include "server/room/room.hpp"
+
+namespace osteon {
+
+// What a room began as: enough to make it again beside the case itself.
+struct RoomGenesis {
+  Digest case_hash;
+  std::uint32_t kernel_version = 0;
+  std::vector<Tool> tools;
+  Digest room_genesis;        // Room::genesis()
+  std::string room;           // its name
+  // A branch: where it comes from.
+  std::string parent;
+  RoomSeq parent_room_seq;
+  Digest parent_chain;
+};
+[[nodiscard]] RoomGenesis genesis_of(const Room& room, std::string name);
+[[nodiscard]] std::string to_bytes(const RoomGenesis& genesis);
+// Errors: invalid_input (not such bytes), unsupported (of a later version).
+[[nodiscard]] Result<RoomGenesis> genesis_from_bytes(std::string_view bytes);
+// The room as it began. Errors: unsupported (of another case or kernel than this), invalid_input.
+[[nodiscard]] Result<Room> begin_room(const Case& bone, const RoomGenesis& genesis, const CutLimits& limits);
+
+// Without place and time, which a journal keeps beside them.
+[[nodiscard]] std::string to_bytes(const RoomRow& row);
+// Error invalid_input, naming the row and the field.
+[[nodiscard]] Result<RoomRow> row_from_bytes(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes);
+
+}  // namespace osteon

@@ -1,0 +1,175 @@
+#include "server/net/room_keeper.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <utility>
+
+#include "common/field/field_hash.hpp"
+#include "common/runtime/log.hpp"
+#include "common/wire/convert.hpp"
+#include "osteon/v1/journal.pb.h"
+
+namespace osteon {
+namespace {
+
+constexpr std::size_t kPieceBytes = 128 * 1024;  // of a checkpoint, about
+
+std::int32_t today() {
+  return static_cast<std::int32_t>(
+      std::chrono::duration_cast<std::chrono::days>(std::chrono::system_clock::now().time_since_epoch()).count());
+}
+
+// A piece of a checkpoint: its length, then a JournalFields.
+std::string piece_of(const v1::JournalFields& fields) {
+  const std::string bytes = fields.SerializeAsString();
+  std::string piece(4, '\0');
+  for (std::size_t i = 0; i < 4; ++i) piece[i] = static_cast<char>(bytes.size() >> (8 * i) & 0xff);
+  return piece + bytes;
+}
+
+std::optional<std::vector<FieldLeaf>> leaves_of(std::string_view bytes) {
+  std::vector<FieldLeaf> leaves;
+  while (!bytes.empty()) {
+    if (bytes.size() < 4) return std::nullopt;
+    std::size_t size = 0;
+    for (std::size_t i = 0; i < 4; ++i) size |= std::size_t{static_cast<std::uint8_t>(bytes[i])} << (8 * i);
+    bytes.remove_prefix(4);
+    v1::JournalFields fields;
+    if (size > bytes.size() || !fields.ParseFromArray(bytes.data(), static_cast<int>(size))) return std::nullopt;
+    bytes.remove_prefix(size);
+    for (const v1::FieldLeaf& leaf : fields.leaves()) {
+      Result<FieldLeaf> one = wire::from_wire(leaf);
+      if (!one) return std::nullopt;
+      leaves.push_back(std::move(*one));
+    }
+  }
+  return leaves;
+}
+
+}  // namespace
+
+Result<KeptRoom> RoomKeeper::open(const std::filesystem::path& file, const Case& bone, const Options& options,
+                                  const std::function<void(double)>& progress) {
+  Result<Journal> journal = Journal::open(file, options.journal);
+  bool made = false;
+  if (!journal && journal.error().code == ErrorCode::not_found) {
+    const RoomGenesis genesis = genesis_of(Room(bone, options.limits, options.tools ? options.tools : builtin_tool_box()), options.name);
+    journal = Journal::create(file, to_bytes(genesis), options.journal);
+    made = true;
+  }
+  if (!journal) return tl::unexpected(journal.error());
+  Result<RoomGenesis> genesis = genesis_from_bytes(journal->genesis());
+  if (!genesis) return failure(genesis.error().code, file.string() + ": " + genesis.error().message);
+  std::unique_ptr<RoomKeeper> keeper(new RoomKeeper(std::move(*journal), std::move(*genesis), bone.pitch_mm()));
+  if (const Error* closed = keeper->journal_.closed_because())
+    log::warn("journal takes no rows", {{"file", file.string()}, {"reason", closed->message}});
+  else if (Result<std::uint64_t> epoch = keeper->journal_.next_server_epoch(); epoch)
+    keeper->server_epoch_ = *epoch;
+  else
+    return tl::unexpected(epoch.error());
+  const Fields fields = keeper->newest_fields();
+  Result<Room> room = keeper->replay(bone, options.limits, fields, progress);
+  if (!room) return failure(room.error().code, file.string() + ": " + room.error().message);
+  const std::uint64_t rows = keeper->journal_.head().place.value;
+  return KeptRoom{std::move(*room), std::move(keeper), made, rows - fields.place.value};
+}
+
+RoomKeeper::Fields RoomKeeper::newest_fields() {
+  const Result<std::vector<Checkpoint>> checkpoints = journal_.checkpoints();
+  if (!checkpoints) return {};
+  for (const Checkpoint& one : *checkpoints) {
+    if (one.at.place > journal_.head().place) continue;
+    const Result<std::string> bytes = journal_.read_checkpoint(one);
+    if (!bytes) continue;
+    std::optional<std::vector<FieldLeaf>> leaves = leaves_of(*bytes);
+    if (leaves && to_hex(field_hash(*leaves, pitch_mm_)) == one.meta) return {one.at.place, std::move(*leaves)};
+    log::warn("a checkpoint is passed over", {{"place", one.at.place.value}});
+  }
+  return {};
+}
+
+Result<Room> RoomKeeper::replay(const Case& bone, const CutLimits& limits, const Fields& fields,
+                                const std::function<void(double)>& progress) {
+  Result<Room> room = begin_room(bone, genesis_, limits);
+  if (!room) return room;
+  const std::uint64_t rows = journal_.head().place.value;
+  Result<void> replayed;
+  const auto take = [&](const JournalRow& one) {
+    Result<RoomRow> row = row_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
+    replayed = row ? room->replay(*row, one.place <= fields.place ? Room::Fields::leave : Room::Fields::evaluate)
+                   : Result<void>(tl::unexpected(row.error()));
+    if (replayed && one.place == fields.place) replayed = room->set_fields(fields.leaves);
+    if (progress && one.place.value % 64 == 0) progress(static_cast<double>(one.place.value) / static_cast<double>(rows));
+    return replayed.has_value();
+  };
+  if (Result<void> read = journal_.read(RoomSeq{1}, take); !read) return tl::unexpected(read.error());
+  if (!replayed) return tl::unexpected(replayed.error());
+  // Nobody has watched this room yet: all of its surface is made anew.
+  (void)room->take_changes();
+  return room;
+}
+
+Result<void> RoomKeeper::write(std::span<const RoomRow> rows) {
+  std::vector<JournalRow> out;
+  out.reserve(rows.size());
+  for (const RoomRow& row : rows) out.push_back({row.place, row.at.count(), to_bytes(row)});
+  const std::lock_guard lock(mutex_);
+  return journal_.append(out);
+}
+
+JournalHead RoomKeeper::head() const {
+  const std::lock_guard lock(mutex_);
+  return journal_.head();
+}
+
+Result<std::uint32_t> RoomKeeper::person(const std::string& label) {
+  const std::lock_guard lock(mutex_);
+  const Result<std::vector<Person>> people = journal_.people();
+  if (!people) return tl::unexpected(people.error());
+  std::uint32_t newest = 0;
+  for (const Person& person : *people) {
+    if (person.label == label) return static_cast<std::uint32_t>(std::stoul(person.pseudonym));
+    newest = std::max(newest, static_cast<std::uint32_t>(std::stoul(person.pseudonym)));
+  }
+  // Never again the number of one who was forgotten.
+  const Result<std::optional<std::string>> given = journal_.find_register("people");
+  if (!given) return tl::unexpected(given.error());
+  if (*given) newest = std::max(newest, static_cast<std::uint32_t>(std::stoul(**given)));
+  const std::string pseudonym = std::to_string(newest + 1);
+  if (Result<void> set = journal_.set_register("people", pseudonym); !set) return tl::unexpected(set.error());
+  if (Result<void> set = journal_.set_person({pseudonym, label, today()}); !set) return tl::unexpected(set.error());
+  return newest + 1;
+}
+
+Result<void> RoomKeeper::check_witness(const JournalHead& witness) {
+  const std::lock_guard lock(mutex_);
+  return journal_.check_witness(witness);
+}
+
+Result<void> RoomKeeper::checkpoint(RoomSeq place, std::span<const FieldLeaf> leaves) {
+  const std::lock_guard lock(mutex_);
+  if (journal_.head().place != place || !place) return {};
+  if (const Result<std::vector<Checkpoint>> known = journal_.checkpoints(); known && !known->empty() && known->front().at.place == place)
+    return {};
+  const Digest hash = field_hash({leaves.begin(), leaves.end()}, pitch_mm_);
+  Result<CheckpointFile> file = journal_.begin_checkpoint(journal_.head(), to_hex(hash));
+  if (!file) return tl::unexpected(file.error());
+  for (std::size_t next = 0; next < leaves.size();) {
+    v1::JournalFields piece;
+    for (std::size_t size = 0; next < leaves.size() && size < kPieceBytes; ++next) {
+      *piece.add_leaves() = wire::to_wire(leaves[next]);
+      size += piece.leaves(piece.leaves_size() - 1).values().size() + 24;
+    }
+    if (Result<void> written = file->write(piece_of(piece)); !written) return written;
+  }
+  if (Result<void> finished = file->finish(); !finished) return finished;
+  return journal_.add_checkpoint(std::move(*file));
+}
+
+Result<void> RoomKeeper::close() {
+  const std::lock_guard lock(mutex_);
+  return journal_.close();
+}
+
+}  // namespace osteon

@@ -1,0 +1,464 @@
+// What a room's rows do to it: the same for one that was just decided and for one of a journal, years later.
+#include <algorithm>
+#include <map>
+#include <string>
+
+#include "common/field/kernel.hpp"
+#include "server/room/room.hpp"
+
+namespace osteon {
+namespace {
+
+// Key in a piece's history of the mask that leaves it of its parent: no event of its own. Places of events stay below.
+constexpr std::uint64_t kLeftOfSplit = std::uint64_t{1} << 63;
+
+tl::unexpected<Error> impossible(const RoomRow& row, const std::string& why) {
+  return failure(ErrorCode::invalid_input, "row " + std::to_string(row.place.value) + " cannot follow: " + why);
+}
+
+CoordBox level_0_box(int level, Coord origin) {
+  return {shift_down(origin, level), shift_down(origin + Coord{kLeafSize, kLeafSize, kLeafSize}, level)};
+}
+
+bool meet(const CoordBox& a, const CoordBox& b) {
+  return a.min.x <= b.max.x && b.min.x <= a.max.x && a.min.y <= b.max.y && b.min.y <= a.max.y && a.min.z <= b.max.z &&
+         b.min.z <= a.max.z;
+}
+
+// A mask as a split may have it: sorted leaves of the lattice that hold values.
+bool is_mask(const Mask& mask) {
+  if (!mask) return false;
+  const auto place_of = [](const FieldLeaf& leaf) { return std::pair(leaf.level, leaf.origin); };
+  for (std::size_t i = 0; i < mask->size(); ++i) {
+    const FieldLeaf& leaf = (*mask)[i];
+    const auto off_lattice = [](std::int32_t at) { return at % kLeafSize != 0; };
+    if (leaf.level < 0 || leaf.level >= kLevels || !leaf.holds_values() || off_lattice(leaf.origin.x) ||
+        off_lattice(leaf.origin.y) || off_lattice(leaf.origin.z))
+      return false;
+    if (i > 0 && !(place_of((*mask)[i - 1]) < place_of(leaf))) return false;
+  }
+  return true;
+}
+
+void add(Hasher& hasher, const Digest& digest) { hasher.bytes(std::as_bytes(std::span(digest.bytes))); }
+
+}  // namespace
+
+Result<void> Room::replay(const RoomRow& row, Fields fields) {
+  if (Result<void> possible = can_follow(row); !possible) return possible;
+  set_time(row.at);
+  fields_ = fields;
+  apply(row);
+  fields_ = Fields::evaluate;
+  return {};
+}
+
+// Not whether it would be decided so again, but whether it can have been: what a damaged or forged journal names may not
+// exist.
+Result<void> Room::can_follow(const RoomRow& row) const {
+  const auto possible = [&](bool holds, const char* why) -> Result<void> {
+    return holds ? Result<void>{} : Result<void>(impossible(row, why));
+  };
+  if (row.place.value != room_seq_.value + 1)
+    return impossible(row, "row " + std::to_string(room_seq_.value + 1) + " comes next");
+  struct Judge {
+    const Room& room;
+    const RoomRow& row;
+    const decltype(possible)& require;
+
+    Result<void> next_of(AuthorId author, std::uint64_t author_seq) const {
+      if (!room.surgeons_.contains(author)) return require(false, "its author may not cut");
+      return require(author_seq == room.decided(author) + 1, "it is not its author's next cut");
+    }
+    Result<void> operator()(const JoinRow& join) const {
+      return require(join.author.value == room.authors_ + 1 && join.kind <= MemberKind::watcher, "an author was given twice");
+    }
+    Result<void> operator()(const CutRow& cut) const {
+      if (Result<void> next = next_of(cut.cut.author, cut.cut.author_seq); !next) return next;
+      return require(room.exists(cut.cut.body) && room.judge_form(cut.cut) == Rejection::none, "no room would take this cut");
+    }
+    Result<void> operator()(const RejectionRow& one) const {
+      if (Result<void> next = next_of(one.author, one.author_seq); !next) return next;
+      return require(one.reason > Rejection::none && static_cast<int>(one.reason) < kRejections, "its reason is none");
+    }
+    Result<void> operator()(const SplitRow& split) const {
+      bool whole = room.exists(split.parent) && is_mask(split.taken);
+      std::uint32_t next = room.last_body_;
+      for (const SplitPiece& piece : split.pieces) whole = whole && piece.body.value == ++next && is_mask(piece.left);
+      return require(whole && room.bodies().size() + split.pieces.size() <= kMostBodies, "the split is incomplete");
+    }
+    Result<void> operator()(const UndoRow& undo) const {
+      bool all = !undo.places.empty() && std::ranges::is_sorted(undo.places, std::less_equal{});
+      for (const RoomSeq place : undo.places) all = all && room.can_be_undone(place) && !room.events_.at(place).undone;
+      return require(all, "it takes back what does not stand");
+    }
+    Result<void> operator()(const RedoRow& redo) const {
+      const auto stands = [&](RoomSeq place) {
+        const auto found = room.events_.find(place);
+        return found != room.events_.end() && found->second.kind == EventKind::undo && !found->second.undone;
+      };
+      bool all = !redo.undos.empty() && std::ranges::all_of(redo.undos, stands);
+      for (const RoomSeq place : redo.places) all = all && room.can_be_undone(place) && room.events_.at(place).undone;
+      return require(all, "it does again what was not undone");
+    }
+    Result<void> operator()(const RemoveBodyRow& removal) const {
+      return require(room.exists(removal.body) && room.bodies().size() > 1, "the body cannot go");
+    }
+    Result<void> operator()(const ItemRow& item) const {
+      const bool known = room.items_.contains(item.item);
+      if (!item.set) return require(known, "there is no such item");
+      return require((known || item.item == room.last_item_ + 1) && room.exists(item.set->body) &&
+                         room.tools_->find(item.set->tool) && room.items_.size() < kMostItems + 1,
+                     "the item cannot stand there");
+    }
+    Result<void> operator()(const ToolRow& tool) const {
+      if (room.tools_->find(tool.tool.hash())) return require(false, "the tool was known before");
+      if (Result<void> room_for_it = room.know(tool.tool); !room_for_it) return impossible(row, room_for_it.error().message);
+      return {};
+    }
+    Result<void> operator()(const MarkRow& mark) const {
+      return require(!mark.label.empty() && mark.label.size() <= kMostLabelBytes, "the mark has no label");
+    }
+  };
+  return std::visit(Judge{*this, row, possible}, row.what);
+}
+
+RoomEvent Room::apply(const RoomRow& row) {
+  room_seq_ = row.place;
+  RoomEvent event;
+  event.room_seq = row.place;
+  event.author = row.author;
+  std::visit([&](const auto& what) { apply(row, what, event); }, row.what);
+  finish_event(event);
+  return event;
+}
+
+void Room::finish_event(RoomEvent& event) const {
+  event.bodies = bodies();
+}
+
+Room::Event& Room::add_event(const RoomRow& row, EventKind kind) {
+  Event& event = events_[row.place];
+  event.kind = kind;
+  event.author = row.author;
+  return event;
+}
+
+void Room::apply(const RoomRow& row, const JoinRow& join, RoomEvent& event) {
+  event.kind = EventKind::join;
+  event.author = join.author;
+  authors_ = join.author.value;
+  secrets_[join.author] = join.secret;
+  if (join.kind == MemberKind::surgeon) surgeons_[join.author].granted = row.at;
+}
+
+void Room::apply(const RoomRow& row, const CutRow& what, RoomEvent& event) {
+  const Cut& cut = what.cut;
+  event.kind = EventKind::cut;
+  add_event(row, EventKind::cut);
+  ++counts_.committed;
+  note_decided(cut.author, cut_digest(cut), row.place, Rejection::none);
+  Surgeon& surgeon = surgeons_.at(cut.author);
+  surgeon.claimed += std::chrono::microseconds(cut.path_us);
+  surgeon.swept_voxels = voxels_spent(surgeon) + swept_voxels(cut);
+  surgeon.spent = row.at;
+
+  event.cut.level = cut.level;
+  for (auto& [id, body] : bodies_) {
+    if (fields_ == Fields::leave) {
+      if (const std::vector<Coord> reach = body.field.reach(cut); !reach.empty()) body.history.add(row.place, cut, reach);
+      continue;
+    }
+    CutReport part = body.field.apply(cut);
+    if (!part.reached_leaves.empty()) body.history.add(row.place, cut, part.reached_leaves);
+    if (!body.present) continue;  // nobody sees it, but it may come back
+    event.cut.visited += part.visited;
+    event.cut.computed += part.computed;
+    event.cut.modified += part.modified;
+    event.cut.changed_leaves.insert(event.cut.changed_leaves.end(), part.changed_leaves.begin(), part.changed_leaves.end());
+    if (!part.changed_leaves.empty()) note_changed(id, {{cut.level, std::move(part.changed_leaves)}}, nullptr);
+  }
+}
+
+// What its author has predicted on top of a cut that fell, falls too; but a stale cut says that he does not know yet, and
+// to raise the epoch for it would make the next ones stale as well.
+void Room::apply(const RoomRow& row, const RejectionRow& rejection, RoomEvent& event) {
+  event.kind = EventKind::cut;
+  ++counts_.rejected;
+  note_decided(rejection.author, rejection.bytes, row.place, rejection.reason);
+  if (rejection.reason == Rejection::lease) return;
+  grant(surgeons_.at(rejection.author));
+}
+
+// Epochs are places of the order, so that none comes twice and everyone sees the same.
+void Room::grant(Surgeon& surgeon) {
+  surgeon.epoch = room_seq_.value + 1;
+  surgeon.granted = now_;
+  surgeon.claimed = {};
+}
+
+void Room::bone_came_back(RoomEvent& event) {
+  ++bone_epoch_;
+  ++bone_changes_;
+  for (auto& [author, surgeon] : surgeons_) grant(surgeon);
+  event.lease_epoch = room_seq_.value + 1;
+}
+
+void Room::apply(const RoomRow& row, const UndoRow& undo, RoomEvent& event) {
+  event.kind = EventKind::undo;
+  add_event(row, EventKind::undo).places = undo.places;
+  event.places = undo.places;
+  std::set<BodyId> back;
+  for (auto place = undo.places.rbegin(); place != undo.places.rend(); ++place) {
+    Event& fallen = events_.at(*place);
+    fallen.undone = true;
+    event.scene |= fallen.kind == EventKind::scene || fallen.kind == EventKind::split || fallen.kind == EventKind::remove_body;
+    event.bone |= fallen.kind != EventKind::scene;
+    for (const SplitPiece& piece : fallen.pieces) {
+      bodies_.erase(piece.body);
+      back.erase(piece.body);
+    }
+    if (fallen.kind != EventKind::remove_body) continue;
+    const auto body = bodies_.find(fallen.body);
+    if (body == bodies_.end()) continue;
+    body->second.present = true;
+    back.insert(fallen.body);
+  }
+  for (auto& [id, body] : bodies_) {
+    if (fields_ == Fields::leave) {
+      body.history.note_undone(undo.places, true);
+      continue;
+    }
+    const auto changed = body.history.undo(body.field, undo.places);
+    if (body.present && !back.contains(id)) note_changed(id, changed, &event);
+  }
+  for (const BodyId id : back) show_whole(id, event);
+  if (event.bone) bone_came_back(event);
+}
+
+void Room::apply(const RoomRow& row, const RedoRow& redo, RoomEvent& event) {
+  event.kind = EventKind::redo;
+  add_event(row, EventKind::redo);
+  for (const RoomSeq undo : redo.undos) events_.at(undo).undone = true;
+  // Cuts first: a piece is made from its parent as it is with all of them.
+  std::vector<RoomSeq> cuts;
+  for (const RoomSeq place : redo.places)
+    if (events_.at(place).kind == EventKind::cut) cuts.push_back(place);
+  for (auto& [id, body] : bodies_) {
+    if (fields_ == Fields::leave) {
+      body.history.note_undone(cuts, false);
+      continue;
+    }
+    const auto changed = body.history.redo(body.field, cuts);
+    if (body.present) note_changed(id, changed, &event);
+  }
+  for (const RoomSeq place : redo.places) {
+    Event& again = events_.at(place);
+    if ((again.kind == EventKind::split || again.kind == EventKind::remove_body) && !exists(again.body)) continue;
+    again.undone = false;
+    event.places.push_back(place);
+    event.scene |= again.kind == EventKind::scene || again.kind == EventKind::split || again.kind == EventKind::remove_body;
+    event.bone |= again.kind != EventKind::scene;
+    if (again.kind == EventKind::split) cut_apart(place, again, event);
+    if (again.kind == EventKind::remove_body) bodies_.at(again.body).present = false;
+  }
+  if (event.bone) bone_came_back(event);
+  // A body that was changed and then taken away again is not told of.
+  std::erase_if(event.leaves, [&](const FieldLeaf& leaf) { return !exists(leaf.body); });
+}
+
+void Room::apply(const RoomRow& row, const RemoveBodyRow& removal, RoomEvent& event) {
+  event.kind = EventKind::remove_body;
+  add_event(row, EventKind::remove_body).body = removal.body;
+  bodies_.at(removal.body).present = false;
+  ++bone_changes_;
+  event.bone = event.scene = true;
+}
+
+void Room::apply(const RoomRow& row, const SplitRow& split, RoomEvent& event) {
+  event.kind = EventKind::split;
+  Event& one = add_event(row, EventKind::split);
+  one.body = split.parent;
+  one.taken = split.taken;
+  one.pieces = split.pieces;
+  if (!split.pieces.empty()) last_body_ = split.pieces.back().body.value;
+  for (const SplitPiece& piece : split.pieces) last_body_ = std::max(last_body_, piece.body.value);
+  cut_apart(row.place, one, event);
+  event.scene = true;
+  ++bone_changes_;
+}
+
+void Room::apply(const RoomRow& row, const ItemRow& item, RoomEvent& event) {
+  event.kind = EventKind::scene;
+  add_event(row, EventKind::scene).item = item.item;
+  items_[item.item].push_back({row.place, item.set});
+  last_item_ = std::max(last_item_, item.item);
+  event.item = item.item;
+  event.scene = true;
+}
+
+void Room::apply(const RoomRow& row, const ToolRow& tool, RoomEvent& event) {
+  event.kind = EventKind::tool;
+  add_event(row, EventKind::tool);
+  event.tool = &tools_->add(tool.tool);
+}
+
+void Room::apply(const RoomRow& row, const MarkRow& mark, RoomEvent& event) {
+  event.kind = EventKind::mark;
+  add_event(row, EventKind::mark).label = mark.label;
+}
+
+void Room::note_changed(BodyId id, const std::vector<LevelLeaves>& changed, RoomEvent* event) {
+  Body& body = bodies_.at(id);
+  for (const LevelLeaves& leaves : changed) {
+    if (leaves.origins.empty()) continue;
+    for (const BlockKey& key : body.surface.touch(leaves.level, leaves.origins)) stale_.insert(key);
+    changes_.push_back({id, leaves.level, leaves.origins});
+    if (!event) continue;
+    for (const Coord origin : leaves.origins) {
+      FieldLeaf& leaf = event->leaves.emplace_back(FieldLeaf{id, leaves.level, origin, {}});
+      body.field.read(leaf);
+    }
+  }
+}
+
+void Room::add_body(BodyId id, CutField field, CutHistory history, const CoordBox& reach) {
+  bodies_.emplace(id, Body{std::move(field), std::move(history), SurfaceBlocks(id), reach});
+}
+
+// Every leaf of a body that comes or comes back, and every block that it may be drawn with.
+void Room::show_whole(BodyId id, RoomEvent& event) {
+  Body& body = bodies_.at(id);
+  std::vector<FieldLeaf> leaves = body.field.leaves();
+  std::map<int, std::vector<Coord>> cut;
+  for (const FieldLeaf& leaf : leaves)
+    if (meet(level_0_box(leaf.level, leaf.origin), body.reach)) cut[leaf.level].push_back(leaf.origin);
+  // Most of a piece's leaves are gone throughout and far from it: only those round it are drawn.
+  for (const auto& [level, origins] : cut)
+    for (const BlockKey& key : body.surface.touch(level, origins)) stale_.insert(key);
+  std::vector<BlockKey> whole;
+  list_blocks(id, body, whole);
+  stale_.insert(whole.begin(), whole.end());
+  stale_.merge(focused(body));
+  for (const BlockKey& key : body.surface.coarse_blocks()) stale_.insert(key);
+  std::ranges::move(leaves, std::back_inserter(event.leaves));
+  event.bone = true;
+}
+
+// A copy of the parent with all but the piece gone.
+CutField Room::made_piece(const Body& parent, const SplitPiece& piece) const {
+  CutField field(bone(), piece.body, tools_);
+  for (const FieldLeaf& leaf : parent.field.leaves()) field.restore(leaf);
+  for (const FieldLeaf& leaf : *piece.left) field.merge(leaf);
+  return field;
+}
+
+// What the parent lost since the copy that a piece was made from; between split and undo a field only falls.
+void Room::catch_up(const Body& parent, CutField& field) const {
+  FieldLeaf leaf;
+  for (const BodyLeaves& change : changes_) {
+    if (change.body != parent.field.body()) continue;
+    for (const Coord origin : change.origins) {
+      leaf.level = change.level;
+      leaf.origin = origin;
+      parent.field.read(leaf);
+      field.merge(leaf);
+    }
+  }
+}
+
+// The pieces are copies of the parent, each with all but itself gone; then the parent loses them.
+void Room::cut_apart(RoomSeq place, Event& row, RoomEvent& event) {
+  Body& parent = bodies_.at(row.body);
+  const RoomSeq left_key{kLeftOfSplit | place.value};
+  const bool evaluated = fields_ == Fields::evaluate, ready = ready_.size() == row.pieces.size();
+  for (std::size_t i = 0; i < row.pieces.size(); ++i) {
+    const SplitPiece& piece = row.pieces[i];
+    const bool use = ready && ready_[i].body() == piece.body;
+    if (use) catch_up(parent, ready_[i]);
+    CutField field = use ? std::move(ready_[i]) : evaluated ? made_piece(parent, piece) : CutField(bone(), piece.body, tools_);
+    CutHistory history = parent.history.fork();
+    history.add_mask(left_key, piece.left);
+    add_body(piece.body, std::move(field), std::move(history), piece.reach);
+  }
+  std::vector<LevelLeaves> changed;
+  const RoomSeq again[] = {place};
+  if (!parent.history.contains(place)) {
+    parent.history.add_mask(place, row.taken);
+    std::map<int, std::vector<Coord>> origins;
+    if (evaluated)
+      for (const FieldLeaf& leaf : *row.taken)
+        if (parent.field.merge(leaf)) origins[leaf.level].push_back(leaf.origin);
+    for (auto& [level, of_level] : origins) changed.push_back({level, std::move(of_level)});
+  } else if (evaluated) {
+    changed = parent.history.redo(parent.field, again);
+  } else {
+    parent.history.note_undone(again, false);
+  }
+  note_changed(row.body, changed, &event);
+  for (const SplitPiece& piece : row.pieces) show_whole(piece.body, event);
+  event.bone = true;
+}
+
+std::vector<FieldLeaf> Room::all_leaves() const {
+  std::vector<FieldLeaf> leaves;
+  for (const auto& [id, body] : bodies_) std::ranges::move(body.field.leaves(), std::back_inserter(leaves));
+  return leaves;
+}
+
+Result<void> Room::set_fields(std::span<const FieldLeaf> leaves) {
+  for (const FieldLeaf& leaf : leaves)
+    if (!bodies_.contains(leaf.body))
+      return failure(ErrorCode::invalid_input, "the fields hold leaves of body " + std::to_string(leaf.body.value) +
+                                                   ", which the room does not have at place " + std::to_string(room_seq_.value));
+  for (const FieldLeaf& leaf : leaves) bodies_.at(leaf.body).field.restore(leaf);
+  RoomEvent nobody_hears;
+  for (auto& [id, body] : bodies_)
+    if (body.present) show_whole(id, nobody_hears);
+  return {};
+}
+
+Digest Room::room_hash() const {
+  Hasher hasher;
+  hasher.text("osteon-room-state-1");
+  add(hasher, genesis_);
+  hasher.integer(room_seq_.value);
+  hasher.integer(bodies_.size());
+  for (const auto& [id, body] : bodies_) {
+    hasher.integer(id.value);
+    hasher.integer(body.present ? 1 : 0);
+    add(hasher, body.field.hash());
+  }
+  for (const auto& [id, states] : items_)
+    for (const ItemState& state : states) {
+      hasher.integer(id);
+      hasher.integer(state.place.value);
+      hasher.integer(state.item ? 1 : 0);
+      if (!state.item) continue;
+      hasher.integer(state.item->body.value);
+      add(hasher, state.item->tool);
+      const Pose& pose = state.item->pose_bone_item;
+      for (const double part : {pose.position_mm.x(), pose.position_mm.y(), pose.position_mm.z(), pose.rotation.x(),
+                                pose.rotation.y(), pose.rotation.z(), pose.rotation.w(), state.item->turns})
+        hasher.number(part);
+      hasher.integer(state.item->seated ? 1 : 0);
+    }
+  for (const auto& [place, event] : events_) {
+    if (event.undone) hasher.integer(place.value);  // tombstones
+    if (event.kind == EventKind::mark) hasher.text(event.label);
+  }
+  hasher.integer(authors_);
+  hasher.integer(bone_epoch_);
+  for (const auto& [author, surgeon] : surgeons_) {
+    hasher.integer(author.value);
+    hasher.integer(surgeon.epoch);
+    for (const Decided& row : surgeon.decided) {
+      add(hasher, row.bytes);
+      hasher.integer(row.room_seq.value);
+      hasher.integer(static_cast<std::uint64_t>(row.rejection));
+    }
+  }
+  return hasher.finish();
+}
+
+}  // namespace osteon

@@ -1,0 +1,313 @@
+// What a room decides as rows: replayed, through their bytes, they make the same room again, from the beginning or from any
+// place on.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <random>
+
+#include "server/net/journal_rows.hpp"
+#include "tests/unit/room/cuts.hpp"
+#include "tests/unit/room/parts.hpp"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+using test::strokes;
+using test::test_block;
+using test::tool_named;
+
+Fragment half(const Case& bone, bool upper) {
+  Fragment fragment = test::part(bone, [&](int x) { return (x >= 0) == upper; });
+  (upper ? fragment.bounds.min_mm : fragment.bounds.max_mm).x() = 0.0;
+  return fragment;
+}
+
+// Two hands that cut, undo, redo, saw the bone apart, take pieces away, set items, mark, and err, in a seeded mixture.
+class BusyRoom {
+ public:
+  explicit BusyRoom(unsigned seed) : room(test_block()), random_(seed) {
+    for (std::size_t i = 0; i < 2; ++i) hands_[i] = room.join(MemberKind::surgeon, static_cast<std::uint32_t>(i + 1), Digest{{1}});
+    for (std::size_t i = 0; i < 2; ++i) cuts_[i] = strokes(hands_[i], 200, seed + static_cast<unsigned>(i) * 100);
+  }
+
+  void act() {
+    room.set_time(room.time() + 8ms);
+    const std::size_t who = random_() % 2;
+    const AuthorId hand = hands_[who];
+    switch (random_() % 12) {
+      case 0: (void)room.undo_last(hand, 1 + random_() % 3, {}); return;
+      case 1: (void)room.redo_last(hand, 1 + random_() % 2); return;
+      case 2:
+        if (room.bodies().size() == 1) (void)room.split(BodyId{0}, {half(room.bone(), upper_ = !upper_)}, room.bone_epoch());
+        return;
+      case 3:
+        if (room.bodies().size() > 1) (void)room.remove_body(hand, room.bodies()[random_() % room.bodies().size()]);
+        return;
+      case 4: {
+        SceneItem guide;
+        guide.body = room.bodies().front();
+        guide.tool = tool_named("guide-1").hash();
+        guide.pose_bone_item = pose_along({0.1 * static_cast<double>(random_() % 50), 2, 0}, Vec3{0.1, 0.2, -1}.normalized());
+        const auto standing = room.items();
+        if (!standing.empty() && random_() % 2) guide.id = standing.front().id;
+        (void)room.set_item(hand, guide);
+        return;
+      }
+      case 5:
+        if (const auto standing = room.items(); !standing.empty()) (void)room.remove_item(hand, standing.back().id);
+        return;
+      case 6: {
+        (void)room.mark(hand, "step " + std::to_string(room.room_seq().value));
+        Tool tool = tool_named("drill-3.2");
+        tool.name = "drill-" + std::to_string(room.room_seq().value);
+        tool.diameter_mm = 3.3 + 0.01 * static_cast<double>(random_() % 50);
+        (void)room.add_tool(hand, tool);
+        return;
+      }
+      default: {
+        Cut& cut = cuts_[who][room.decided(hand)];
+        cut.lease_epoch = random_() % 10 == 0 ? 0 : room.lease_epoch(hand);
+        if (random_() % 10 == 0) cut.spindle_rpm = 1'000'000;
+        ASSERT_TRUE(room.submit(cut));
+      }
+    }
+  }
+
+  Room room;
+
+ private:
+  std::mt19937 random_;
+  std::array<AuthorId, 2> hands_;
+  std::array<std::vector<Cut>, 2> cuts_;
+  bool upper_ = false;
+};
+
+Room begun_like(const Room& room) {
+  const Result<RoomGenesis> genesis = genesis_from_bytes(to_bytes(genesis_of(Room(test_block()), "a room")));
+  EXPECT_TRUE(genesis) << genesis.error().message;
+  Result<Room> made = begin_room(test_block(), *genesis, {});
+  EXPECT_TRUE(made) << made.error().message;
+  EXPECT_EQ(made->genesis(), room.genesis());
+  return std::move(*made);
+}
+
+// As a journal keeps it.
+RoomRow through_bytes(const RoomRow& row) {
+  Result<RoomRow> read = row_from_bytes(row.place, row.at, to_bytes(row));
+  EXPECT_TRUE(read) << read.error().message;
+  return std::move(*read);
+}
+
+// The whole room, also what shows only later: what an undo of everything leaves, and a redo after that.
+void expect_same(Room& one, Room& other) {
+  ASSERT_EQ(one.room_hash(), other.room_hash());
+  ASSERT_EQ(one.bodies(), other.bodies());
+  ASSERT_EQ(one.items(), other.items());
+  ASSERT_EQ(one.marks(), other.marks());
+  for (int round = 0; round < 2; ++round) {
+    for (Room* room : {&one, &other}) {
+      if (round == 0) (void)room->undo_to(AuthorId{1}, RoomSeq{2});
+      else (void)room->redo_last(AuthorId{1}, 1);
+    }
+    ASSERT_EQ(one.room_hash(), other.room_hash()) << (round == 0 ? "after an undo of everything" : "after its redo");
+  }
+}
+
+class RoomRows : public ::testing::TestWithParam<unsigned> {};
+
+TEST_P(RoomRows, ReplayedMakeTheSameRoom) {
+  BusyRoom busy(GetParam());
+  Room replayed = begun_like(busy.room);
+  std::size_t rows = 0;
+  for (int i = 0; i < 60; ++i) {
+    busy.act();
+    for (const RoomRow& row : busy.room.take_rows()) {
+      const Result<void> followed = replayed.replay(through_bytes(row));
+      ASSERT_TRUE(followed) << followed.error().message;
+      ++rows;
+    }
+    ASSERT_EQ(replayed.room_hash(), busy.room.room_hash()) << "event " << i << ", row " << rows;
+    ASSERT_EQ(replayed.room_seq(), busy.room.room_seq());
+  }
+  EXPECT_EQ(rows, busy.room.room_seq().value) << "every place of the order is a row";
+  EXPECT_TRUE(replayed.take_rows().empty()) << "what was decided elsewhere is not decided again";
+  expect_same(busy.room, replayed);
+}
+
+// Fields of any place and the rows before it, which are not evaluated again, then the rows after it.
+TEST_P(RoomRows, GoOnFromACheckpoint) {
+  BusyRoom busy(GetParam());
+  std::vector<RoomRow> before, after;
+  std::vector<FieldLeaf> fields;
+  for (int i = 0; i < 60; ++i) {
+    busy.act();
+    std::ranges::move(busy.room.take_rows(), std::back_inserter(i < 40 ? before : after));
+    if (i == 39) fields = busy.room.all_leaves();
+  }
+  Room recovered = begun_like(busy.room);
+  for (const RoomRow& row : before) ASSERT_TRUE(recovered.replay(through_bytes(row), Room::Fields::leave));
+  ASSERT_TRUE(recovered.set_fields(fields));
+  for (const RoomRow& row : after) {
+    const Result<void> followed = recovered.replay(through_bytes(row));
+    ASSERT_TRUE(followed) << followed.error().message;
+  }
+  expect_same(busy.room, recovered);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, RoomRows, ::testing::Range(1u, 9u));
+
+TEST(RoomReplay, TakesOnlyTheRowThatComesNext) {
+  BusyRoom busy(3);
+  for (int i = 0; i < 20; ++i) busy.act();
+  const std::vector<RoomRow> rows = busy.room.take_rows();
+  Room replayed = begun_like(busy.room);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Digest before = replayed.room_hash();
+    if (i + 1 < rows.size()) {
+      EXPECT_FALSE(replayed.replay(rows[i + 1])) << "a gap";
+    }
+    if (i > 0) {
+      EXPECT_FALSE(replayed.replay(rows[i - 1])) << "again";
+    }
+    EXPECT_EQ(replayed.room_hash(), before);
+    ASSERT_TRUE(replayed.replay(rows[i]));
+  }
+}
+
+// A journal may have been damaged or forged where its chain still holds: no row may name what is not there.
+TEST(RoomReplay, RefusesARowThatNamesWhatIsNotThere) {
+  Room room(test_block());
+  const AuthorId hand = room.join(MemberKind::surgeon);
+  const auto cuts = strokes(hand, 3, 4);
+  ASSERT_TRUE(room.submit(cuts[0]));
+  const Digest before = room.room_hash();
+  Cut of_nobody = cuts[1], of_no_tool = cuts[1], of_no_body = cuts[1], too_early = cuts[2], far = cuts[1];
+  of_nobody.author = AuthorId{9};
+  of_no_tool.tool.bytes[3] ^= 1;
+  of_no_body.body = BodyId{4};
+  far.path.back().position[0] = INT32_MAX;
+  const Mask torn = std::make_shared<const std::vector<FieldLeaf>>(std::vector<FieldLeaf>{{BodyId{0}, 0, {1, 0, 0}, {5}}});
+  const Mask whole = std::make_shared<const std::vector<FieldLeaf>>();
+  SceneItem item;
+  item.id = 1;
+  item.tool = tool_named("guide-1").hash();
+  SceneItem of_gone_body = item;
+  of_gone_body.body = BodyId{3};
+  const decltype(RoomRow::what) impossible[] = {
+      CutRow{of_nobody}, CutRow{of_no_tool}, CutRow{of_no_body}, CutRow{too_early}, CutRow{far},
+      JoinRow{hand, MemberKind::surgeon, 0, {}}, JoinRow{AuthorId{7}, MemberKind::watcher, 0, {}},
+      RejectionRow{hand, 3, {}, Rejection::place}, RejectionRow{hand, 2, {}, Rejection::none},
+      RejectionRow{hand, 2, {}, static_cast<Rejection>(kRejections)},
+      SplitRow{BodyId{3}, whole, {}}, SplitRow{BodyId{0}, torn, {}}, SplitRow{BodyId{0}, nullptr, {}},
+      SplitRow{BodyId{0}, whole, {{BodyId{5}, {}, whole}}},
+      UndoRow{{}}, UndoRow{{RoomSeq{1}}}, UndoRow{{RoomSeq{9}}}, UndoRow{{RoomSeq{2}, RoomSeq{2}}},
+      RedoRow{{}, {}}, RedoRow{{RoomSeq{2}}, {}}, RedoRow{{RoomSeq{8}}, {}},
+      RemoveBodyRow{BodyId{0}}, RemoveBodyRow{BodyId{6}},
+      ItemRow{1, std::nullopt}, ItemRow{2, item}, ItemRow{1, of_gone_body},
+      ToolRow{tool_named("guide-1")}, MarkRow{""}, MarkRow{std::string(kMostLabelBytes + 1, 'x')}};
+  for (std::size_t i = 0; i < std::size(impossible); ++i) {
+    EXPECT_FALSE(room.replay({RoomSeq{3}, 1s, hand, impossible[i]})) << "row " << i;
+    EXPECT_EQ(room.room_hash(), before) << "row " << i;
+  }
+  EXPECT_TRUE(room.replay({RoomSeq{3}, 1s, hand, CutRow{cuts[1]}}));
+}
+
+TEST(RoomLease, FallsWithARejectionForItsAuthorAlone) {
+  Room room(test_block());
+  const AuthorId one = room.join(MemberKind::surgeon), other = room.join(MemberKind::surgeon);
+  auto cuts = strokes(one, 4, 1), of_other = strokes(other, 1, 2);
+  cuts[0].level = kLevels;
+  const Outcome fell = room.submit(cuts[0]).value();
+  EXPECT_EQ(fell.rejection, Rejection::level);
+  EXPECT_GT(fell.lease_epoch, 1u);
+  EXPECT_EQ(room.lease_epoch(one), fell.lease_epoch);
+  // What was on its way was made on top of what fell; that it falls too does not void what comes after it.
+  EXPECT_EQ(room.submit(cuts[1])->rejection, Rejection::lease);
+  EXPECT_EQ(room.submit(cuts[2])->rejection, Rejection::lease);
+  cuts[3].lease_epoch = fell.lease_epoch;
+  EXPECT_TRUE(room.submit(cuts[3])->committed());
+  EXPECT_TRUE(room.submit(of_other[0])->committed()) << "another's work stands on other bone";
+}
+
+TEST(RoomLease, TakesNoMoreToolTimeThanHasPassed) {
+  Room room(test_block(), {.time_slack = 100ms});
+  const AuthorId hand = room.join(MemberKind::surgeon);
+  auto cuts = strokes(hand, 40, 1);
+  std::size_t taken = 0;
+  room.set_time(1s);
+  for (Cut& cut : cuts) {
+    cut.path_us = 50'000;
+    cut.lease_epoch = room.lease_epoch(hand);
+    if (!room.submit(cut)->committed()) break;
+    ++taken;
+  }
+  EXPECT_EQ(taken, 22u) << "1.1 s of cuts of 50 ms each, and none of those that take longer";
+  EXPECT_EQ(room.counts().rejected, 1u);
+}
+
+// 1 mm of way a cut; what the kernel would look at is bounded by the box of the tool and its way.
+TEST(RoomLimits, BoundWhatIsSweptOverTime) {
+  const auto taken_in_a_row = [](double voxels_per_s) {
+    Room room(test_block(), {.swept_voxels_per_s = voxels_per_s});
+    const AuthorId hand = room.join(MemberKind::surgeon);
+    const Tool burr = tool_named("burr-round-5");
+    std::size_t taken = 0;
+    for (std::uint64_t i = 1; i <= 100; ++i) {
+      Cut cut = test::straight_cut(burr, {0, 0, 0}, {1, 0, 0}, {0, 0, -1}, i);
+      cut.author = hand;
+      cut.lease_epoch = room.lease_epoch(hand);
+      if (room.submit(cut)->committed()) ++taken;
+    }
+    EXPECT_EQ(room.counts().rejected, 100 - taken);
+    room.set_time(1h);
+    Cut cut = test::straight_cut(burr, {0, 0, 0}, {1, 0, 0}, {0, 0, -1}, 101);
+    cut.author = hand;
+    cut.lease_epoch = room.lease_epoch(hand);
+    EXPECT_TRUE(room.submit(cut)->committed()) << "time gives it back";
+    return taken;
+  };
+  const std::size_t few = taken_in_a_row(1e5), more = taken_in_a_row(2e5);
+  EXPECT_GT(few, 0u);
+  EXPECT_LT(more, 100u);
+  EXPECT_NEAR(static_cast<double>(more), 2.0 * static_cast<double>(few), 2.0);
+}
+
+TEST(RoomMark, IsFoundAgainAndUndoneTo) {
+  Room room(test_block());
+  const AuthorId hand = room.join(MemberKind::surgeon);
+  auto cuts = strokes(hand, 6, 8);
+  for (std::size_t i = 0; i < 3; ++i) ASSERT_TRUE(room.submit(cuts[i])->committed());
+  const Digest then = room.field_hash();
+  ASSERT_TRUE(room.mark(hand, "before the deep one"));
+  for (std::size_t i = 3; i < 6; ++i) ASSERT_TRUE(room.submit(cuts[i])->committed());
+  ASSERT_NE(room.field_hash(), then);
+  ASSERT_EQ(room.marks().size(), 1u);
+  EXPECT_EQ(room.marks()[0].second, "before the deep one");
+  const auto undone = room.undo_to(hand, room.marks()[0].first);
+  ASSERT_TRUE(undone);
+  EXPECT_EQ(undone->places.size(), 3u);
+  EXPECT_EQ(room.field_hash(), then);
+  EXPECT_EQ(room.undo_to(hand, room.marks()[0].first).error().code, ErrorCode::unavailable) << "nothing stands since";
+  EXPECT_FALSE(room.undo_to(hand, RoomSeq{99}));
+  EXPECT_FALSE(room.mark(hand, "")) << "a mark without a name";
+  EXPECT_FALSE(room.mark(AuthorId{}, "nobody's"));
+}
+
+TEST(JournalRows, AreRefusedWhereTheyAreNone) {
+  EXPECT_FALSE(row_from_bytes(RoomSeq{1}, 0s, "\xff\xff"));
+  EXPECT_EQ(row_from_bytes(RoomSeq{1}, 0s, "").error().code, ErrorCode::unsupported);
+  EXPECT_FALSE(genesis_from_bytes("\xff\xff"));
+  RoomGenesis genesis = genesis_of(Room(test_block()), "a");
+  genesis.case_hash.bytes[0] ^= 1;
+  EXPECT_EQ(begin_room(test_block(), genesis, {}).error().code, ErrorCode::unsupported);
+  genesis = genesis_of(Room(test_block()), "a");
+  ++genesis.kernel_version;
+  EXPECT_EQ(begin_room(test_block(), genesis, {}).error().code, ErrorCode::unsupported);
+  genesis = genesis_of(Room(test_block()), "a");
+  genesis.tools.pop_back();
+  EXPECT_EQ(begin_room(test_block(), genesis, {}).error().code, ErrorCode::invalid_input);
+}
+
+}  // namespace
+}  // namespace osteon
