@@ -19,7 +19,8 @@ bool ClockOffset::add(const ClockSample& sample) noexcept {
   const auto there = sample.peer_received - sample.sent, back = sample.peer_sent - sample.received;
   const auto round_trip = away - kept;
   // Halves are rounded down, by less than the nanosecond that the error is widened by.
-  kept_[count_++ % kSamples] = {{(there + back) / 2, round_trip, (round_trip + std::chrono::nanoseconds{1}) / 2}, sample.received};
+  const auto error = (round_trip + std::chrono::nanoseconds{1}) / 2;
+  kept_[count_++ % kSamples] = {{(there + back) / 2, round_trip, error}, sample.received};
   return true;
 }
 

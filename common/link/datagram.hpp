@@ -30,7 +30,7 @@ struct Datagram {
 
 // One socket, of a server with many peers or of a client with one. It is polled, so that one loop drives a session on a real
 // network and in a simulation alike: receive what there is (a bounded number, as there are floods), do what is due, then wait
-// (UdpPort::wait) or let virtual time go on. Nothing is promised of what is sent: it may be lost, repeated, late or out of order. One thread.
+// (UdpPort::wait) or let virtual time go on. What is sent may be lost, repeated, late or out of order. One thread.
 class DatagramPort {
  public:
   virtual ~DatagramPort() = default;

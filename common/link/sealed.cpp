@@ -2,6 +2,7 @@
 
 #include <sodium.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "common/core/check.hpp"
@@ -43,10 +44,18 @@ bool authentic(std::span<const std::uint8_t> datagram, const Nonce& nonce, const
 
 SealKey::~SealKey() { sodium_memzero(bytes.data(), bytes.size()); }
 
-SealKey make_key(const FillRandom& random) {
+std::optional<SealKey> key_of(std::span<const std::uint8_t> bytes) noexcept {
   SealKey key;
-  random(key.bytes);
+  if (bytes.size() != key.bytes.size()) return {};
+  std::ranges::copy(bytes, key.bytes.begin());
   return key;
+}
+
+SessionKeys make_session_keys(std::uint32_t session, const FillRandom& random) {
+  SessionKeys keys{session, {}, {}};
+  random(keys.up.bytes);
+  random(keys.down.bytes);
+  return keys;
 }
 
 SealKey next_key(const SealKey& key) noexcept {

@@ -33,9 +33,17 @@ struct SealKey {
   ~SealKey();
   friend bool operator==(const SealKey&, const SealKey&) = default;
 };
-[[nodiscard]] SealKey make_key(const FillRandom& random);
+// Nothing unless there are 32 bytes.
+[[nodiscard]] std::optional<SealKey> key_of(std::span<const std::uint8_t> bytes) noexcept;
 // The key of the generation after `key`'s.
 [[nodiscard]] SealKey next_key(const SealKey& key) noexcept;
+
+// What a server makes for each session and hands to its peer.
+struct SessionKeys {
+  std::uint32_t session = 0;
+  SealKey up, down;  // up: from the client to the server
+};
+[[nodiscard]] SessionKeys make_session_keys(std::uint32_t session, const FillRandom& random);
 
 struct SealRules {
   std::chrono::nanoseconds rekey_after = std::chrono::seconds{120};  // since the first datagram under a key

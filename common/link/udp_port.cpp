@@ -61,7 +61,8 @@ Result<std::unique_ptr<UdpPort>> UdpPort::open(const UdpPortOptions& options) {
   asio::error_code error;
   const asio::ip::address address = asio::ip::make_address(options.address, error);
   if (error)
-    return failure(ErrorCode::invalid_input, "\"" + options.address + "\" is no numeric address for UDP; give one such as 0.0.0.0");
+    return failure(ErrorCode::invalid_input,
+                   "\"" + options.address + "\" is no numeric address for UDP; give one such as 0.0.0.0");
   const auto refused = [&](const char* what) {
     return failure(ErrorCode::unavailable, std::string("UDP on ") + name + " cannot be " + what + " (" + error.message() +
                                                "); give an address of this machine and a free port");
@@ -136,7 +137,8 @@ Result<Endpoint> find_endpoint(const std::string& host, std::uint16_t port) {
   if (!error) return endpoint_of({numeric, port});
   const auto found = udp::resolver(context).resolve(host, std::to_string(port), udp::resolver::numeric_service, error);
   if (error || found.empty())
-    return failure(ErrorCode::not_found, "no machine named \"" + host + "\" is known (" + error.message() + "); give its address");
+    return failure(ErrorCode::not_found,
+                   "no machine named \"" + host + "\" is known (" + error.message() + "); give its address");
   for (const auto& entry : found)
     if (entry.endpoint().address().is_v4()) return endpoint_of(entry.endpoint());
   return endpoint_of(found.begin()->endpoint());

@@ -24,9 +24,9 @@ int main(int argc, char** argv) {
               number(report.answered_bytes));
   for (std::size_t i = 0; i < osteon::test::kForgeries; ++i)
     std::printf("\"%s\": %llu, ", osteon::test::kForgeryNames[i], number(report.sent[i]));
-  std::printf("\"genuine\": %llu, \"genuine_accepted\": %llu, \"genuine_answered\": %llu, \"moves\": %llu, \"moves_noticed\": %llu, ",
-              number(report.genuine), number(report.genuine_accepted), number(report.genuine_answered), number(report.moves),
-              number(report.moves_noticed));
+  std::printf("\"genuine\": %llu, \"genuine_accepted\": %llu, \"genuine_answered\": %llu, ", number(report.genuine),
+              number(report.genuine_accepted), number(report.genuine_answered));
+  std::printf("\"moves\": %llu, \"moves_noticed\": %llu, ", number(report.moves), number(report.moves_noticed));
   std::printf("\"generations\": %llu, \"seconds\": %.3f, \"packets_per_s\": %.0f}\n", number(report.generations), seconds,
               static_cast<double>(forged) / seconds);
 }

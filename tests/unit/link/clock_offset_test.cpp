@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 #include <random>
+#include <vector>
 
 namespace osteon {
 namespace {
@@ -41,7 +42,9 @@ TEST(ClockOffset, StaysWithinItsStatedErrorOnAnyNetwork) {
   Time worst{0};
   for (std::uint64_t seed = 0; seed < 300; ++seed) {
     std::mt19937_64 random(seed);
-    const auto upto = [&](Time most) { return Time(static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(most.count() + 1))); };
+    const auto upto = [&](Time most) {
+      return Time(static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(most.count() + 1)));
+    };
     const Time ahead = upto(2h) - Time(1h), least_there = upto(50ms), least_back = upto(50ms);
     ClockOffset clock;
     std::vector<Time> round_trips;
@@ -53,7 +56,8 @@ TEST(ClockOffset, StaysWithinItsStatedErrorOnAnyNetwork) {
       ASSERT_TRUE(clock.add(sample));
       round_trips.push_back(there + back);
       now = sample.received;
-      const Time least = *std::min_element(round_trips.end() - std::min<long>(16, static_cast<long>(round_trips.size())), round_trips.end());
+      const auto kept = std::min<long>(16, static_cast<long>(round_trips.size()));
+      const Time least = *std::min_element(round_trips.end() - kept, round_trips.end());
       const auto reading = clock.at(now);
       ASSERT_TRUE(reading);
       EXPECT_EQ(reading->round_trip, least);

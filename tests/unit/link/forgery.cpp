@@ -25,11 +25,6 @@ constexpr std::uint64_t kForgedForEachGenuine = 31;
 constexpr Time kBetween = 50us;
 constexpr std::uint8_t kData = 0, kEcho = 1, kChallenge = 2;  // first plain byte; a token follows echo and challenge
 
-struct SessionKeys {
-  std::uint32_t session;
-  SealKey up, down;
-};
-
 // Keeps what is sent, for the peers and the forger to find.
 class Outlet final : public DatagramPort {
  public:
@@ -95,7 +90,8 @@ class Responder {
 };
 
 struct Peer {
-  Peer(const SessionKeys& keys, const Endpoint& first) : sealer(keys.session, keys.up), opener(keys.session, keys.down), address(first) {}
+  Peer(const SessionKeys& keys, const Endpoint& first)
+      : sealer(keys.session, keys.up), opener(keys.session, keys.down), address(first) {}
   Sealer sealer;
   Opener opener;
   Endpoint address;
@@ -178,7 +174,7 @@ ForgeryReport forge(std::uint64_t count, std::uint64_t seed) {
     for (auto& byte : into) byte = static_cast<std::uint8_t>(random());
   };
   std::vector<SessionKeys> keys;
-  for (std::uint32_t i = 0; i < kPeers; ++i) keys.push_back({100 + i, make_key(fill), make_key(fill)});
+  for (std::uint32_t i = 0; i < kPeers; ++i) keys.push_back(make_session_keys(100 + i, fill));
   Outlet outlet;
   Responder server(keys, fill, outlet);
   std::vector<std::unique_ptr<Peer>> peers;
@@ -218,7 +214,8 @@ ForgeryReport forge(std::uint64_t count, std::uint64_t seed) {
     for (std::uint64_t i = 0; i < kForgedForEachGenuine && left > 0; ++i, --left) {
       now += kBetween;
       const auto kind = static_cast<Forgery>(random() % kForgeries);
-      const Bytes bytes = forged(kind, on_its_way, replays[random() % replays.size()], peers[random() % kPeers]->last, reflected, random);
+      const Bytes &replayed = replays[random() % replays.size()], &of_another = peers[random() % kPeers]->last;
+      const Bytes bytes = forged(kind, on_its_way, replayed, of_another, reflected, random);
       // From the peer's own address, from another's, or from anywhere.
       Endpoint from = peer.address;
       if (random() % 2 == 0) from = random() % 2 == 0 ? peers[random() % kPeers]->address : Endpoint{random(), random(), 7};

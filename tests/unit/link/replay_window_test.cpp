@@ -50,7 +50,8 @@ TEST(ReplayWindow, TakesEachCounterOnceInAnyOrder) {
     for (std::size_t at = 0; at < counters.size(); at += 1024)
       std::shuffle(counters.begin() + static_cast<long>(at), counters.begin() + static_cast<long>(at + 1024), random);
     std::vector<std::uint64_t> twice;
-    for (const std::uint64_t counter : counters) twice.insert(twice.end(), {counter, counters[random() % counters.size()], counter});
+    for (const std::uint64_t counter : counters)
+      twice.insert(twice.end(), {counter, counters[random() % counters.size()], counter});
     SCOPED_TRACE(seed);
     agree(twice);
     EXPECT_EQ(agree(counters), static_cast<int>(counters.size()));
@@ -70,7 +71,8 @@ TEST(ReplayWindow, AgreesWithASetOfAllThatWasSeen) {
       const std::uint64_t jump = jumps[far ? 4 + random() % 3 : random() % 4];
       front += std::min(jump, kLast - front);
       // What the ring held before must not be taken for what is at the window's far end now.
-      for (std::uint64_t back = 1980; far && back < 2060; back += 3) counters.insert(counters.end(), {front, front - std::min(back, front)});
+      for (std::uint64_t back = 1980; far && back < 2060; back += 3)
+        counters.insert(counters.end(), {front, front - std::min(back, front)});
       const std::uint64_t back = random() % 20 == 0 ? 1900 + random() % 300 : random() % 100;
       counters.push_back(front - std::min(back, front));
       counters.push_back(front);
