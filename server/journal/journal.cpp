@@ -131,6 +131,9 @@ Result<Journal> Journal::open_locked(const fs::path& file, const JournalOptions&
     state.closed = Error{ErrorCode::unavailable, found.faults.front()};
     return journal;
   }
+  // The log's end is filled up to a sector at each commit, so that a torn write cannot spoil rows that are safe; but a log
+  // found after a power failure may end within one. So nothing is put behind it: it is carried into the file, and begun anew.
+  if (Result<void> carried = state.file.database().carry_log(true); !carried) return tl::unexpected(carried.error());
   const auto recovered = state.file.find_register(kRecoveredRegister);
   if (!recovered) return tl::unexpected(recovered.error());
   if (*recovered) state.recovered_to = RoomSeq{decode_number(**recovered).value_or(0)};
@@ -220,12 +223,12 @@ Result<void> Journal::check_witness(const JournalHead& witness) {
   const std::string place = std::to_string(witness.place.value), file = state.path.string();
   if (witness.place > state.head.place && state.recovered_to)
     return failure(ErrorCode::unavailable,
-                   file + " was recovered to place " + std::to_string(state.recovered_to->value) + ", and a client knows " +
-                       place + ": what it knows beyond is lost, it has to join anew");
+                   file + " was recovered to place " + std::to_string(state.recovered_to->value) +
+                       ", and a client knows place " + place + ": what it knows beyond is lost, it has to join anew");
   if (witness.place > state.head.place) {
-    close_to_rows({ErrorCode::unavailable, file + " goes to place " + std::to_string(state.head.place.value) +
-                                               ", but a client was told that place " + place +
-                                               " is safe: rows were lost; recover it into a new journal, or go on from a backup"});
+    close_to_rows({ErrorCode::unavailable,
+                   file + " goes to place " + std::to_string(state.head.place.value) + ", but a client was told that place " +
+                       place + " is safe: rows were lost; recover it into a new journal, or go on from a backup"});
     return tl::unexpected(*state.closed);
   }
   const auto chain = state.file.chain_at(witness.place);

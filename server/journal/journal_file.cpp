@@ -80,31 +80,16 @@ Digest seal_of(std::string_view name, std::string_view value) {
   return hasher.finish();
 }
 
-std::uint64_t big_endian_32(std::string_view bytes, std::size_t at) {
-  std::uint64_t value = 0;
-  for (std::size_t i = 0; i < 4; ++i) value = (value << 8) | static_cast<unsigned char>(bytes[at + i]);
-  return value;
-}
-
-// SQLite takes an empty file for a new database, and throws away the log beside it: so the first page is looked at before.
-Result<int> version_in_header(const fs::path& file, Disk& disk) {
+// SQLite takes an empty file for a new database, and throws away the log beside it. Any other first page is for SQLite to
+// judge: when the power failed while the log was being carried into the file, the log still has what is torn there.
+Result<void> check_not_empty(const fs::path& file, Disk& disk) {
+  constexpr std::uint64_t kSmallestPage = 512;
   const auto size = disk.size(file);
   if (!size) return tl::unexpected(size.error());
   if (!*size) return failure(ErrorCode::not_found, "there is no journal " + file.string());
-  const Result<std::string> header = disk.read(file, 0, 100);
-  if (!header) return tl::unexpected(header.error());
-  if (header->size() < 100 || header->compare(0, 16, std::string_view("SQLite format 3\0", 16)) != 0 ||
-      big_endian_32(*header, 68) != static_cast<std::uint64_t>(kApplication))
-    return failure(ErrorCode::invalid_input, file.string() + " is no journal, or its first page is damaged");
-  if ((*header)[18] != 2 || (*header)[19] != 2)
-    return failure(ErrorCode::invalid_input, file.string() + " is no journal as its first page says, so that is damaged");
-  const auto version = static_cast<std::int64_t>(big_endian_32(*header, 60));
-  const auto known = std::find_if(kVersions.begin(), kVersions.end(), [&](const Version& v) { return v.number == version; });
-  if (known == kVersions.end())
-    return failure(ErrorCode::unsupported, file.string() + " is a journal of version " + std::to_string(version) +
-                                               ", this program reads up to version " + std::to_string(kJournalVersion) +
-                                               "; open it with the program that made it");
-  return known->number;
+  if (**size >= kSmallestPage) return {};
+  return failure(ErrorCode::invalid_input,
+                 file.string() + " has been cut to " + std::to_string(**size) + " bytes, less than a page; go on from a backup");
 }
 
 }  // namespace
@@ -182,12 +167,10 @@ Result<void> JournalFile::make(const fs::path& file, std::string_view genesis, D
 }
 
 Result<JournalFile> JournalFile::open(const fs::path& file, Disk& disk, const DatabaseOptions& options) {
-  const Result<int> version = version_in_header(file, disk);
-  if (!version) return tl::unexpected(version.error());
+  if (Result<void> something = check_not_empty(file, disk); !something) return tl::unexpected(something.error());
   auto database = Database::open(file, disk, options);
   if (!database) return tl::unexpected(database.error());
   JournalFile opened(file, disk, std::move(*database));
-  opened.version_ = *version;
   if (Result<void> known = opened.check_tables(); !known) return tl::unexpected(known.error());
   const auto genesis = opened.find_register(kGenesisRegister);
   if (!genesis) return tl::unexpected(genesis.error());
@@ -201,16 +184,27 @@ tl::unexpected<Error> JournalFile::damaged(const std::string& what) const {
   return failure(ErrorCode::invalid_input, file_.string() + ": " + what + " is damaged" + std::string(kRemedy));
 }
 
-// A damaged definition could make SQLite read the right bytes wrongly.
 Result<void> JournalFile::check_tables() {
+  const Result<std::int64_t> application = database_.integer("PRAGMA application_id");
+  if (!application) return tl::unexpected(application.error());
+  const Result<std::string> mode = database_.text("PRAGMA journal_mode");
+  if (!mode) return tl::unexpected(mode.error());
+  if (*application != kApplication || *mode != "wal")
+    return failure(ErrorCode::invalid_input, file_.string() + " is no journal, or its first page is damaged; go on from a backup");
+  const Result<std::int64_t> version = database_.integer("PRAGMA user_version");
+  if (!version) return tl::unexpected(version.error());
+  if (std::none_of(kVersions.begin(), kVersions.end(), [&](const Version& known) { return known.number == *version; }))
+    return failure(ErrorCode::unsupported, file_.string() + " is a journal of version " + std::to_string(*version) +
+                                               ", this program reads up to version " + std::to_string(kJournalVersion) +
+                                               "; open it with the program that made it");
+  version_ = static_cast<int>(*version);
+
+  // A damaged definition could make SQLite read the right bytes wrongly.
   const Result<std::string> tables =
       database_.text("SELECT group_concat(sql, ';') || ';' FROM (SELECT sql FROM sqlite_schema ORDER BY rowid)");
   if (!tables) return tl::unexpected(tables.error());
-  const Result<std::int64_t> version = database_.integer("PRAGMA user_version");
-  if (!version) return tl::unexpected(version.error());
-  if (*tables == version_of(version_).tables && *version == version_) return {};
-  return failure(ErrorCode::invalid_input, file_.string() + ": its tables are not those of version " + std::to_string(version_) +
-                                               ", so its first pages are damaged" + std::string(kRemedy));
+  if (*tables == version_of(version_).tables) return {};
+  return damaged("what says how its tables of version " + std::to_string(version_) + " are made");
 }
 
 Walk JournalFile::walk(const JournalHead& before, RoomSeq last,

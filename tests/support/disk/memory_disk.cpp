@@ -215,20 +215,12 @@ int MemoryDisk::Fault::next() {
   return error;
 }
 
-int MemoryDisk::before_write() {
+int MemoryDisk::before(std::uint64_t& count, Fault& fault) {
   if (off_) return EIO;
-  ++counts_.writes;
+  ++count;
+  const int either = fault_.next(), own = fault.next();
   if (power_fault_.next() != 0) off_ = true;
-  const int error = off_ ? EIO : write_fault_.next();
-  failed_ = failed_ || error != 0;
-  return error;
-}
-
-int MemoryDisk::before_sync() {
-  if (off_) return EIO;
-  ++counts_.syncs;
-  if (power_fault_.next() != 0) off_ = true;
-  const int error = off_ ? EIO : sync_fault_.next();
+  const int error = off_ ? EIO : either != 0 ? either : own;
   failed_ = failed_ || error != 0;
   return error;
 }
@@ -358,10 +350,11 @@ void MemoryDisk::power_returns() {
 }
 
 void MemoryDisk::mend() {
-  write_fault_ = sync_fault_ = power_fault_ = {};
+  fault_ = write_fault_ = sync_fault_ = power_fault_ = {};
   failed_ = off_;
 }
 
+void MemoryDisk::fail_at(std::uint64_t n, int error, Lasting lasting) { fault_ = {n, error, lasting}; }
 void MemoryDisk::fail_write_at(std::uint64_t n, int error, Lasting lasting) { write_fault_ = {n, error, lasting}; }
 void MemoryDisk::fail_sync_at(std::uint64_t n, int error, Lasting lasting) { sync_fault_ = {n, error, lasting}; }
 void MemoryDisk::fail_power_at(std::uint64_t n) { power_fault_ = {n, EIO, Lasting::once}; }

@@ -36,6 +36,7 @@ class MemoryDisk final : public Disk {
 
   // Faults. They count from now, 1 being the next; `error` is an errno value: EIO, ENOSPC.
   enum class Lasting { once, from_then_on };
+  void fail_at(std::uint64_t n, int error, Lasting lasting = Lasting::once);        // the n-th write or sync
   void fail_write_at(std::uint64_t n, int error, Lasting lasting = Lasting::once);  // writes, and new, renamed, removed names
   void fail_sync_at(std::uint64_t n, int error, Lasting lasting = Lasting::once);   // of files and folders
   // The power fails at the n-th write or sync: that and all later calls fail, reads too, until power_returns().
@@ -66,9 +67,16 @@ class MemoryDisk final : public Disk {
   friend struct Sqlite;
   class OpenFile;
   class HeldLock;
+  struct Fault {
+    std::uint64_t at = 0;  // counted down; 0: none
+    int error = 0;
+    Lasting lasting = Lasting::once;
+    int next();
+  };
   // 0, or the errno value that the call fails with.
-  [[nodiscard]] int before_write();
-  [[nodiscard]] int before_sync();
+  [[nodiscard]] int before(std::uint64_t& count, Fault& fault);
+  [[nodiscard]] int before_write() { return before(counts_.writes, write_fault_); }
+  [[nodiscard]] int before_sync() { return before(counts_.syncs, sync_fault_); }
   [[nodiscard]] int write_at(Content& content, std::uint64_t from, std::string_view bytes);
   [[nodiscard]] int truncate(Content& content, std::uint64_t size);
   [[nodiscard]] int sync(Content& content);
@@ -85,13 +93,7 @@ class MemoryDisk final : public Disk {
   std::vector<std::vector<std::pair<std::string, Contents>>> changes_;
   std::map<std::string, std::uint64_t> locks_;
   std::uint64_t last_lock_ = 0;
-  struct Fault {
-    std::uint64_t at = 0;  // counted down; 0: none
-    int error = 0;
-    Lasting lasting = Lasting::once;
-    int next();
-  };
-  Fault write_fault_, sync_fault_, power_fault_;
+  Fault fault_, write_fault_, sync_fault_, power_fault_;
   bool off_ = false, failed_ = false;
   int open_files_ = 0;
   int last_error_ = 0;
