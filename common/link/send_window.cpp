@@ -71,6 +71,10 @@ SendWindow::Time SendWindow::retransmission_time() const {
   return round_trip_ + round_trip_ / 8 + std::chrono::milliseconds(24);
 }
 
+std::size_t SendWindow::head_bytes(const SendItem& item) const {
+  return item.head.empty() ? 0 : item.head.size() + limits_.bytes_per_head;
+}
+
 // A packet on its way to being full.
 class SendWindow::Filling {
  public:
@@ -81,8 +85,8 @@ class SendWindow::Filling {
     if (chosen(number)) return true;
     const Waiting& waiting = *window_.find(number);
     std::size_t bytes = bytes_ + waiting.item.bytes.size();
-    if (!chosen(waiting.item.follows)) bytes += waiting.item.head.size();
-    if (chosen(waiting.follower)) bytes -= window_.find(waiting.follower)->item.head.size();
+    if (!chosen(waiting.item.follows)) bytes += window_.head_bytes(waiting.item);
+    if (chosen(waiting.follower)) bytes -= window_.head_bytes(window_.find(waiting.follower)->item);
     if (bytes > budget_) return false;
     bytes_ = bytes;
     chosen_[number - window_.oldest_] = true;

@@ -29,6 +29,7 @@ struct SendItem {
 struct SendWindowLimits {
   std::size_t bytes = 16 * 1024;  // of items without heads, unacknowledged (DESIGN section 5)
   std::size_t items = 4096;
+  std::size_t bytes_per_head = 0;  // that a packet takes for a head beside its own bytes, where that is not empty
 };
 
 struct SendCounts {
@@ -92,6 +93,7 @@ class SendWindow {
     Time first_sent{}, last_sent{};
   };
   class Filling;
+  [[nodiscard]] std::size_t head_bytes(const SendItem& item) const;
   void forget_oldest();
   [[nodiscard]] const Waiting* find(std::uint64_t number) const;
   Waiting* find(std::uint64_t number) { return const_cast<Waiting*>(std::as_const(*this).find(number)); }

@@ -1,0 +1,105 @@
+// Cuts in few bytes: those of one author, one after the other, as items of a SendWindow.
+//
+// A cut is coded against the one before it: of its first pose, which is that one's last, nothing is sent; each further pose
+// is a byte that says which of its seven numbers differ from what was expected, and these differences as zigzag varints.
+// Expected is the pose before, or that pose moved on by the step before, whichever takes fewer bytes. What cuts of a stretch
+// have in common, and the pose to go on from, is the head of a run; it goes before the first of neighbouring items only.
+//
+//   cut:   knots << 2 | own first << 1 | time differs, [path_us], knots x (second order << 7 | which of x y z qx qy qz qw, ...)
+//   row:   (index step - 1) << 1 | more, [room_seq step - index step, author_seq step - 1], cut
+//
+// The steps of a run's first row are passed over, since its head says where it is. Every cut comes back as it was, whatever
+// its numbers; whether they make sense is for the room to judge.
+#pragma once
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/core/result.hpp"
+#include "common/field/cut.hpp"
+#include "common/link/send_window.hpp"
+#include "osteon/v1/link.pb.h"
+
+namespace osteon::wire {
+
+// Short names of tools, as the room has told them to this session in a way that does not lose anything. A sender uses what
+// is here and the whole hash otherwise; a receiver that does not know a number yet drops the run, which will come again.
+class ToolNumbers {
+ public:
+  void add(std::uint32_t number, const Digest& tool);  // from 1; one that is known keeps its tool
+  [[nodiscard]] std::optional<std::uint32_t> number_of(const Digest& tool) const;
+  [[nodiscard]] std::optional<Digest> tool_of(std::uint32_t number) const;
+
+ private:
+  std::map<std::uint32_t, Digest> tools_;
+  std::map<Digest, std::uint32_t> numbers_;
+};
+
+// What of a stretch of cuts is known before the next.
+struct RunState {
+  Cut last;             // without its path
+  QuantisedPose pose;   // that the next one goes on from
+};
+
+// Codes an author's own cuts. Item numbers are the cuts' author_seq, so the window begins with the first of them.
+class CutSender {
+ public:
+  // Both must outlive this.
+  CutSender(SendWindow& window, const ToolNumbers& tools) : window_(window), tools_(tools) {}
+  // False, and nothing has changed, when the window is full. The cut's author_seq must be window.next().
+  [[nodiscard]] bool push(const Cut& cut);
+
+ private:
+  SendWindow& window_;
+  const ToolNumbers& tools_;
+  std::optional<RunState> state_;
+};
+
+// What a session is told, in its own order, which numbers these from 1.
+enum class SessionRowKind : std::uint8_t { committed, rejected, streamed };
+struct SessionRow {
+  RoomSeq room_seq;
+  SessionRowKind kind = SessionRowKind::streamed;  // what it was comes over the stream
+  Cut cut{};                                       // committed
+  std::uint64_t author_seq = 0;                    // rejected: of the session's own cut
+  std::uint32_t reason = 0;                        // rejected: as the room numbers its reasons
+  std::uint64_t lease_epoch = 0;                   // rejected: of the session, from now on
+  friend bool operator==(const SessionRow&, const SessionRow&) = default;
+};
+
+// Codes the rows of one session, as items whose numbers are their index.
+class RowSender {
+ public:
+  RowSender(SendWindow& window, const ToolNumbers& tools) : window_(window), tools_(tools) {}
+  // False, and nothing has changed, when the window is full.
+  [[nodiscard]] bool push(const SessionRow& row);
+  // An author who has left: nothing of them comes any more.
+  void forget(AuthorId author) { states_.erase(author); }
+
+ private:
+  struct AuthorState {
+    RunState run;
+    std::uint64_t index = 0;
+    RoomSeq room_seq;
+  };
+  SendWindow& window_;
+  const ToolNumbers& tools_;
+  std::map<AuthorId, AuthorState> states_;
+};
+
+// One author's cuts, in order: their author_seq follow each other. Errors: invalid_input (bytes that no sender makes),
+// not_found (a tool number that is not known yet).
+[[nodiscard]] Result<std::vector<Cut>> cuts_of(const v1::CutRun& run, AuthorId author, const ToolNumbers& tools);
+
+struct IndexedRow {
+  std::uint64_t index = 0;
+  SessionRow row;
+};
+// All rows of a packet in order of their index. Runs whose tool is not known yet are left out; `left_out` counts them where
+// it is given. Error invalid_input as above; then nothing of the packet is to be believed.
+[[nodiscard]] Result<std::vector<IndexedRow>> rows_of(const v1::DownPacket& packet, const ToolNumbers& tools,
+                                                      std::size_t* left_out = nullptr);
+
+}  // namespace osteon::wire

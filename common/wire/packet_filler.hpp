@@ -1,0 +1,40 @@
+// Fills a packet of the fast path up to a number of bytes: first what must go, then items, then what may wait.
+#pragma once
+#include <chrono>
+#include <cstddef>
+#include <string>
+
+#include "common/link/send_window.hpp"
+#include "osteon/v1/link.pb.h"
+
+namespace osteon::wire {
+
+// What a packet takes for a run beside its head and its items: two tags and two lengths below 16 KiB. For
+// SendWindowLimits::bytes_per_head.
+inline constexpr std::size_t kRunBytes = 6;
+
+// Parts of a packet may be joined byte to byte, so each is added if it fits. `Packet`: v1::UpPacket or v1::DownPacket.
+template <class Packet>
+class PacketFiller {
+ public:
+  // `most_bytes`: of the plain packet, before sealing.
+  explicit PacketFiller(std::size_t most_bytes) : most_bytes_(most_bytes) {}
+
+  // A packet with only some fields set. False, and nothing is added, where it does not fit. Messages within must not be in
+  // two parts, or they would be merged; repeated fields go on.
+  bool add(const Packet& part);
+  // The items that the window picks for what room there is.
+  SendWindow::Picked add_items(SendWindow& window, SendWindow::Time now, int repeats);
+
+  [[nodiscard]] std::size_t room() const { return most_bytes_ - bytes_.size(); }
+  [[nodiscard]] std::string take() { return std::move(bytes_); }  // once
+
+ private:
+  std::size_t most_bytes_;
+  std::string bytes_;
+};
+
+extern template class PacketFiller<v1::UpPacket>;
+extern template class PacketFiller<v1::DownPacket>;
+
+}  // namespace osteon::wire

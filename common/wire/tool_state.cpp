@@ -1,0 +1,105 @@
+#include "common/wire/tool_state.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "common/field/cut.hpp"
+
+namespace osteon::wire {
+namespace {
+
+constexpr std::size_t kMostNameBytes = 64;
+
+tl::unexpected<Error> bad(const std::string& field, const std::string& what) {
+  return failure(ErrorCode::invalid_input, field + " " + what);
+}
+
+// In whole steps, as far as the type goes; nothing for what is no number.
+template <class Integer>
+Integer steps(double value, double per_unit) {
+  if (std::isnan(value)) return 0;
+  using Limits = std::numeric_limits<Integer>;
+  return static_cast<Integer>(std::clamp(std::round(value * per_unit), static_cast<double>(Limits::min()), static_cast<double>(Limits::max())));
+}
+
+void set_pose(v1::QuantisedPose& out, const Pose& pose) {
+  const QuantisedPose quantised = quantise(pose);
+  for (const std::int32_t p : quantised.position) out.add_position(p);
+  for (const std::int16_t r : quantised.rotation) out.add_rotation(r);
+}
+
+Result<Pose> pose_from(const v1::QuantisedPose& pose, const std::string& field) {
+  if (pose.position_size() != 3 || pose.rotation_size() != 4) return bad(field, "needs 3 positions and 4 rotations");
+  QuantisedPose out;
+  double norm = 0.0;
+  for (int i = 0; i < 3; ++i) out.position[static_cast<std::size_t>(i)] = pose.position(i);
+  for (int i = 0; i < 4; ++i) {
+    const std::int32_t r = pose.rotation(i);
+    if (r != static_cast<std::int16_t>(r)) return bad(field, "has a rotation beyond 16 bits");
+    out.rotation[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(r);
+    norm += static_cast<double>(r) * r;
+  }
+  if (std::abs(std::sqrt(norm) / 32767.0 - 1.0) > 1e-3) return bad(field, "has a rotation that is not a unit quaternion");
+  return dequantise(out);
+}
+
+}  // namespace
+
+v1::ToolState to_tool_state(const CuttingState& state, std::uint32_t buttons, bool with_effort) {
+  v1::ToolState out;
+  out.set_author(state.author.value);
+  out.set_state_seq(state.state_seq);
+  set_pose(*out.mutable_pose_bone_tool(), state.pose_bone_tool);
+  if (quantise(state.pose_bone_device) != quantise(state.pose_bone_tool))
+    set_pose(*out.mutable_pose_bone_device(), state.pose_bone_device);
+  out.set_buttons(buttons);
+  out.set_spindle_rpm(steps<std::uint32_t>(state.spindle_rpm, 1.0));
+  out.set_phase(static_cast<v1::CuttingPhase>(state.phase));
+  if (!with_effort) return out;
+  v1::ToolEffort& effort = *out.mutable_effort();
+  effort.set_tool_name(state.tool_name.substr(0, kMostNameBytes));
+  for (int i = 0; i < 3; ++i) effort.add_force(steps<std::int32_t>(state.force_physical_N[i], 1000.0));
+  effort.set_torque(steps<std::int32_t>(state.torque_Nmm, 100.0));
+  effort.set_feed(steps<std::uint32_t>(state.feed_mm_per_s, 1000.0));
+  effort.set_density(steps<std::uint32_t>(state.density_g_cm3, 1000.0));
+  effort.set_engaged(steps<std::uint32_t>(std::clamp(state.engaged_fraction, 0.0, 1.0), 1000.0));
+  effort.set_depth(steps<std::int32_t>(state.depth_mm, 1024.0));
+  return out;
+}
+
+Result<bool> take_over(const v1::ToolState& sent, HeardState& known) {
+  if (sent.state_seq() <= known.state.state_seq) return false;
+  CuttingState next = known.state;
+  next.author = {sent.author()};
+  next.state_seq = sent.state_seq();
+  const auto tool = pose_from(sent.pose_bone_tool(), "pose_bone_tool");
+  if (!tool) return tl::unexpected(tool.error());
+  next.pose_bone_tool = next.pose_bone_device = *tool;
+  if (sent.has_pose_bone_device()) {
+    const auto device = pose_from(sent.pose_bone_device(), "pose_bone_device");
+    if (!device) return tl::unexpected(device.error());
+    next.pose_bone_device = *device;
+  }
+  next.spindle_rpm = sent.spindle_rpm();
+  if (sent.phase() < v1::CUTTING_PHASE_IDLE || sent.phase() > v1::CUTTING_PHASE_RUBBING)
+    return bad("phase", "is not one that this program knows");
+  next.phase = static_cast<CuttingPhase>(sent.phase());
+  if (sent.has_effort()) {
+    const v1::ToolEffort& effort = sent.effort();
+    if (effort.force_size() != 3) return bad("effort.force", "needs 3 numbers, this has " + std::to_string(effort.force_size()));
+    if (effort.engaged() > 1000) return bad("effort.engaged", "must be at most 1000");
+    if (effort.tool_name().size() > kMostNameBytes) return bad("effort.tool_name", "is longer than 64 bytes");
+    next.tool_name = effort.tool_name();
+    for (int i = 0; i < 3; ++i) next.force_physical_N[i] = effort.force(i) / 1000.0;
+    next.torque_Nmm = effort.torque() / 100.0;
+    next.feed_mm_per_s = effort.feed() / 1000.0;
+    next.density_g_cm3 = effort.density() / 1000.0;
+    next.engaged_fraction = effort.engaged() / 1000.0;
+    next.depth_mm = effort.depth() / 1024.0;
+  }
+  known = {next, sent.buttons()};
+  return true;
+}
+
+}  // namespace osteon::wire
