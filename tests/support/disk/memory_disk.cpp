@@ -36,7 +36,8 @@ struct MemoryDisk::Content {
   std::set<std::size_t> waiting; // sectors written since they were last synced
 
   void mark(std::size_t sector_bytes, std::uint64_t from, std::uint64_t to) {
-    for (std::size_t sector = from / sector_bytes; sector * sector_bytes < to; ++sector) waiting.insert(waiting.end(), sector);
+    if (from >= to) return;
+    for (std::size_t sector = from / sector_bytes; sector * sector_bytes < to; ++sector) waiting.insert(sector);
   }
   // The bytes of a sector, with zeros where `of` ends.
   static std::string sector(const std::string& of, std::size_t sector_bytes, std::size_t at) {

@@ -58,6 +58,7 @@ class MemoryDisk final : public Disk {
     std::uint64_t writes = 0, syncs = 0, written_bytes = 0;
   };
   [[nodiscard]] const Counts& counts() const { return counts_; }
+  [[nodiscard]] std::size_t sector_bytes() const { return sector_bytes_; }
 
   struct Sqlite;   // the virtual file system
   struct Content;  // of a file

@@ -1,0 +1,135 @@
+// A journal that something has damaged, anywhere: each byte of each of its files flipped, each of them cut at every length.
+// What is then read is exactly what was acknowledged, or it is said that it is not.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+
+#include "server/journal/upkeep.hpp"
+#include "tests/support/disk/journal_trials.hpp"
+#include "tests/support/disk/memory_disk.hpp"
+#include "tests/unit/journal/rows.hpp"
+
+namespace osteon {
+namespace {
+
+using test::MemoryDisk;
+using test::plain_head;
+
+constexpr const char* kFile = "/room/journal";
+
+struct Outcomes {
+  int whole = 0;    // as if nothing had been
+  int closed = 0;   // opened to be read, and said so
+  int refused = 0;  // not opened
+  int behind = 0;   // shorter, found out by the client that knew more
+  int found = 0;    // by verify_journal
+};
+
+class DamageTest : public ::testing::TestWithParam<bool> {
+ protected:
+  // Small pages keep it small. `closed`: with a footer and without a log; else all but the first rows are in the log.
+  void SetUp() override {
+    Journal journal = std::move(Journal::create(kFile, "bone", {.disk = &disk_, .page_bytes = 512}).value());
+    append(journal, rows_, 0, 8);
+    ASSERT_TRUE(journal.set_person({"p1", "Anna", 20000}));
+    ASSERT_TRUE(journal.next_server_epoch());
+    auto file = journal.begin_checkpoint(journal.head(), "meta");
+    ASSERT_TRUE(file && file->write("the room at place 8") && file->finish());
+    ASSERT_TRUE(journal.add_checkpoint(std::move(*file)));
+    ASSERT_TRUE(journal.close());
+    journal = std::move(Journal::open(kFile, {.disk = &disk_}).value());
+    append(journal, rows_, 8, 10);
+    append(journal, rows_, 10, 11);
+    append(journal, rows_, 11, 12);
+    if (GetParam()) {
+      ASSERT_TRUE(journal.close());
+    }
+  }
+  void TearDown() override {
+    std::printf("%s: %d whole, %d closed to rows, %d refused, %d behind a client; verify found %d\n",
+                GetParam() ? "closed" : "killed", outcomes_.whole, outcomes_.closed, outcomes_.refused, outcomes_.behind,
+                outcomes_.found);
+    EXPECT_GT(outcomes_.whole, 0);
+    EXPECT_GT(outcomes_.closed, 0);
+    EXPECT_GT(outcomes_.refused, 0);
+    EXPECT_GT(outcomes_.found, 0);
+    if (GetParam()) EXPECT_EQ(outcomes_.behind, 0) << "a journal that was closed vouches for its own end";
+  }
+
+  void look(const std::string& what) {
+    SCOPED_TRACE(what);
+    const MemoryDisk::Image damaged = disk_.image();
+    const auto report = verify_journal(kFile, &disk_);
+    if (!report || !report->sound()) ++outcomes_.found;
+    ASSERT_EQ(disk_.image(), damaged) << "verifying changes nothing";
+
+    auto opened = Journal::open(kFile, {.disk = &disk_});
+    if (!opened) {
+      ++outcomes_.refused;
+      ASSERT_NE(opened.error().message.find(kFile), std::string::npos) << opened.error().message;
+      ASSERT_FALSE(report && report->sound());
+      return;
+    }
+    // Rows may be missing at the end, never differ.
+    const std::vector<JournalRow> rows = rows_of(*opened);
+    ASSERT_LE(rows.size(), rows_.size());
+    ASSERT_TRUE(equal(rows, {rows_.begin(), rows_.begin() + static_cast<std::ptrdiff_t>(rows.size())}));
+    if (opened->closed_because() != nullptr) {
+      ++outcomes_.closed;
+      ASSERT_FALSE(report && report->sound());
+      return;
+    }
+    if (rows.size() < rows_.size()) {
+      ++outcomes_.behind;
+      ASSERT_EQ(opened->check_witness(head_).error().code, ErrorCode::unavailable);
+      ASSERT_NE(opened->closed_because(), nullptr);
+      return;
+    }
+    ++outcomes_.whole;
+    ASSERT_EQ(opened->head(), head_);
+    ASSERT_TRUE(opened->check_witness(head_));
+    ASSERT_EQ(opened->people().value(), (std::vector<Person>{{"p1", "Anna", 20000}}));
+    for (const Checkpoint& checkpoint : opened->checkpoints().value())
+      if (const auto bytes = opened->read_checkpoint(checkpoint)) {
+        ASSERT_EQ(*bytes, "the room at place 8");
+      }
+    ASSERT_EQ(opened->next_server_epoch().value(), 2u);
+    const JournalRow next{RoomSeq{13}, 0, "next"};
+    ASSERT_TRUE(opened->append({&next, 1}));
+  }
+
+  MemoryDisk disk_{1, 512};
+  std::vector<JournalRow> rows_ = some_rows(20, 12, 60);
+  JournalHead head_ = plain_head("bone", rows_);
+  Outcomes outcomes_;
+};
+
+TEST_P(DamageTest, FlippedAtAnyByteItIsWholeOrSaysSo) {
+  const MemoryDisk::Image sound = disk_.image();
+  std::mt19937_64 random(1);
+  for (const auto& [name, bytes] : sound)
+    for (std::size_t at = 0; at < bytes.size(); ++at) {
+      disk_.load(sound);
+      const std::uint64_t bit = random() % 8;
+      disk_.flip_bit(name, 8 * at + bit);
+      look(name + ", byte " + std::to_string(at) + ", bit " + std::to_string(bit));
+      if (HasFatalFailure()) return;
+    }
+}
+
+TEST_P(DamageTest, CutAtAnyLengthItIsWholeOrSaysSo) {
+  const MemoryDisk::Image sound = disk_.image();
+  for (const auto& [name, bytes] : sound)
+    for (std::size_t size = 0; size < bytes.size(); size += bytes.size() > 4096 ? 7 : 1) {
+      disk_.load(sound);
+      disk_.cut(name, size);
+      look(name + " cut to " + std::to_string(size));
+      if (HasFatalFailure()) return;
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Journal, DamageTest, ::testing::Values(true, false),
+                         [](const auto& info) { return info.param ? "Closed" : "Killed"; });
+
+}  // namespace
+}  // namespace osteon

@@ -1,0 +1,365 @@
+// The journal as the room uses it, on a disk in memory and on the computer's own.
+#include "server/journal/journal.hpp"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "server/journal/upkeep.hpp"
+#include "tests/support/disk/journal_trials.hpp"
+#include "tests/support/disk/memory_disk.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/unit/journal/rows.hpp"
+
+namespace osteon {
+namespace {
+
+using test::MemoryDisk;
+using test::plain_head;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+constexpr const char* kFile = "/room/journal";
+
+class JournalTest : public ::testing::Test {
+ protected:
+  Journal create() { return std::move(Journal::create(kFile, "bone", options()).value()); }
+  Journal reopen() { return std::move(Journal::open(kFile, options()).value()); }
+  JournalOptions options() { return {.disk = &disk_}; }
+  MemoryDisk disk_{1};
+};
+
+// Computed with Python's hashlib from the definition in chain.hpp.
+TEST(JournalChain, IsTheOneThatIsWrittenDown) {
+  const JournalHead none = first_head("bone");
+  EXPECT_EQ(to_hex(none.chain), "76315a6e8df2e7e5be7c5e2d969b2e8d752c0a1f91f230eaa9f407b8f851caba");
+  const JournalHead one = next_head(none, {RoomSeq{1}, 5, "first"});
+  EXPECT_EQ(to_hex(one.chain), "a2fb508b017c3da4f05b3ad7c3efa0f09ce3d65466b578c5141cc399c7fcc098");
+  const JournalHead two = next_head(one, {RoomSeq{2}, -1, ""});
+  EXPECT_EQ(to_hex(two.chain), "7095729f8ccdba13c88177a1c3fd27d6162c0df3c0e06fbd380899036dad1611");
+  EXPECT_EQ(two.place, RoomSeq{2});
+}
+
+TEST_F(JournalTest, GivesBackWhatItWasGivenAfterItsProcessWasKilledAndAfterItWasClosed) {
+  const std::vector<JournalRow> rows = some_rows(1, 40);
+  {
+    Journal journal = create();
+    append(journal, rows, 0, 20);
+  }
+  {
+    Journal journal = reopen();
+    EXPECT_EQ(journal.closed_because(), nullptr);
+    EXPECT_EQ(journal.genesis(), "bone");
+    EXPECT_EQ(journal.head(), plain_head("bone", {rows.begin(), rows.begin() + 20}));
+    append(journal, rows, 20, 40);
+    ASSERT_TRUE(journal.close());
+  }
+  EXPECT_THAT(disk_.image(), SizeIs(1)) << "closed, it is one file";
+  Journal journal = reopen();
+  EXPECT_EQ(journal.head(), plain_head("bone", rows));
+  EXPECT_TRUE(equal(rows_of(journal), rows));
+  EXPECT_TRUE(equal(rows_of(journal, 33), {rows.begin() + 32, rows.end()}));
+  int taken = 0;
+  ASSERT_TRUE(journal.read(RoomSeq{5}, [&](const JournalRow&) { return ++taken < 3; }));
+  EXPECT_EQ(taken, 3);
+}
+
+TEST_F(JournalTest, IsMadeOnceAndOpenedOnlyWhereItIs) {
+  const auto missing = Journal::open(kFile, options());
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().code, ErrorCode::not_found);
+  { Journal journal = create(); }
+  const auto again = Journal::create(kFile, "bone", options());
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().code, ErrorCode::exists);
+
+  // A log that belonged to another journal of that name would be read as the new one's.
+  ASSERT_TRUE(disk_.remove(kFile));
+  const auto haunted = Journal::create(kFile, "bone", options());
+  ASSERT_FALSE(haunted);
+  EXPECT_EQ(haunted.error().code, ErrorCode::exists);
+  EXPECT_THAT(haunted.error().message, HasSubstr("/room/journal-wal belonged to an earlier journal"));
+}
+
+TEST_F(JournalTest, TakesNoRowAboveTheLimitAndGoesOn) {
+  JournalOptions small = options();
+  small.most_row_bytes = 100;
+  Journal journal = std::move(Journal::create(kFile, "bone", small).value());
+  const std::vector<JournalRow> rows{{RoomSeq{1}, 0, std::string(100, 'a')}, {RoomSeq{2}, 0, std::string(101, 'b')}};
+  const Result<void> refused = journal.append(rows);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::invalid_input);
+  EXPECT_THAT(refused.error().message, HasSubstr("row 2 has 101 bytes"));
+  EXPECT_EQ(journal.head().place, RoomSeq{0});
+  EXPECT_EQ(journal.closed_because(), nullptr);
+  EXPECT_TRUE(journal.append({rows.data(), 1}));
+}
+
+TEST_F(JournalTest, AbortsOnAPlaceThatDoesNotGoOn) {
+  Journal journal = create();
+  const JournalRow skipping{RoomSeq{2}, 0, ""};
+  EXPECT_DEATH(static_cast<void>(journal.append({&skipping, 1})), "broken promise");
+}
+
+TEST_F(JournalTest, HoldsWitnessesAgainstItsHistory) {
+  const std::vector<JournalRow> rows = some_rows(2, 5);
+  Journal journal = create();
+  append(journal, rows, 0, 5);
+  for (std::size_t n = 0; n <= rows.size(); ++n)
+    EXPECT_TRUE(journal.check_witness(plain_head("bone", {rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(n)})));
+
+  const Result<void> other = journal.check_witness(plain_head("other bone", {rows.begin(), rows.begin() + 3}));
+  ASSERT_FALSE(other);
+  EXPECT_EQ(other.error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(journal.closed_because(), nullptr) << "one client's mistake closes no room";
+
+  const Result<void> ahead = journal.check_witness({RoomSeq{6}, journal.head().chain});
+  ASSERT_FALSE(ahead);
+  EXPECT_EQ(ahead.error().code, ErrorCode::unavailable);
+  EXPECT_THAT(ahead.error().message, HasSubstr("goes to place 5, but a client was told that place 6 is safe"));
+  ASSERT_NE(journal.closed_because(), nullptr);
+  const JournalRow next{RoomSeq{6}, 0, ""};
+  EXPECT_FALSE(journal.append({&next, 1}));
+  EXPECT_FALSE(journal.next_server_epoch());
+  EXPECT_TRUE(equal(rows_of(journal), rows)) << "it can still be read";
+}
+
+TEST_F(JournalTest, KeepsTheNewestTwoCheckpoints) {
+  const std::vector<JournalRow> rows = some_rows(3, 4);
+  std::vector<JournalHead> heads;
+  {
+    Journal journal = create();
+    for (std::size_t n = 0; n < rows.size(); ++n) {
+      append(journal, rows, n, n + 1);
+      heads.push_back(journal.head());
+      auto file = journal.begin_checkpoint(journal.head(), "meta " + std::to_string(n));
+      ASSERT_TRUE(file);
+      ASSERT_TRUE(file->write("room at "));
+      ASSERT_TRUE(file->write(std::to_string(n)));
+      ASSERT_TRUE(file->finish());
+      ASSERT_TRUE(journal.add_checkpoint(std::move(*file)));
+    }
+    EXPECT_EQ(journal.begin_checkpoint(heads.back(), "").error().code, ErrorCode::exists);
+    EXPECT_EQ(journal.begin_checkpoint({RoomSeq{2}, heads.back().chain}, "").error().code, ErrorCode::invalid_input);
+    EXPECT_EQ(journal.begin_checkpoint({RoomSeq{5}, heads.back().chain}, "").error().code, ErrorCode::invalid_input);
+    // One that is given up.
+    append(journal, {{RoomSeq{5}, 0, "x"}}, 0, 1);
+    auto dropped = journal.begin_checkpoint(journal.head(), "");
+    ASSERT_TRUE(dropped && dropped->write("half"));
+  }
+  EXPECT_THAT(disk_.image(), SizeIs(4)) << "the journal, its log, two checkpoints";
+  Journal journal = reopen();
+  const auto checkpoints = journal.checkpoints();
+  ASSERT_TRUE(checkpoints);
+  ASSERT_THAT(*checkpoints, SizeIs(2));
+  for (int i = 0; i < 2; ++i) {
+    const Checkpoint& checkpoint = (*checkpoints)[static_cast<std::size_t>(i)];
+    EXPECT_EQ(checkpoint.at, heads[static_cast<std::size_t>(3 - i)]);
+    EXPECT_EQ(checkpoint.meta, "meta " + std::to_string(3 - i));
+    EXPECT_EQ(journal.read_checkpoint(checkpoint).value(), "room at " + std::to_string(3 - i));
+  }
+  const std::filesystem::path newest = checkpoint_path(disk_, heads[3]);
+  disk_.flip_bit(newest, 5);
+  const auto spoiled = journal.read_checkpoint(checkpoints->front());
+  ASSERT_FALSE(spoiled);
+  EXPECT_THAT(spoiled.error().message, HasSubstr("is not what was written"));
+}
+
+// The file of an earlier day, and a checkpoint that knows more: the log with what was between them is lost.
+TEST_F(JournalTest, OpensForReadingOnlyWhereACheckpointKnowsMore) {
+  const std::vector<JournalRow> rows = some_rows(4, 9);
+  MemoryDisk::Image earlier;
+  {
+    Journal journal = create();
+    append(journal, rows, 0, 5);
+    ASSERT_TRUE(journal.close());
+    earlier = disk_.image();
+    Journal later = reopen();
+    append(later, rows, 5, 9);
+    auto file = later.begin_checkpoint(later.head(), "");
+    ASSERT_TRUE(file && file->finish() && later.add_checkpoint(std::move(*file)));
+    ASSERT_TRUE(later.close());
+  }
+  disk_.put(kFile, earlier.at(kFile));
+  {
+    Journal journal = reopen();
+    ASSERT_NE(journal.closed_because(), nullptr);
+    EXPECT_EQ(journal.closed_because()->code, ErrorCode::unavailable);
+    EXPECT_THAT(journal.closed_because()->message, HasSubstr("goes to place 5"));
+    EXPECT_THAT(journal.closed_because()->message, HasSubstr("vouches for place 9: rows were lost"));
+    EXPECT_TRUE(equal(rows_of(journal), {rows.begin(), rows.begin() + 5}));
+    EXPECT_FALSE(journal.append({&rows[5], 1}));
+  }
+  const auto report = recover_journal(kFile, "/room/new", &disk_);
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_EQ(report->head.place, RoomSeq{5});
+  EXPECT_EQ(report->lost(), 4u);
+  Journal journal = std::move(Journal::open("/room/new", options()).value());
+  EXPECT_EQ(journal.closed_because(), nullptr);
+  EXPECT_EQ(journal.recovered_to(), RoomSeq{5});
+  EXPECT_EQ(journal.check_witness(plain_head("bone", rows)).error().code, ErrorCode::unavailable);
+  EXPECT_EQ(journal.closed_because(), nullptr) << "the loss is known and was accepted";
+  append(journal, rows, 5, 6);
+}
+
+TEST_F(JournalTest, NeverGivesAServerEpochTwice) {
+  std::uint64_t last = 0;
+  for (int i = 0; i < 5; ++i) {
+    Journal journal = i == 0 ? create() : reopen();
+    for (int k = 0; k < 2; ++k) {
+      const auto epoch = journal.next_server_epoch();
+      ASSERT_TRUE(epoch);
+      EXPECT_EQ(*epoch, last + 1);
+      last = *epoch;
+    }
+    EXPECT_EQ(journal.find_register("none").value(), std::nullopt);
+    ASSERT_TRUE(journal.set_register("retention_days", std::to_string(i)));
+    EXPECT_EQ(journal.find_register("retention_days").value(), std::to_string(i));
+    if (i % 2 == 0) {
+      ASSERT_TRUE(journal.close());
+    }
+  }
+}
+
+TEST_F(JournalTest, TakesNothingAfterAFailedWriteNotEvenWhenOpenedAnew) {
+  const std::vector<JournalRow> rows = some_rows(5, 4);
+  {
+    Journal journal = create();
+    append(journal, rows, 0, 2);
+    disk_.fail_sync_at(1, EIO);
+    const Result<void> failed = journal.append({&rows[2], 1});
+    ASSERT_FALSE(failed);
+    EXPECT_EQ(failed.error().code, ErrorCode::unavailable);
+    EXPECT_THAT(failed.error().message, HasSubstr("disk I/O error"));
+    EXPECT_EQ(journal.append({&rows[2], 1}).error().message, failed.error().message);
+    EXPECT_EQ(journal.head().place, RoomSeq{2});
+    EXPECT_TRUE(equal(rows_of(journal), {rows.begin(), rows.begin() + 2}));
+  }
+  {
+    Journal journal = reopen();
+    ASSERT_NE(journal.closed_because(), nullptr);
+    EXPECT_THAT(journal.closed_because()->message, HasSubstr("recover it into a new journal"));
+  }
+  ASSERT_TRUE(recover_journal(kFile, "/room/new", &disk_));
+  Journal journal = std::move(Journal::open("/room/new", options()).value());
+  EXPECT_EQ(journal.closed_because(), nullptr);
+  EXPECT_GE(journal.head().place, RoomSeq{2});
+}
+
+TEST_F(JournalTest, SaysThatTheDiskIsFull) {
+  Journal journal = create();
+  disk_.fail_write_at(1, ENOSPC, MemoryDisk::Lasting::from_then_on);
+  const JournalRow row{RoomSeq{1}, 0, "x"};
+  const Result<void> failed = journal.append({&row, 1});
+  ASSERT_FALSE(failed);
+  EXPECT_THAT(failed.error().message, HasSubstr("disk is full"));
+}
+
+TEST_F(JournalTest, KeepsItsLogShort) {
+  JournalOptions short_log = options();
+  short_log.most_log_bytes = 64 << 10;
+  Journal journal = std::move(Journal::create(kFile, "bone", short_log).value());
+  const std::vector<JournalRow> rows = some_rows(6, 600);
+  std::uint64_t longest = 0;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    append(journal, rows, i, i + 1);
+    longest = std::max(longest, disk_.size("/room/journal-wal").value().value());
+  }
+  EXPECT_LT(longest, 3u * (64 << 10)) << "the limit, filled up to sectors, and one append";
+  EXPECT_GT(longest, std::uint64_t{32} << 10);
+}
+
+// A name in the middle of many: some moved from page to page as the table grew, one was given another name.
+void forget(Journal& journal, int people, const std::function<std::size_t(std::string_view)>& found) {
+  const std::string name = "Wilhelmina Grubenmann";
+  for (int i = 0; i < people; ++i) {
+    const std::string label = i % 2 == 0 ? name + std::to_string(i) : "Someone else";
+    const Person person{"p" + std::to_string((i * 37) % people), label, 100 + i % 2};
+    ASSERT_TRUE(journal.set_person(person));
+  }
+  ASSERT_TRUE(journal.set_person({"p0", name + " renamed", 101}));
+  const std::vector<JournalRow> rows = some_rows(7, 50);
+  append(journal, rows, 0, 50);
+  EXPECT_GT(found(name), 0u);
+  EXPECT_EQ(journal.forget_people_before(101).value(), static_cast<std::size_t>(people / 2 - 1));
+  EXPECT_EQ(found(name + std::to_string(2)), 0u);
+  EXPECT_GT(found(name + " renamed"), 0u);
+  EXPECT_EQ(journal.forget_person("p0").value(), 1u);
+  EXPECT_EQ(journal.forget_person("p0").value(), 0u);
+  EXPECT_EQ(found(name), 0u);
+  EXPECT_THAT(journal.people().value(), SizeIs(people / 2));
+  EXPECT_TRUE(equal(rows_of(journal), rows));
+  EXPECT_TRUE(verify_journal(journal).value().sound());
+}
+
+TEST_F(JournalTest, ForgetsPeopleSoThatNoByteOfThemIsLeft) {
+  Journal journal = create();
+  forget(journal, 400, [&](std::string_view name) {
+    std::size_t found = 0;
+    for (const auto& [file, bytes] : disk_.image())
+      for (std::size_t at = bytes.find(name); at != std::string::npos; at = bytes.find(name, at + 1)) ++found;
+    return found;
+  });
+}
+
+TEST(JournalOnDisk, ForgetsPeopleSoThatNoByteOfThemIsLeft) {
+  const test::TempDir folder;
+  Journal journal = std::move(Journal::create(folder / "journal", "bone").value());
+  forget(journal, 120, [&](std::string_view name) {
+    std::size_t found = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
+      std::ostringstream all;
+      all << std::ifstream(entry.path(), std::ios::binary).rdbuf();
+      const std::string bytes = std::move(all).str();
+      for (std::size_t at = bytes.find(name); at != std::string::npos; at = bytes.find(name, at + 1)) ++found;
+    }
+    return found;
+  });
+}
+
+TEST(JournalOnDisk, WorksWithNamesThatAreNoWords) {
+  const test::TempDir folder;
+  const std::filesystem::path file = folder / "a room? 100%#1 'x' ü";
+  const std::vector<JournalRow> rows = some_rows(8, 30);
+  {
+    Journal journal = std::move(Journal::create(file, "bone").value());
+    append(journal, rows, 0, 30);
+    auto checkpoint = journal.begin_checkpoint(journal.head(), "m");
+    ASSERT_TRUE(checkpoint && checkpoint->write("bytes") && checkpoint->finish());
+    ASSERT_TRUE(journal.add_checkpoint(std::move(*checkpoint)));
+  }
+  EXPECT_TRUE(std::filesystem::exists(file));
+  Journal journal = std::move(Journal::open(file).value());
+  EXPECT_EQ(journal.closed_because(), nullptr);
+  EXPECT_EQ(journal.head(), plain_head("bone", rows));
+  EXPECT_EQ(journal.read_checkpoint(journal.checkpoints().value().front()).value(), "bytes");
+}
+
+TEST(JournalOnDisk, HasOneUserAtATime) {
+  const test::TempDir folder;
+  const std::filesystem::path file = folder / "journal";
+  {
+    Journal journal = std::move(Journal::create(file, "bone").value());
+    const auto second = Journal::open(file);
+    ASSERT_FALSE(second);
+    EXPECT_EQ(second.error().code, ErrorCode::exists);
+    EXPECT_EQ(second.error().message, file.string() + " is in use by another process; close the room there first");
+    EXPECT_EQ(verify_journal(file).error().code, ErrorCode::exists);
+  }
+  EXPECT_TRUE(Journal::open(file));
+}
+
+TEST(JournalOnDisk, IsNotTakenFromAnyFile) {
+  const test::TempDir folder;
+  for (const std::string& content : {std::string(), std::string("short"), std::string(5000, 'x')}) {
+    std::ofstream(folder / "file", std::ios::binary | std::ios::trunc) << content;
+    const auto opened = Journal::open(folder / "file");
+    ASSERT_FALSE(opened);
+    EXPECT_EQ(opened.error().code, ErrorCode::invalid_input) << opened.error().message;
+    EXPECT_THAT(opened.error().message, HasSubstr((folder / "file").string()));
+  }
+}
+
+}  // namespace
+}  // namespace osteon

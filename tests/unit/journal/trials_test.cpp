@@ -1,0 +1,59 @@
+// The journal on disks that lose their power and that fail, by the thousand.
+#include <gtest/gtest.h>
+
+#include <cerrno>
+#include <cstdio>
+
+#include "tests/support/disk/journal_trials.hpp"
+
+namespace osteon::test {
+namespace {
+
+void show(const char* what, const Tally& tally) {
+  std::printf("%s: %lu trials, %lu rows acknowledged, %lu recovered (%lu not acknowledged), %lu lost, %lu closed, %lu bad\n", what,
+              tally.trials, tally.acknowledged, tally.recovered, tally.kept_unasked, tally.lost, tally.closed, tally.bad_trials);
+}
+
+void expect_nothing_lost(const Tally& tally) {
+  for (const std::string& fault : tally.faults) ADD_FAILURE() << fault;
+  EXPECT_EQ(tally.lost, 0u);
+  EXPECT_EQ(tally.bad_trials, 0u);
+}
+
+TEST(JournalTrials, LosesNothingAcknowledgedWhenThePowerFails) {
+  const Tally tally = power_loss_trials(1, 2000);
+  show("power loss", tally);
+  expect_nothing_lost(tally);
+  EXPECT_EQ(tally.closed, 0u) << "lost power alone is no reason to refuse rows";
+  // The trials are hard: the disk fails in them, and often with a batch under way.
+  EXPECT_GT(tally.failed, tally.trials * 9 / 10);
+  EXPECT_GT(tally.acknowledged, 10 * tally.trials);
+  EXPECT_GT(tally.kept_unasked, 100u);
+}
+
+// The same trials must find it when rows are reported that were not waited for.
+TEST(JournalTrials, FindsRowsLostWhenNobodyWaitsForTheDisk) {
+  const Tally tally = power_loss_trials(1, 100, false);
+  show("power loss, synchronous=OFF", tally);
+  EXPECT_GT(tally.bad_trials, 90u);
+  EXPECT_GT(tally.lost, 100u);
+}
+
+TEST(JournalTrials, LosesNothingAcknowledgedWhenAnyWriteOrSyncFails) {
+  const Tally tally = failing_disk_trials(10000, 1000, EIO);
+  show("EIO", tally);
+  expect_nothing_lost(tally);
+  EXPECT_EQ(tally.failed, 1000u);
+  EXPECT_GT(tally.closed, 300u);
+}
+
+TEST(JournalTrials, LosesNothingAcknowledgedWhenTheDiskIsFullAtAnyWrite) {
+  const Tally tally = failing_disk_trials(20000, 1000, ENOSPC);
+  show("ENOSPC", tally);
+  expect_nothing_lost(tally);
+  EXPECT_EQ(tally.failed, 1000u);
+  EXPECT_GT(tally.closed, 300u);
+}
+
+}  // namespace
+}  // namespace osteon::test

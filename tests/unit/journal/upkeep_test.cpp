@@ -1,0 +1,283 @@
+// Checking, backing up, recovering and migrating journals as files.
+#include "server/journal/upkeep.hpp"
+
+#include <gmock/gmock.h>
+#include <sqlite3.h>
+
+#include "tests/support/disk/journal_trials.hpp"
+#include "tests/support/disk/memory_disk.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/unit/journal/rows.hpp"
+
+namespace osteon {
+namespace {
+
+using test::MemoryDisk;
+using test::plain_head;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+constexpr const char *kFile = "/room/journal", *kTo = "/backup/journal";
+
+class UpkeepTest : public ::testing::Test {
+ protected:
+  // With something of everything.
+  void make(bool closed) {
+    Journal journal = std::move(Journal::create(kFile, "bone", {.disk = &disk_}).value());
+    for (std::size_t i = 0; i < rows_.size(); i += 5) append(journal, rows_, i, i + 5);
+    ASSERT_TRUE(journal.set_person({"p1", "Anna", 20000}));
+    ASSERT_TRUE(journal.set_register("retention_days", "30"));
+    ASSERT_TRUE(journal.next_server_epoch());
+    for (const std::size_t place : {10, 25}) {
+      const JournalHead at = plain_head("bone", {rows_.begin(), rows_.begin() + static_cast<std::ptrdiff_t>(place)});
+      auto file = journal.begin_checkpoint(at, "meta");
+      ASSERT_TRUE(file && file->write("room at " + std::to_string(place)) && file->finish());
+      ASSERT_TRUE(journal.add_checkpoint(std::move(*file)));
+    }
+    if (closed) {
+      ASSERT_TRUE(journal.close());
+    }
+  }
+  Journal open(const char* file) { return std::move(Journal::open(file, {.disk = &disk_}).value()); }
+  void expect_copied(Journal& journal) {
+    EXPECT_EQ(journal.closed_because(), nullptr);
+    EXPECT_EQ(journal.head(), plain_head("bone", rows_));
+    EXPECT_TRUE(equal(rows_of(journal), rows_));
+    EXPECT_THAT(journal.people().value(), ElementsAre(Person{"p1", "Anna", 20000}));
+    EXPECT_EQ(journal.find_register("retention_days").value(), "30");
+    const auto checkpoints = journal.checkpoints().value();
+    ASSERT_THAT(checkpoints, SizeIs(2));
+    EXPECT_EQ(journal.read_checkpoint(checkpoints[0]).value(), "room at 25");
+    EXPECT_EQ(journal.read_checkpoint(checkpoints[1]).value(), "room at 10");
+  }
+  MemoryDisk disk_{1};
+  std::vector<JournalRow> rows_ = some_rows(10, 40);
+};
+
+TEST_F(UpkeepTest, ASoundJournalIsFoundSoundAndIsLeftAsItWas) {
+  for (const bool closed : {true, false}) {
+    disk_.load({});
+    make(closed);
+    const MemoryDisk::Image before = disk_.image();
+    const auto report = verify_journal(kFile, &disk_);
+    ASSERT_TRUE(report) << report.error().message;
+    EXPECT_THAT(report->faults, IsEmpty());
+    EXPECT_EQ(report->version, 2);
+    EXPECT_EQ(report->head, plain_head("bone", rows_));
+    EXPECT_EQ(report->witnessed, RoomSeq{closed ? 40u : 25u});
+    EXPECT_EQ(report->closed_cleanly, closed);
+    EXPECT_EQ(disk_.image(), before);
+  }
+}
+
+TEST_F(UpkeepTest, TheFirstBadRowIsNamed) {
+  make(true);
+  const std::string& bytes = disk_.image().at(kFile);
+  const std::size_t at = bytes.find(rows_[17].bytes);
+  ASSERT_NE(at, std::string::npos);
+  disk_.flip_bit(kFile, 8 * at + 3);
+  const auto report = verify_journal(kFile, &disk_);
+  ASSERT_TRUE(report);
+  EXPECT_EQ(report->first_bad, RoomSeq{18});
+  EXPECT_THAT(report->faults.front(), HasSubstr("row 18 does not fit the chain of hashes"));
+  EXPECT_EQ(report->head, plain_head("bone", {rows_.begin(), rows_.begin() + 17}));
+
+  const MemoryDisk::Image before = disk_.image();
+  EXPECT_EQ(backup_journal(kFile, kTo, &disk_).error().code, ErrorCode::invalid_input);
+  const auto recovered = recover_journal(kFile, kTo, &disk_);
+  ASSERT_TRUE(recovered) << recovered.error().message;
+  EXPECT_EQ(recovered->head.place, RoomSeq{17});
+  EXPECT_EQ(recovered->lost(), 23u) << "of the 40 that the footer vouches for";
+  for (const auto& [name, content] : before) EXPECT_EQ(disk_.image().at(name), content) << name;
+  Journal journal = open(kTo);
+  EXPECT_EQ(journal.closed_because(), nullptr);
+  EXPECT_TRUE(equal(rows_of(journal), {rows_.begin(), rows_.begin() + 17}));
+  EXPECT_THAT(journal.people().value(), ElementsAre(Person{"p1", "Anna", 20000}));
+  const auto checkpoints = journal.checkpoints().value();
+  ASSERT_THAT(checkpoints, SizeIs(1)) << "the one behind the damage is not of this history";
+  EXPECT_EQ(journal.read_checkpoint(checkpoints[0]).value(), "room at 10");
+  EXPECT_GT(journal.next_server_epoch().value(), 1000u) << "far from what the lost part may have given";
+  append(journal, rows_, 17, 20);
+}
+
+TEST_F(UpkeepTest, ASpoiledCheckpointIsFoundAndLeftBehind) {
+  make(true);
+  const std::string newest = checkpoint_path(disk_, {RoomSeq{25}, {}});
+  disk_.flip_bit(newest, 0);
+  const auto report = verify_journal(kFile, &disk_);
+  ASSERT_TRUE(report);
+  ASSERT_THAT(report->faults, SizeIs(1));
+  EXPECT_THAT(report->faults.front(), HasSubstr(newest + " is not what was written"));
+  EXPECT_EQ(report->first_bad, std::nullopt);
+  EXPECT_FALSE(backup_journal(kFile, kTo, &disk_));
+  const auto recovered = recover_journal(kFile, kTo, &disk_);
+  ASSERT_TRUE(recovered);
+  EXPECT_EQ(recovered->lost(), 0u);
+  Journal journal = open(kTo);
+  EXPECT_THAT(journal.checkpoints().value(), SizeIs(1));
+  EXPECT_TRUE(equal(rows_of(journal), rows_));
+}
+
+TEST_F(UpkeepTest, ABackupIsTheJournalAgain) {
+  for (const bool closed : {true, false}) {
+    disk_.load({});
+    make(closed);
+    const MemoryDisk::Image before = disk_.image();
+    const Result<void> done = backup_journal(kFile, kTo, &disk_);
+    ASSERT_TRUE(done) << done.error().message;
+    const MemoryDisk::Image after = disk_.image();
+    for (const auto& [name, content] : before) EXPECT_EQ(after.at(name), content) << name;
+    EXPECT_THAT(after, SizeIs(before.size() + 3)) << "the copy, its two checkpoints, nothing else";
+    Journal copy = open(kTo);
+    expect_copied(copy);
+    EXPECT_EQ(copy.next_server_epoch().value(), 2u);
+    EXPECT_FALSE(copy.recovered_to());
+    EXPECT_EQ(backup_journal(kFile, kTo, &disk_).error().code, ErrorCode::exists);
+  }
+}
+
+TEST_F(UpkeepTest, ABackupInSlicesLetsRowsBeAppendedBetween) {
+  make(false);
+  Journal journal = open(kFile);
+  auto copy = JournalCopy::begin(journal, kTo);
+  ASSERT_TRUE(copy) << copy.error().message;
+  const std::vector<JournalRow> all = some_rows(10, 60);
+  std::size_t steps = 0, next = 40;
+  for (Result<bool> done = false;; ++steps) {
+    done = copy->step(7);
+    ASSERT_TRUE(done) << done.error().message;
+    if (*done) break;
+    append(journal, all, next, next + 1);
+    ++next;
+  }
+  EXPECT_EQ(steps, 5u) << "40 rows by 7";
+  EXPECT_EQ(journal.head(), plain_head("bone", {all.begin(), all.begin() + 45}));
+  Journal backup = open(kTo);
+  expect_copied(backup);
+}
+
+TEST_F(UpkeepTest, ACopyThatIsGivenUpOrCutShortLeavesNothingInTheWay) {
+  make(false);
+  {
+    Journal journal = open(kFile);
+    const MemoryDisk::Image before = disk_.image();
+    auto copy = JournalCopy::begin(journal, kTo);
+    ASSERT_TRUE(copy && copy->step(7));
+  }
+  for (const auto& [name, bytes] : disk_.image()) EXPECT_FALSE(name.starts_with("/backup/")) << name;
+  for (std::uint64_t n = 1; n < 150; n += 3) {
+    disk_.fail_power_at(n);
+    const bool done = backup_journal(kFile, kTo, &disk_).has_value();
+    EXPECT_EQ(done, !disk_.has_failed());
+    disk_.power_returns();
+    if (disk_.size(kTo).value()) {  // the last step but the sync may have stayed
+      Journal copy = open(kTo);
+      expect_copied(copy);
+    } else {
+      const Result<void> again = backup_journal(kFile, kTo, &disk_);
+      // Checkpoints that got their names first are in the way, and that is said.
+      EXPECT_TRUE(again || again.error().code == ErrorCode::exists) << again.error().message;
+    }
+    Journal source = open(kFile);
+    EXPECT_EQ(source.closed_because(), nullptr);
+    ASSERT_TRUE(equal(rows_of(source), rows_));
+    MemoryDisk::Image kept = disk_.image();
+    std::erase_if(kept, [](const auto& file) { return file.first.starts_with("/backup/"); });
+    { const Journal dropped = std::move(source); }
+    disk_.load(kept);
+  }
+}
+
+TEST_F(UpkeepTest, WhatClientsKnowCountsAsLost) {
+  make(true);
+  const auto recovered = recover_journal(kFile, kTo, &disk_, {{RoomSeq{39}, {}}, {RoomSeq{44}, {}}});
+  ASSERT_TRUE(recovered);
+  EXPECT_EQ(recovered->lost(), 4u);
+}
+
+// Made by the program of the first version: its tables, in its words.
+void make_version_1(const std::filesystem::path& file, const std::vector<JournalRow>& rows) {
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
+  const auto run = [&](const std::string& sql) {
+    char* why = nullptr;
+    ASSERT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, &why), SQLITE_OK) << why << " in " << sql;
+  };
+  const auto hex = [](const auto& bytes) {
+    std::string text = "x'";
+    for (const auto byte : bytes) {
+      char digits[3];
+      std::snprintf(digits, sizeof digits, "%02x", static_cast<unsigned>(static_cast<unsigned char>(byte)));
+      text += digits;
+    }
+    return text + "'";
+  };
+  run("PRAGMA journal_mode=WAL");
+  run("CREATE TABLE rows(place INTEGER PRIMARY KEY, bytes BLOB NOT NULL, chain BLOB NOT NULL) STRICT");
+  run("CREATE TABLE registers(name TEXT PRIMARY KEY, value BLOB NOT NULL, seal BLOB NOT NULL) STRICT, WITHOUT ROWID");
+  run("CREATE TABLE checkpoints(place INTEGER PRIMARY KEY, chain BLOB NOT NULL, meta BLOB NOT NULL, size INTEGER NOT NULL,"
+      " digest BLOB NOT NULL, seal BLOB NOT NULL) STRICT");
+  run("CREATE TABLE people(pseudonym TEXT PRIMARY KEY, label TEXT NOT NULL, joined_day INTEGER NOT NULL,"
+      " seal BLOB NOT NULL) STRICT, WITHOUT ROWID");
+  run("PRAGMA application_id=0x4f73744a; PRAGMA user_version=1");
+  Hasher seal;
+  seal.text("register");
+  seal.text("genesis");
+  seal.text("bone");
+  run("INSERT INTO registers VALUES('genesis', " + hex(std::string("bone")) + ", " + hex(seal.finish().bytes) + ")");
+  std::vector<JournalRow> so_far;
+  for (const JournalRow& row : rows) {
+    so_far.push_back(row);
+    run("INSERT INTO rows VALUES(" + std::to_string(row.place.value) + ", " + hex(row.bytes) + ", " +
+        hex(plain_head("bone", so_far).chain.bytes) + ")");
+  }
+  ASSERT_EQ(sqlite3_close(database), SQLITE_OK);
+}
+
+TEST(Migration, TakesAFirstVersionIntoACopyWithTheSameChain) {
+  const test::TempDir folder;
+  const std::filesystem::path old = folder / "old", now = folder / "new";
+  std::vector<JournalRow> rows = some_rows(11, 30);
+  for (JournalRow& row : rows) row.at_ns = 0;  // it kept no times
+  ASSERT_NO_FATAL_FAILURE(make_version_1(old, rows));
+
+  const auto opened = Journal::open(old);
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().code, ErrorCode::unsupported);
+  EXPECT_THAT(opened.error().message, HasSubstr("is a journal of version 1; migrate it"));
+  const auto verified = verify_journal(old);
+  ASSERT_TRUE(verified) << verified.error().message;
+  EXPECT_TRUE(verified->sound());
+  EXPECT_EQ(verified->version, 1);
+
+  const Result<void> migrated = migrate_journal(old, now);
+  ASSERT_TRUE(migrated) << migrated.error().message;
+  EXPECT_EQ(verify_journal(old)->version, 1) << "the old one is left";
+  EXPECT_EQ(verify_journal(now)->version, 2);
+  Journal journal = std::move(Journal::open(now).value());
+  EXPECT_EQ(journal.closed_because(), nullptr);
+  EXPECT_TRUE(equal(rows_of(journal), rows));
+  EXPECT_TRUE(journal.check_witness(plain_head("bone", rows))) << "what clients were told still holds";
+  const JournalRow next{RoomSeq{31}, 12345, "next"};
+  EXPECT_TRUE(journal.append({&next, 1}));
+  ASSERT_TRUE(journal.close());
+  EXPECT_EQ(migrate_journal(now, folder / "newer").error().code, ErrorCode::exists);
+}
+
+TEST(Migration, RefusesAVersionOfTheFuture) {
+  const test::TempDir folder;
+  { ASSERT_TRUE(Journal::create(folder / "journal", "bone")->close()); }
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open((folder / "journal").c_str(), &database), SQLITE_OK);
+  ASSERT_EQ(sqlite3_exec(database, "PRAGMA user_version=3", nullptr, nullptr, nullptr), SQLITE_OK);
+  ASSERT_EQ(sqlite3_close(database), SQLITE_OK);
+  const auto opened = Journal::open(folder / "journal");
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().code, ErrorCode::unsupported);
+  EXPECT_THAT(opened.error().message, HasSubstr("of version 3, this program reads up to version 2"));
+}
+
+}  // namespace
+}  // namespace osteon
