@@ -17,6 +17,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kMaxReceiveBytes = 4 * 1024 * 1024;  // a piece of a case is 1 MiB, a mesh message about 256 kB
 constexpr auto kAnswerTime = 5s;                   // for one request to a server that was reached
+constexpr auto kAgainTime = 1s;                    // for one attempt to come back to a server that was lost
 // A server that is silent so long is asked whether it lives, and gone if it has not answered for some time. The server allows
 // pings from kShortestPingMs on (server/net/room_server.cpp). A hand goes on feeling its own replica of the bone: it waits
 // longer than its RoomWatch does.
@@ -65,6 +66,35 @@ Error error_of(const grpc::Status& status, const std::string& server) {
   }
 }
 
+v1::JoinRequest request_of(ClientKind kind) {
+  v1::JoinRequest request;
+  request.set_protocol_version(kProtocolVersion);
+  request.set_kernel_version(kind == ClientKind::haptic ? kKernelVersion : 0);
+  request.set_kind(static_cast<v1::ClientKind>(kind));
+  return request;
+}
+
+// Over `room`'s channel; `server` is for sentences.
+Result<JoinedRoom> ask_to_join(JoinedRoom room, const v1::JoinRequest& request, const std::string& server, grpc::ClientContext& context) {
+  v1::JoinResponse response;
+  const grpc::Status status = v1::RoomService::NewStub(room.channel)->Join(&context, request, &response);
+  if (!status.ok()) return tl::unexpected(error_of(status, server));
+
+  const Result<Digest> hash = digest_from_wire(response.case_hash());
+  if (!hash || response.author() == 0 || !(response.pitch_mm() > 0))
+    return failure(ErrorCode::unsupported, server + " does not answer as an Osteon server does");
+  room.author = AuthorId{response.author()};
+  room.server_epoch = response.server_epoch();
+  room.lease_epoch = response.lease_epoch();
+  room.case_hash = *hash;
+  room.case_title = response.case_title();
+  room.pitch_mm = response.pitch_mm();
+  room.bounds = {from_wire(response.bounds_min_mm()), from_wire(response.bounds_max_mm())};
+  room.room_seq = RoomSeq{response.room_seq()};
+  if (!response.secret().empty()) room.secret = response.secret();
+  return room;
+}
+
 }  // namespace
 
 Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
@@ -82,29 +112,29 @@ Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const 
     if (Clock::now() >= until) return tl::unexpected(nobody_answers(address, patience));
   }
 
-  v1::JoinRequest request;
-  request.set_protocol_version(kProtocolVersion);
-  request.set_kernel_version(kind == ClientKind::haptic ? kKernelVersion : 0);
-  request.set_kind(static_cast<v1::ClientKind>(kind));
+  v1::JoinRequest request = request_of(kind);
   request.set_name(name);
-  v1::JoinResponse response;
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kAnswerTime);
-  const grpc::Status status = v1::RoomService::NewStub(room.channel)->Join(&context, request, &response);
-  if (!status.ok()) return tl::unexpected(error_of(status, "the program at " + address));
+  return ask_to_join(std::move(room), request, "the program at " + address, context);
+}
 
-  const Result<Digest> hash = digest_from_wire(response.case_hash());
-  if (!hash || response.author() == 0 || !(response.pitch_mm() > 0))
-    return failure(ErrorCode::unsupported, "the program at " + address + " does not answer as an Osteon server does");
-  room.author = AuthorId{response.author()};
-  room.server_epoch = response.server_epoch();
-  room.lease_epoch = response.lease_epoch();
-  room.case_hash = *hash;
-  room.case_title = response.case_title();
-  room.pitch_mm = response.pitch_mm();
-  room.bounds = {from_wire(response.bounds_min_mm()), from_wire(response.bounds_max_mm())};
-  room.room_seq = RoomSeq{response.room_seq()};
-  return room;
+Result<JoinedRoom> join_again(const JoinedRoom& room, ClientKind kind, const std::optional<KeptEvents>& kept) {
+  v1::JoinRequest request = request_of(kind);
+  request.set_resume_author(room.author.value);
+  request.set_secret(room.secret);
+  if (kept) {
+    request.set_kept_room_seq(kept->room_seq.value);
+    request.set_kept_chain(to_wire(kept->chain));
+  }
+  // As soon as the channel, which keeps trying, has a connection.
+  grpc::ClientContext context;
+  context.set_wait_for_ready(true);
+  context.set_deadline(std::chrono::system_clock::now() + kAgainTime);
+  Result<JoinedRoom> again = ask_to_join(room, request, "the server", context);
+  if (again && (again->case_hash != room.case_hash || again->author != room.author))
+    return failure(ErrorCode::unsupported, "another room answers where this one was");
+  return again;
 }
 
 }  // namespace osteon::wire

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/core/digest.hpp"
@@ -28,11 +29,20 @@ struct JoinedRoom {
   double pitch_mm = 0;
   Box bounds;
   RoomSeq room_seq;
+  std::string secret;                      // proves that a later connection is this one's
 };
 
 // Errors: unavailable (nobody answers at `address` within `patience`, one sentence with the remedy), unsupported
 // (protocol or kernel version differ), cancelled (`stop` returned true).
 [[nodiscard]] Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
                                            std::chrono::milliseconds patience, const std::function<bool()>& stop);
+
+// The same author again over the same channel, after the stream or the server was lost. `kept`: the newest event that the
+// server said is kept, and its chain. Errors: unavailable (try again), any other (the room knows this client no more).
+struct KeptEvents {
+  RoomSeq room_seq;
+  Digest chain;
+};
+[[nodiscard]] Result<JoinedRoom> join_again(const JoinedRoom& room, ClientKind kind, const std::optional<KeptEvents>& kept);
 
 }  // namespace osteon::wire

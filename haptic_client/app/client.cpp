@@ -61,7 +61,10 @@ struct SceneSet {
   RoomSeq place;
   std::vector<SceneItem> items;
 };
-using FromRoom = std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, SceneSet, Noted>;
+struct Interrupted {
+  std::string why;  // the line to the room is down, and is being made again
+};
+using FromRoom = std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, SceneSet, Noted, Interrupted>;
 
 // Where the tool is, for the replica's thread.
 struct ToolPlace {
@@ -165,6 +168,7 @@ class Client {
     events.rejected = [pass](RoomSeq place, std::uint64_t seq, std::uint64_t lease, const std::string& why) {
       pass(Rejected{place, seq, lease, why});
     };
+    events.interrupted = [pass](const Error& why) { pass(Interrupted{why.message}); };
     events.lost = [this](const Error& why) { give_up(why); };
     room_.open(std::move(events));
   }
@@ -308,8 +312,30 @@ class Client {
     row.confirmed_mono_ns = ns(Clock::now());
   }
 
-  void take(const FieldLeaf& leaf) { replica_.restore(leaf); }
+  void take(const FieldLeaf& leaf) {
+    if (interrupted_)
+      renewed_.push_back(leaf);
+    else
+      replica_.restore(leaf);
+  }
+  void take(const Interrupted& interrupted) {
+    // Contact goes on with what is held; the leaves that come take its place together, so that no bone is missed meanwhile.
+    if (joined_ && !interrupted_) log::warn("the line to the server is interrupted", {{"reason", interrupted.why}});
+    interrupted_ = joined_;
+    renewed_.clear();
+  }
+  void renew(const RoomAtJoin& room) {
+    replica_.renew(room.contained, room.bodies, renewed_, room.decided_author_seq);
+    for (std::uint64_t seq = 1; seq <= room.decided_author_seq && seq <= outcome_.cuts.size(); ++seq)
+      if (outcome_.cuts[seq - 1].confirmed_mono_ns == 0) confirm(seq, room.contained);
+    follow_lease(room.lease_epoch);
+    interrupted_ = false;
+    renewed_ = {};
+    ++outcome_.interruptions;
+    log::info("the line to the server stands again", {{"room_seq", room.contained.value}, {"unconfirmed_cuts", replica_.unconfirmed()}});
+  }
   void take(const RoomAtJoin& room) {
+    if (interrupted_) return renew(room);
     replica_.change(room.contained, room.bodies, {});
     replica_.joined(room.contained);
     lease_epoch_ = room.lease_epoch;
@@ -366,15 +392,18 @@ class Client {
 
   void watch_room(bool heard) {
     const double now_s = 1e-9 * static_cast<double>(ns(Clock::now()));
-    const RoomHealth health = watch_.update(now_s, heard, replica_.unconfirmed());
+    // Without a line everything that will be cut is unconfirmed.
+    const bool silent = interrupted_ && replica_.unconfirmed() == 0;
+    const RoomHealth health = watch_.update(now_s, heard && !interrupted_, silent ? 1 : replica_.unconfirmed());
     unconfirmed_ = replica_.unconfirmed();
     const RoomHealth before = room_health_.exchange(health);
     if (health == before) return;
     if (health == RoomHealth::follows) log::info("the server follows again");
     else log::warn("the spindle is held", {{"because", name(health)}, {"unconfirmed_cuts", replica_.unconfirmed()}});
     if (health == RoomHealth::lost && link_ok_)
-      give_up({ErrorCode::unavailable, "the server has not answered " + std::to_string(replica_.unconfirmed()) +
-                                           " cuts; see whether it runs and can be reached"});
+      give_up({ErrorCode::unavailable, interrupted_ ? "the line to the server has not come back; see whether it runs and can be reached"
+                                                    : "the server has not answered " + std::to_string(replica_.unconfirmed()) +
+                                                          " cuts; see whether it runs and can be reached"});
   }
 
   void build_patch() {
@@ -536,6 +565,8 @@ class Client {
   Pose built_at_;
   int built_tool_ = -1;
   int rejected_in_a_row_ = 0;
+  bool interrupted_ = false;          // since then leaves are gathered here
+  std::vector<FieldLeaf> renewed_;
   RoomWatch watch_;
   std::size_t noted_steps_ = 0;
   double noted_mm3_ = 0;

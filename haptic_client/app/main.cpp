@@ -127,6 +127,7 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string
             {"uncovered_ticks", outcome.uncovered_ticks},
             {"cuts_waiting_ticks", outcome.cuts_waiting_ticks}}},
           {"held_for_room_ticks", outcome.held_for_room_ticks},
+          {"interruptions", outcome.interruptions},
           {"rows_dropped", outcome.rows_dropped},
           {"recording",
            {{"rows", outcome.recording.rows}, {"dropped", outcome.recording.dropped}, {"trouble", outcome.recording.trouble}}},

@@ -77,6 +77,32 @@ void Replica::lease(std::uint64_t epoch) {
   });
 }
 
+void Replica::renew(RoomSeq contained, std::span<const BodyId> bodies, std::span<const FieldLeaf> leaves, std::uint64_t decided) {
+  change(contained, bodies, {});
+  room_seq_ = contained;
+  std::map<BodyId, std::set<Place>> stored;
+  for (const FieldLeaf& leaf : leaves) {
+    stored[leaf.body].insert({leaf.level, leaf.origin});
+    CutField& committed = body(leaf.body).committed;
+    FieldLeaf held{leaf.body, leaf.level, leaf.origin, {}};
+    committed.read(held);
+    if (held == leaf) continue;
+    committed.restore(leaf);
+    undone_.insert({leaf.level, leaf.origin});
+  }
+  for (auto& [id, held] : bodies_)
+    for (const FieldLeaf& leaf : held.committed.leaf_places()) {
+      if (stored[id].contains({leaf.level, leaf.origin})) continue;
+      held.committed.reset(leaf.level, leaf.origin);
+      undone_.insert({leaf.level, leaf.origin});
+    }
+  std::erase_if(pending_, [&](const Pending& pending) {
+    if (pending.cut.author_seq > decided) return false;
+    fall(pending);  // what of it was taken is committed now, and comes back from there
+    return true;
+  });
+}
+
 void Replica::change(RoomSeq place, std::span<const BodyId> bodies, std::span<const FieldLeaf> leaves) {
   note(place);
   for (const BodyId id : bodies) body(id);

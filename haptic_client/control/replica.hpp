@@ -38,6 +38,10 @@ class Replica {
   // The room takes no cut of an earlier lease any more: what was predicted under one falls.
   void lease(std::uint64_t epoch);
   void note(RoomSeq place) { room_seq_ = std::max(room_seq_, place); }  // of an event that leaves the bone as it is
+  // The room as it is at `contained`, whatever was held before: after the line to it was lost. `leaves`: all that are stored.
+  // Own cuts up to `decided` are in them, or were rejected. Only what differs changes, so that bone that is the same stays
+  // under the tool.
+  void renew(RoomSeq contained, std::span<const BodyId> bodies, std::span<const FieldLeaf> leaves, std::uint64_t decided);
   void settle();  // after a batch of the above, before predicted() is asked
   // What has changed in predicted bodies since the last call.
   [[nodiscard]] std::vector<ChangedLeaves> take_changes();

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "common/core/check.hpp"
+#include "common/link/backoff.hpp"
 #include "common/wire/convert.hpp"
 #include "osteon/v1/cutting.grpc.pb.h"
 #include "osteon/v1/room.grpc.pb.h"
@@ -157,56 +158,95 @@ fs::path default_case_cache() {
 }
 
 struct RoomSession::Impl {
-  Impl(wire::JoinedRoom r, Case b) : room(std::move(r)), bone(std::move(b)) {}
+  Impl(wire::JoinedRoom r, Case b) : room(std::move(r)), bone(std::move(b)), joined(room) {}
 
-  void read();
-  void write();
-  Result<void> deliver(const v1::SessionResponse& response);
+  // A stream, from its opening to its end.
+  struct Line {
+    grpc::ClientContext context;
+    std::unique_ptr<grpc::ClientReaderWriter<v1::SessionRequest, v1::SessionResponse>> stream;
+    bool may_send = false;  // it is known what the room has decided; under the session's mutex
+  };
 
-  wire::JoinedRoom room;
+  void run();
+  // Reads until the stream ends; why it did.
+  grpc::Status serve(Line& line, std::optional<Error>& broken);
+  void write(Line& line);
+  // Until it succeeds or the session is closed. Error: the server answers, and refuses.
+  Result<void> join_again();
+  Result<void> deliver(Line& line, const v1::SessionResponse& response);
+  void decided(std::uint64_t author_seq);
+  void send_again(Line& line, std::uint64_t decided_author_seq);
+  [[nodiscard]] bool ends() const {
+    const std::lock_guard lock(mutex);
+    return over || closing;
+  }
+
+  const wire::JoinedRoom room;
   Case bone;
   std::shared_ptr<ToolBox> tools = builtin_tool_box();  // shared with the replica's fields
   RoomEvents events;
 
-  grpc::ClientContext context;
   std::unique_ptr<v1::CuttingService::Stub> stub;
-  std::unique_ptr<grpc::ClientReaderWriter<v1::SessionRequest, v1::SessionResponse>> stream;
-  std::thread reader, writer;
+  std::thread thread;
+  // Of that thread.
+  wire::JoinedRoom joined;                    // newest
+  std::optional<wire::KeptEvents> kept;
 
   mutable std::mutex mutex;
   std::condition_variable wake;
-  std::deque<v1::Cut> cuts;                   // at most kMaxWaitingCuts
+  Line* line = nullptr;                       // the open one
+  std::deque<v1::Cut> cuts;                   // to be sent
+  std::deque<v1::Cut> sent;                   // and not known to be decided
   std::optional<v1::CuttingState> state;      // the newest that was not sent
   bool closing = false, over = false;
 };
 
-// On the writer thread: cuts before states, so that a state never tells of bone that the server still has.
-void RoomSession::Impl::write() {
+// On the line's writer thread: cuts before states, so that a state never tells of bone that the server still has.
+void RoomSession::Impl::write(Line& open) {
   v1::SessionRequest request;
-  request.mutable_open()->set_author(room.author.value);
-  request.mutable_open()->set_server_epoch(room.server_epoch);
-  bool sent = stream->Write(request);
-  while (sent) {
+  request.mutable_open()->set_author(joined.author.value);
+  request.mutable_open()->set_server_epoch(joined.server_epoch);
+  request.mutable_open()->set_secret(joined.secret);
+  bool written = open.stream->Write(request);
+  while (written) {
     {
       std::unique_lock lock(mutex);
-      wake.wait(lock, [&] { return !cuts.empty() || state || closing || over; });
-      if (over) break;
-      if (!cuts.empty()) {
-        *request.mutable_cut() = std::move(cuts.front());
+      wake.wait(lock, [&] { return (open.may_send && (!cuts.empty() || state)) || closing || over || line != &open; });
+      if (over || line != &open) break;
+      if (open.may_send && !cuts.empty()) {
+        *request.mutable_cut() = cuts.front();
+        sent.push_back(std::move(cuts.front()));
         cuts.pop_front();
-      } else if (state) {
+      } else if (open.may_send && state) {
         *request.mutable_state() = std::move(*state);
         state.reset();
       } else {
         break;
       }
     }
-    sent = stream->Write(request);
+    written = open.stream->Write(request);
   }
-  stream->WritesDone();
+  open.stream->WritesDone();
 }
 
-Result<void> RoomSession::Impl::deliver(const v1::SessionResponse& response) {
+// Everything that the room has not decided follows again, in order: a cut may have been lost on its way there, or its
+// answer on the way back.
+void RoomSession::Impl::send_again(Line& open, std::uint64_t decided_author_seq) {
+  decided(decided_author_seq);
+  const std::lock_guard lock(mutex);
+  cuts.insert(cuts.begin(), std::make_move_iterator(sent.begin()), std::make_move_iterator(sent.end()));
+  sent.clear();
+  open.may_send = true;
+  wake.notify_all();
+}
+
+void RoomSession::Impl::decided(std::uint64_t author_seq) {
+  const std::lock_guard lock(mutex);
+  while (!sent.empty() && sent.front().author_seq() <= author_seq) sent.pop_front();
+  while (!cuts.empty() && cuts.front().author_seq() <= author_seq) cuts.pop_front();
+}
+
+Result<void> RoomSession::Impl::deliver(Line& open, const v1::SessionResponse& response) {
   switch (response.message_case()) {
     case v1::SessionResponse::kLeaf: {
       const Result<FieldLeaf> leaf = wire::from_wire(response.leaf());
@@ -216,7 +256,9 @@ Result<void> RoomSession::Impl::deliver(const v1::SessionResponse& response) {
     }
     case v1::SessionResponse::kComplete: {
       const v1::FieldComplete& row = response.complete();
-      if (events.complete) events.complete({RoomSeq{row.room_seq()}, bodies_of(row.bodies()), row.lease_epoch()});
+      if (events.complete)
+        events.complete({RoomSeq{row.room_seq()}, bodies_of(row.bodies()), row.lease_epoch(), row.decided_author_seq()});
+      send_again(open, row.decided_author_seq());
       return {};
     }
     case v1::SessionResponse::kTool: {
@@ -255,29 +297,109 @@ Result<void> RoomSession::Impl::deliver(const v1::SessionResponse& response) {
       if (!cut) return tl::unexpected(cut.error());
       const ToolBox::Entry* tool = tools->find(cut->tool);
       if (!tool || !tool->body.cuts()) return failure(ErrorCode::invalid_input, "committed.cut names a tool that was not sent");
+      if (cut->author == room.author) decided(cut->author_seq);
       if (events.committed) events.committed(RoomSeq{response.committed().room_seq()}, *cut);
       return {};
     }
     case v1::SessionResponse::kRejected: {
       const v1::RejectedCut& row = response.rejected();
+      decided(row.author_seq());
       if (events.rejected) events.rejected(RoomSeq{row.room_seq()}, row.author_seq(), row.lease_epoch(), row.reason());
+      return {};
+    }
+    case v1::SessionResponse::kKept: {
+      const Result<Digest> chain = wire::digest_from_wire(response.kept().chain());
+      if (!chain) return tl::unexpected(chain.error());
+      kept = {RoomSeq{response.kept().room_seq()}, *chain};
       return {};
     }
     default: return failure(ErrorCode::unsupported, "SessionResponse.message is not known to this client");
   }
 }
 
-void RoomSession::Impl::read() {
+grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) {
+  {
+    const std::lock_guard lock(mutex);
+    if (closing || over) return grpc::Status::CANCELLED;
+    open.stream = stub->Session(&open.context);
+    line = &open;
+  }
+  std::thread writer([&] { write(open); });
   v1::SessionResponse response;
-  std::optional<Error> broken;
-  while (!broken && stream->Read(&response)) {
+  while (!broken && open.stream->Read(&response)) {
     {
       const std::lock_guard lock(mutex);
       if (over) break;
     }
-    if (const Result<void> delivered = deliver(response); !delivered) {
+    if (const Result<void> delivered = deliver(open, response); !delivered) {
       broken = Error{delivered.error().code, "the server sent what no correct server sends: " + delivered.error().message};
-      context.TryCancel();
+      open.context.TryCancel();
+    }
+  }
+  {
+    const std::lock_guard lock(mutex);
+    line = nullptr;
+    wake.notify_all();
+  }
+  // Finish waits for the status, which comes once the writer has stopped.
+  writer.join();
+  return open.stream->Finish();
+}
+
+namespace {
+
+// A line that broke can be made again; what the server says itself stands.
+bool may_come_again(const grpc::Status& status) {
+  switch (status.error_code()) {
+    case grpc::StatusCode::OK:
+    case grpc::StatusCode::UNAVAILABLE:
+    case grpc::StatusCode::CANCELLED:
+    case grpc::StatusCode::INTERNAL:
+    case grpc::StatusCode::UNKNOWN:
+    case grpc::StatusCode::DEADLINE_EXCEEDED:
+    case grpc::StatusCode::RESOURCE_EXHAUSTED: return true;
+    default: return false;
+  }
+}
+
+}  // namespace
+
+Result<void> RoomSession::Impl::join_again() {
+  Backoff backoff(room.author.value ^ static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count()),
+                  {.least = 20ms, .most = 2s});
+  while (true) {
+    {
+      std::unique_lock lock(mutex);
+      wake.wait_for(lock, backoff.next(), [&] { return closing || over; });
+      if (closing || over) return {};
+    }
+    Result<wire::JoinedRoom> again = wire::join_again(joined, wire::ClientKind::haptic, kept);
+    if (again) {
+      joined = std::move(*again);
+      return {};
+    }
+    if (again.error().code != ErrorCode::unavailable) return tl::unexpected(again.error());
+  }
+}
+
+void RoomSession::Impl::run() {
+  std::optional<Error> why;
+  while (!why) {
+    Line open;
+    std::optional<Error> broken;
+    const grpc::Status status = serve(open, broken);
+    if (ends()) break;
+    const std::string said = status.error_message().empty() ? "it closed the connection" : status.error_message();
+    if (broken) {
+      why = broken;
+    } else if (!may_come_again(status)) {
+      why = Error{ErrorCode::unavailable,
+                  "the server ended the session: " + said + "; see whether osteon-server still runs, then join again"};
+    } else {
+      if (events.interrupted) events.interrupted({ErrorCode::unavailable, said});
+      const Result<void> again = join_again();
+      if (ends()) break;
+      if (!again) why = again.error();
     }
   }
   bool closed = false;
@@ -287,15 +409,7 @@ void RoomSession::Impl::read() {
     over = true;
     wake.notify_all();
   }
-  // Finish waits for the status, which comes once the writer has stopped.
-  if (writer.joinable()) writer.join();
-  const grpc::Status status = stream->Finish();
-  if (closed || !events.lost) return;
-  events.lost(broken ? *broken
-                     : Error{ErrorCode::unavailable, "the server ended the session: " +
-                                                         (status.error_message().empty() ? std::string("it closed the connection")
-                                                                                         : status.error_message()) +
-                                                         "; see whether osteon-server still runs, then join again"});
+  if (why && !closed && events.lost) events.lost(*why);
 }
 
 RoomSession::RoomSession(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -339,20 +453,18 @@ Result<std::uint32_t> RoomSession::set_item(const SceneItem& item) {
 }
 
 void RoomSession::open(RoomEvents events) {
-  OSTEON_CHECK(!impl_->stream);
+  OSTEON_CHECK(!impl_->stub);
   impl_->events = std::move(events);
   impl_->stub = v1::CuttingService::NewStub(impl_->room.channel);
-  impl_->stream = impl_->stub->Session(&impl_->context);
-  impl_->writer = std::thread([impl = impl_.get()] { impl->write(); });
-  impl_->reader = std::thread([impl = impl_.get()] { impl->read(); });
+  impl_->thread = std::thread([impl = impl_.get()] { impl->run(); });
 }
 
 bool RoomSession::send(const Cut& cut) {
   v1::Cut message = wire::to_wire(cut);
   const std::lock_guard lock(impl_->mutex);
-  if (impl_->closing || impl_->over || impl_->cuts.size() >= kMaxWaitingCuts) return false;
+  if (impl_->closing || impl_->over || impl_->cuts.size() + impl_->sent.size() >= kMaxWaitingCuts) return false;
   impl_->cuts.push_back(std::move(message));
-  impl_->wake.notify_one();
+  impl_->wake.notify_all();
   return true;
 }
 
@@ -360,11 +472,11 @@ void RoomSession::send(const CuttingState& state) {
   v1::CuttingState message = wire::to_wire(state);
   const std::lock_guard lock(impl_->mutex);
   impl_->state = std::move(message);
-  impl_->wake.notify_one();
+  impl_->wake.notify_all();
 }
 
 void RoomSession::close() {
-  if (!impl_ || !impl_->reader.joinable()) return;
+  if (!impl_ || !impl_->thread.joinable()) return;
   {
     std::unique_lock lock(impl_->mutex);
     impl_->closing = true;
@@ -373,9 +485,9 @@ void RoomSession::close() {
     impl_->wake.wait_for(lock, kCloseTime, [&] { return impl_->over; });
     impl_->over = true;
     impl_->wake.notify_all();
+    if (impl_->line) impl_->line->context.TryCancel();
   }
-  impl_->context.TryCancel();
-  impl_->reader.join();
+  impl_->thread.join();
 }
 
 }  // namespace osteon

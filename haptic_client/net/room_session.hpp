@@ -35,6 +35,7 @@ struct RoomAtJoin {
   RoomSeq contained;
   std::vector<BodyId> bodies;
   std::uint64_t lease_epoch = 0;
+  std::uint64_t decided_author_seq = 0;  // the caller's cuts up to this one were decided: they are in the leaves or rejected
 };
 
 // A part of an event that changed the bone otherwise than by a cut: leaves to set, of bodies to hold.
@@ -47,8 +48,9 @@ struct BonePart {
 };
 
 // What comes down. Called on the session's own thread, one after the other: the scene, every leaf, then `complete`, then
-// events in room_seq order; one may come as a change and as a scene. `lost` comes at most once and last, and never after
-// close(). Tools go to tools() before anything that names them.
+// events in room_seq order; one may come as a change and as a scene. When the line breaks, `interrupted`, and once it is
+// made again, all of that anew: the scene, every leaf, `complete`, and cuts that were sent and not decided are sent again.
+// `lost` comes at most once and last, and never after close(). Tools go to tools() before anything that names them.
 struct RoomEvents {
   std::function<void(const FieldLeaf& leaf)> leaf;
   std::function<void(const RoomAtJoin& room)> complete;
@@ -58,7 +60,8 @@ struct RoomEvents {
   std::function<void(BonePart&& part)> change;
   std::function<void(RoomSeq place, const std::vector<SceneItem>& items)> scene;  // all that stand from now on
   std::function<void(RoomSeq place)> tool;  // one was added
-  std::function<void(const Error& why)> lost;
+  std::function<void(const Error& why)> interrupted;
+  std::function<void(const Error& why)> lost;  // for good: the room is over, or knows this client no more
 };
 
 class RoomSession {
@@ -73,7 +76,7 @@ class RoomSession {
   RoomSession(RoomSession&&) noexcept;
   RoomSession& operator=(RoomSession&&) noexcept;
 
-  [[nodiscard]] const wire::JoinedRoom& room() const;  // the author of all cuts and states, epochs, bounds
+  [[nodiscard]] const wire::JoinedRoom& room() const;  // as first joined: the author of all cuts and states, epochs, bounds
   [[nodiscard]] const Case& bone() const;
   [[nodiscard]] const std::shared_ptr<ToolBox>& tools() const;  // that the room knows; grows with its events
   // Sets an item of the room's scene, id 0 for a new one, and returns its id. Waits for the answer. Errors:
@@ -83,7 +86,7 @@ class RoomSession {
   // Opens the stream; once. From now on `events` are called.
   void open(RoomEvents events);
   // Any thread but the haptic and audio ones: these lock and allocate.
-  // In order of the calls. False when kMaxWaitingCuts are waiting or the stream is lost; the cut is then not taken.
+  // In order of the calls. False when kMaxWaitingCuts are not decided yet or the session is lost; the cut is then not taken.
   [[nodiscard]] bool send(const Cut& cut);
   // Newest wins: a state that is still waiting is replaced. Cuts that are waiting go first.
   void send(const CuttingState& state);

@@ -135,7 +135,7 @@ Result<Room> open_journal(const Options& options, const Case& bone, std::unique_
   log::info("journal", {{"file", options.journal_file.string()},
                         {"made", kept->made},
                         {"room_seq", kept->room.room_seq().value},
-                        {"evaluated", kept->evaluated},
+                        {"evaluated", kept->keeper->evaluated()},
                         {"server_epoch", kept->keeper->server_epoch()}});
   keeper = std::move(kept->keeper);
   return std::move(kept->room);

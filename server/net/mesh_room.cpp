@@ -60,21 +60,23 @@ void MeshRoom::stop() {
 }
 
 void MeshRoom::run() {
-  auto next = Clock::now();
+  Clock::time_point next{};
   bool due = false;
   while (true) {
     {
       std::unique_lock lock(wake_mutex_);
-      if (near_)  // tools move without anything else that wakes this thread
-        wake_.wait_for(lock, rates_.looks, [&] { return due_ || end_; });
-      else
-        wake_.wait(lock, [&] { return due_ || end_; });
-      if (!due_ && (end_ || !near_)) return;
+      const auto called = [&] { return due_ || end_; };
+      if (near_ && !owed_)  // tools move without anything else that wakes this thread
+        wake_.wait_for(lock, rates_.looks, called);
+      else if (!owed_)
+        wake_.wait(lock, called);
+      if (!due_ && end_) return;
       // A first cut is shown at once, a row of cuts at the mesh rate.
       wake_.wait_until(lock, next, [&] { return end_; });
       due = std::exchange(due_, false);
     }
-    next = Clock::now() + rates_.mesh;
+    // Of the ticks that wake this thread, the one that comes about then: what it has committed goes at once.
+    next = Clock::now() + rates_.mesh / turns_ - rates_.mesh / (2 * Pace::kTurns);
     update(due);
   }
 }
@@ -91,9 +93,9 @@ void MeshRoom::wake() {
 }
 
 // [mesh thread]
-void MeshRoom::follow_looks() {
-  if (!near_ || Clock::now() < next_look_) return;
-  next_look_ = Clock::now() + rates_.looks;
+void MeshRoom::follow_looks(Clock::time_point now) {
+  if (!near_ || now < next_look_) return;
+  next_look_ = now + rates_.looks;
   auto focuses = lookers_.focuses(room_.bone().pitch_mm(), tool_tips_mm_());
   if (!focuses) return;
   const std::unique_lock lock(room_mutex_);
@@ -101,7 +103,13 @@ void MeshRoom::follow_looks() {
 }
 
 void MeshRoom::update(bool due) {
-  follow_looks();
+  const auto now = Clock::now();
+  follow_looks(now);
+  make_stale_blocks(due);
+  send_owed(now);
+}
+
+void MeshRoom::make_stale_blocks(bool due) {
   std::vector<BlockKey> keys;
   std::vector<BodyId> bodies_now;
   std::vector<Clock::time_point> arrivals;
@@ -156,17 +164,37 @@ void MeshRoom::update(bool due) {
       if (const StoredBlock* block = store_.put(key, {})) update.blocks[key] = block_message(key, *block);
     }
     surface_.room_seq = update.room_seq;
-    streams_.each([&](MeshSink& sink) { sink.offer(update); });
+    for (Stream& stream : streams_) {
+      stream.sink->offer(update);
+      stream.owed = true;
+    }
+    owed_ = !streams_.empty();
   }
   const auto ready = Clock::now();
   const std::lock_guard lock(stats_mutex_);
   for (const Clock::time_point arrived : arrivals) update_.record(ready - arrived);
 }
 
+void MeshRoom::send_owed(Clock::time_point now) {
+  if (!std::exchange(owed_, false)) return;
+  const std::lock_guard lock(surface_mutex_);
+  turns_ = std::min(Pace::kTurns, 1 + static_cast<int>(streams_.size() / kTurnViewers));
+  for (Stream& stream : streams_) {
+    if (!stream.owed) continue;
+    if (!stream.pace.due(now)) {
+      owed_ = true;
+      continue;
+    }
+    stream.owed = false;
+    stream.pace.done(now);
+    stream.sink->send();
+  }
+}
+
 void MeshRoom::watch(MeshSink& sink, const std::optional<Look>& look) {
   {
     const std::lock_guard lock(surface_mutex_);
-    streams_.add(sink);
+    streams_.push_back({&sink, Pace(rates_.mesh, streams_.size())});
     lookers_.open(sink.author(), look);
     // What is there: the finer blocks that this viewer's look asks for follow.
     sink.begin(surface_);
@@ -177,7 +205,7 @@ void MeshRoom::watch(MeshSink& sink, const std::optional<Look>& look) {
 
 void MeshRoom::leave(MeshSink& sink) {
   const std::lock_guard lock(surface_mutex_);
-  if (streams_.remove(sink)) lookers_.close(sink.author());
+  if (std::erase_if(streams_, [&](const Stream& stream) { return stream.sink == &sink; }) > 0) lookers_.close(sink.author());
 }
 
 void MeshRoom::look(AuthorId viewer, const Look& from) {
@@ -187,7 +215,7 @@ void MeshRoom::look(AuthorId viewer, const Look& from) {
 void MeshRoom::end_streams(const std::string& why) {
   const std::lock_guard lock(surface_mutex_);
   ended_ = why;
-  streams_.each([&](MeshSink& sink) { sink.end(why); });
+  for (const Stream& stream : streams_) stream.sink->end(why);
 }
 
 MeshHealth MeshRoom::health() const {
@@ -197,7 +225,7 @@ MeshHealth MeshRoom::health() const {
     health.streams = streams_.size();
     health.blocks = surface_.blocks.size();
     for (const auto& [key, message] : surface_.blocks) health.surface_bytes += message->size();
-    streams_.each([&](const MeshSink& sink) { health.furthest_behind = std::max(health.furthest_behind, sink.waiting()); });
+    for (const Stream& stream : streams_) health.furthest_behind = std::max(health.furthest_behind, stream.sink->waiting());
   }
   const std::lock_guard lock(stats_mutex_);
   health.update = update_;

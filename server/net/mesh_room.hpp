@@ -1,5 +1,5 @@
-// The surface of a room's bone as viewers hold it: one thread makes the blocks that events have changed, at the mesh rate,
-// and offers them to every open stream.
+// The surface of a room's bone as viewers hold it: one thread makes the blocks that events have changed and offers them to
+// every open stream. Viewers take turns, so that no message waits behind those to all the others.
 #pragma once
 #include <chrono>
 #include <condition_variable>
@@ -26,6 +26,7 @@ class MeshSink : public StreamSink {
   [[nodiscard]] virtual AuthorId author() const { return {}; }
   virtual void begin(MeshUpdate whole_surface) = 0;
   virtual void offer(const MeshUpdate& update) = 0;
+  virtual void send() {}  // what it was offered: this stream's turn has come
 };
 
 // How much of the bone is drawn: all of it in full, or in full only what viewers look at and tools work on.
@@ -34,7 +35,7 @@ enum class Detail : std::uint8_t { automatic, full, near };
 inline constexpr std::size_t kMostFullBlocks = 4000;
 
 struct MeshRates {
-  std::chrono::nanoseconds mesh;   // between two updates of the surface
+  std::chrono::nanoseconds mesh;   // between two messages to a viewer
   std::chrono::nanoseconds looks;  // at most so often the surface follows the looks of viewers and the tools
 };
 
@@ -51,6 +52,9 @@ class MeshRoom {
  public:
   using Clock = std::chrono::steady_clock;
   using ToolTips = std::function<std::vector<Vec3>()>;  // where tools are, mm
+  // The surface is brought up to date at the mesh rate for so many viewers; for more of them in up to Pace::kTurns turns
+  // between two messages to one.
+  static constexpr std::size_t kTurnViewers = 16;
 
   MeshRoom(Room& room, std::shared_mutex& room_mutex, MeshRates rates, Detail detail, ToolTips tool_tips_mm);
   ~MeshRoom() { stop(); }
@@ -62,7 +66,7 @@ class MeshRoom {
   void start();
   void stop();  // makes what is due, then joins the thread
   // [mesh thread; any other before start() and after stop()] Makes the stale blocks and offers them; where none is stale
-  // and `due`, the room's place alone.
+  // and `due`, the room's place alone. Then sends to those whose turn it is.
   void update(bool due);
 
   void changed(Clock::time_point arrived);  // a cut or event that arrived then has made blocks stale
@@ -80,8 +84,15 @@ class MeshRoom {
   [[nodiscard]] Digest surface_hash() const;  // of the newest blocks
 
  private:
+  struct Stream {
+    MeshSink* sink;
+    Pace pace;
+    bool owed = false;  // it was offered something that it was not sent
+  };
   void run();
-  void follow_looks();
+  void follow_looks(Clock::time_point now);
+  void make_stale_blocks(bool due);
+  void send_owed(Clock::time_point now);
 
   Room& room_;
   std::shared_mutex& room_mutex_;
@@ -90,12 +101,14 @@ class MeshRoom {
   const ToolTips tool_tips_mm_;
 
   mutable std::mutex surface_mutex_;
-  Audience<MeshSink> streams_;
+  std::vector<Stream> streams_;
   BlockStore store_;
   MeshUpdate surface_;  // every block with a surface, as it travels
   std::optional<std::string> ended_;
   Lookers lookers_;     // has a lock of its own
-  Clock::time_point next_look_{};  // of the mesh thread
+  Clock::time_point next_look_{};  // of the mesh thread, as is the next
+  bool owed_ = false;              // to some stream
+  int turns_ = 1;
 
   std::mutex wake_mutex_;
   std::condition_variable wake_;

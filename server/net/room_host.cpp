@@ -38,12 +38,12 @@ constexpr std::size_t kLeafBatch = 64;
 // Lock order: room_mutex, then sessions_mutex or that of the surface or the board, then a stream's own, then jobs_mutex.
 // queue_mutex, pieces_mutex and stats_mutex are never held with another.
 struct RoomHost::Impl {
-  Impl(Room r, HostRates rates, Detail detail, Committer::Write write)
-      : room(std::move(r)),
+  Impl(Room r, HostRates rates, Detail detail, RoomKeeper* k)
+      : keeper(k), room(std::move(r)),
         rates_(rates),
         room_began(Clock::now() - std::chrono::duration_cast<Clock::duration>(room.time())),
         mesh(room, room_mutex, {rates.mesh, rates.looks}, detail, [this] { return board.tool_tips_mm(); }),
-        committer(std::move(write), [this](const Error& why) { close_room(why); }) {
+        committer(k ? [k](std::span<const RoomRow> rows) { return k->write(rows); } : Committer::Write{}, [this](const Error& why) { close_room(why); }) {
     authors = room.authors();
   }
 
@@ -54,6 +54,7 @@ struct RoomHost::Impl {
   void decide(QueuedEvent& queued);
   void later(Committer::Tell tell) { tells.push_back(std::move(tell)); }  // [tick] when what was decided is durable
   [[nodiscard]] MessageParts rows_of(const RoomEvent& event) const;
+  void tell_kept();
   void close_room(const Error& why);
   [[nodiscard]] std::optional<Error> closed() const;
   void end_sessions(const std::string& why);
@@ -70,6 +71,7 @@ struct RoomHost::Impl {
   BoneCopy copy_bone();
   void ask_for_split(Separation found);
 
+  RoomKeeper* const keeper;  // null: nothing is kept
   Room room;
   std::shared_mutex room_mutex;
   std::optional<std::vector<Cut>> meanwhile;  // under room_mutex: cuts applied since copy_bone() began to copy
@@ -84,7 +86,7 @@ struct RoomHost::Impl {
 
   mutable std::mutex sessions_mutex;
   Audience<SessionSink> sessions;
-  std::set<AuthorId> open_authors;
+  std::map<AuthorId, SessionSink*> open_authors;
 
   StateBoard board;
   MeshRoom mesh;
@@ -108,6 +110,7 @@ struct RoomHost::Impl {
   std::optional<std::string> ended;       // under sessions_mutex: why new sessions end at once
   std::optional<BoneStatus> last_status;  // of the job thread
   std::vector<Committer::Tell> tells;     // of the tick thread
+  Clock::time_point next_kept{};          // of the tick thread: when it is next said how much is kept
   Committer committer;                    // the last member with a thread: it tells the others
 
   std::thread tick_thread, piece_thread, job_thread;
@@ -168,16 +171,17 @@ void RoomHost::Impl::decide(QueuedCut& queued) {
   const Bytes row = outcome->committed() ? cut_row(outcome->room_seq, queued.cut)
                                          : rejection_row(outcome->room_seq, queued.cut.author_seq, outcome->lease_epoch,
                                                          outcome->rejection);
+  tell_kept();
   later([this, sink = queued.sink, row, place = outcome->room_seq, repeated = outcome->repeated,
          to_all = outcome->committed()](const Result<void>& durable) {
     if (durable) {
       const std::lock_guard lock(sessions_mutex);
-      if (repeated)
-        sink->answer(row);
-      else if (to_all)
+      // The author may have come back on another stream meanwhile.
+      const auto author = open_authors.find(sink->author());
+      if (!repeated && to_all)
         sessions.each([&](SessionSink& one) { one.offer(place, row); });
-      else
-        sink->offer(place, row);
+      else if (author != open_authors.end())
+        repeated ? author->second->answer(row) : author->second->offer(place, row);
     }
     sink->decided();
   });
@@ -206,6 +210,18 @@ void RoomHost::Impl::decide(QueuedEvent& queued) {
         sessions.each([&](SessionSink& sink) { sink.offer(event->room_seq, row); });
     }
     answer(event);
+  });
+}
+
+// [tick] Every second, what a client may hold the room to.
+void RoomHost::Impl::tell_kept() {
+  if (!keeper || Clock::now() < next_kept) return;
+  next_kept = Clock::now() + std::chrono::seconds(1);
+  later([this](const Result<void>& durable) {
+    if (!durable) return;
+    const Bytes row = kept_row(keeper->head());
+    const std::lock_guard lock(sessions_mutex);
+    sessions.each([&](SessionSink& sink) { sink.answer(row); });
   });
 }
 
@@ -255,8 +271,8 @@ void RoomHost::Impl::run_jobs() {
 }
 
 RoomHost::RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress, Detail detail,
-                   Committer::Write write)
-    : impl_(std::make_unique<Impl>(std::move(room), rates, detail, std::move(write))) {
+                   RoomKeeper* keeper)
+    : impl_(std::make_unique<Impl>(std::move(room), rates, detail, keeper)) {
   impl_->mesh.make_whole_surface(progress);
   impl_->room_seq = impl_->room.room_seq().value;
   impl_->show_scene();
@@ -318,7 +334,24 @@ void RoomHost::run_slowly(std::function<void()> job) {
   impl_->jobs_wake.notify_one();
 }
 
-Result<AuthorId> RoomHost::join(MemberKind kind, std::uint32_t person, const Digest& secret) {
+Result<void> RoomHost::resume(AuthorId author, const Digest& secret, const std::optional<JournalHead>& kept) {
+  {
+    const std::shared_lock lock(impl_->room_mutex);
+    if (!impl_->room.proves(author, secret))
+      return failure(ErrorCode::invalid_input, "author " + std::to_string(author.value) +
+                                                   " of an earlier connection is not known here by that secret; join anew");
+  }
+  if (!kept || !impl_->keeper) return {};
+  return impl_->keeper->check_witness(*kept);
+}
+
+Result<AuthorId> RoomHost::join(MemberKind kind, const std::string& name, const Digest& secret) {
+  std::uint32_t person = 0;
+  if (impl_->keeper && !name.empty()) {
+    const Result<std::uint32_t> known = impl_->keeper->person(name);
+    if (!known) return tl::unexpected(known.error());
+    person = *known;
+  }
   std::promise<Result<AuthorId>> answer;
   queue_event(
       [&](Room& room) -> Result<RoomEvent> {
@@ -489,7 +522,7 @@ void RoomHost::find_pieces() {
   impl_->pieces_wake.wait(lock, [&] { return impl_->looks_done >= wanted || impl_->pieces_end; });
 }
 
-Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink) {
+Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, const Digest& secret) {
   std::vector<FieldLeaf> leaves;
   MessageParts before;
   {
@@ -506,11 +539,18 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink) {
     v1::SessionResponse complete;
     complete.mutable_complete()->set_room_seq(impl_->room.room_seq().value);
     complete.mutable_complete()->set_lease_epoch(impl_->room.lease_epoch(sink->author()));
+    complete.mutable_complete()->set_decided_author_seq(impl_->room.decided(sink->author()));
     for (const BodyId body : impl_->room.bodies()) complete.mutable_complete()->add_bodies(body.value);
     const std::lock_guard lock(impl_->sessions_mutex);
-    if (!impl_->open_authors.insert(sink->author()).second)
+    SessionSink*& open = impl_->open_authors[sink->author()];
+    if (open && !impl_->room.proves(sink->author(), secret))
       return failure(ErrorCode::invalid_input,
                      "open.author " + std::to_string(sink->author().value) + " has an open session; join again for another");
+    if (open) {
+      open->end("a newer connection has taken its place");
+      impl_->sessions.remove(*open);
+    }
+    open = sink.get();
     impl_->sessions.add(*sink);
     sink->begin(impl_->room.room_seq(), std::move(before), serialised(complete));
     if (impl_->ended) sink->end(*impl_->ended);

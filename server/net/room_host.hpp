@@ -14,6 +14,7 @@
 #include "common/surface/look.hpp"
 #include "server/net/mesh_room.hpp"
 #include "server/net/committer.hpp"
+#include "server/net/room_keeper.hpp"
 #include "server/net/outbox.hpp"
 #include "server/net/state_board.hpp"
 #include "server/net/stream_sink.hpp"
@@ -69,9 +70,9 @@ class RoomHost {
   using Clock = std::chrono::steady_clock;
 
   // Makes the whole surface, then starts the threads. `progress` hears fractions from one thread at a time.
-  // `write` makes rows durable before anyone hears of them; without it nothing is kept.
+  // `keeper` makes rows durable before anyone hears of them, and outlives the host; without it nothing is kept.
   RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress, Detail detail = Detail::automatic,
-           Committer::Write write = {});
+           RoomKeeper* keeper = nullptr);
   ~RoomHost();
   RoomHost(const RoomHost&) = delete;
   RoomHost& operator=(const RoomHost&) = delete;
@@ -89,13 +90,16 @@ class RoomHost {
   void run_slowly(std::function<void()> job);
   // Waits until it is durable, so not on the tick or the committing thread. Error unavailable: the room has stopped or
   // keeps nothing any more.
-  [[nodiscard]] Result<AuthorId> join(MemberKind kind, std::uint32_t person = 0, const Digest& secret = {});
+  [[nodiscard]] Result<AuthorId> join(MemberKind kind, const std::string& name = {}, const Digest& secret = {});
+  // Whether an earlier connection may go on. `kept`: what it was told is safe, if anything. Errors: invalid_input (not the
+  // secret of which the author has the digest), unavailable (the room has lost what was said to be safe).
+  [[nodiscard]] Result<void> resume(AuthorId author, const Digest& secret, const std::optional<JournalHead>& kept);
   [[nodiscard]] BoneStatus bone_status();
   void find_pieces();                        // waits until what was cut so far is looked through, and its pieces are bodies
   [[nodiscard]] SavedFields saved_fields();  // of all bodies, at its room_seq
-  // The sink hears every row after those of its leaves. Error: invalid_input (the author may not cut, or
-  // has an open session).
-  [[nodiscard]] Result<void> open_session(const std::shared_ptr<SessionSink>& sink);
+  // The sink hears every row after those of its leaves. With the digest of the author's secret it takes the place of an
+  // earlier session of his. Error: invalid_input (the author may not cut, or has an open session).
+  [[nodiscard]] Result<void> open_session(const std::shared_ptr<SessionSink>& sink, const Digest& secret = {});
   // From where its author looks at first; without a look it is sent the bone in full.
   void watch_mesh(MeshSink& sink, const std::optional<Look>& look = std::nullopt);
   // The newest of each viewer counts, until its last mesh stream ends. Of one without such a stream: nothing.

@@ -71,8 +71,8 @@ Result<KeptRoom> RoomKeeper::open(const std::filesystem::path& file, const Case&
   const Fields fields = keeper->newest_fields();
   Result<Room> room = keeper->replay(bone, options.limits, fields, progress);
   if (!room) return failure(room.error().code, file.string() + ": " + room.error().message);
-  const std::uint64_t rows = keeper->journal_.head().place.value;
-  return KeptRoom{std::move(*room), std::move(keeper), made, rows - fields.place.value};
+  keeper->evaluated_ = keeper->journal_.head().place.value - fields.place.value;
+  return KeptRoom{std::move(*room), std::move(keeper), made};
 }
 
 RoomKeeper::Fields RoomKeeper::newest_fields() {

@@ -37,6 +37,8 @@ class RoomKeeper {
   [[nodiscard]] JournalHead head() const;
   // Rises with every opening.
   [[nodiscard]] std::uint64_t server_epoch() const { return server_epoch_; }
+  // Rows that were evaluated again when it was opened.
+  [[nodiscard]] std::uint64_t evaluated() const { return evaluated_; }
   // The pseudonym under which rows know this person; the same for the same label.
   [[nodiscard]] Result<std::uint32_t> person(const std::string& label);
   // What a client was told was safe: see Journal::check_witness.
@@ -63,14 +65,13 @@ class RoomKeeper {
   Journal journal_;
   RoomGenesis genesis_;
   const double pitch_mm_;
-  std::uint64_t server_epoch_ = 0;
+  std::uint64_t server_epoch_ = 0, evaluated_ = 0;
 };
 
 struct KeptRoom {
   Room room;
   std::unique_ptr<RoomKeeper> keeper;
   bool made = false;              // there was no journal
-  std::uint64_t evaluated = 0;    // rows since the checkpoint
 };
 
 }  // namespace osteon

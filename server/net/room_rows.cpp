@@ -49,6 +49,13 @@ Bytes rejection_row(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease
   return serialised(response);
 }
 
+Bytes kept_row(const JournalHead& head) {
+  v1::SessionResponse response;
+  response.mutable_kept()->set_room_seq(head.place.value);
+  response.mutable_kept()->set_chain(wire::to_wire(head.chain));
+  return serialised(response);
+}
+
 Bytes tool_row(RoomSeq place, const Tool& tool) {
   v1::SessionResponse response;
   response.mutable_tool()->set_room_seq(place.value);

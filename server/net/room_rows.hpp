@@ -2,6 +2,7 @@
 #pragma once
 #include <vector>
 
+#include "server/journal/chain.hpp"
 #include "server/net/outbox.hpp"
 #include "server/room/room.hpp"
 
@@ -13,6 +14,7 @@ namespace osteon {
 // Whole SessionResponses.
 [[nodiscard]] Bytes cut_row(RoomSeq place, const Cut& cut);
 [[nodiscard]] Bytes rejection_row(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, Rejection reason);
+[[nodiscard]] Bytes kept_row(const JournalHead& head);
 [[nodiscard]] Bytes tool_row(RoomSeq place, const Tool& tool);
 [[nodiscard]] Bytes scene_row(RoomSeq place, const std::vector<SceneItem>& items);
 [[nodiscard]] MessageParts change_rows(const RoomEvent& event);  // at least one; each of a bounded size

@@ -149,11 +149,14 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(Room room, const RoomServe
 
   auto impl = std::make_unique<Impl>();
   impl->saves = !options.save.empty();
-  Committer::Write write;
-  if (keeper) write = [kept = keeper.get()](std::span<const RoomRow> rows) { return kept->write(rows); };
+  // What took long to make again should not take so long the next time.
+  constexpr std::uint64_t kLongReplay = 5000;
+  if (keeper && keeper->evaluated() > kLongReplay)
+    if (Result<void> kept = keeper->checkpoint(room.room_seq(), room.all_leaves()); !kept)
+      log::warn("no checkpoint", {{"reason", kept.error().message}});
   const std::uint64_t epoch = keeper ? keeper->server_epoch() : new_server_epoch();
   impl->keeper = std::move(keeper);
-  impl->host = std::make_unique<RoomHost>(std::move(room), options.rates, progress, options.detail, std::move(write));
+  impl->host = std::make_unique<RoomHost>(std::move(room), options.rates, progress, options.detail, impl->keeper.get());
   impl->services.push_back(make_room_service(*impl->host, {options.case_folder, options.save}, epoch));
   impl->services.push_back(make_cutting_service(*impl->host, epoch));
   impl->services.push_back(make_watch_service(*impl->host));

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "common/field/kernel.hpp"
+#include "common/link/random_bytes.hpp"
 #include "common/wire/convert.hpp"
 #include "osteon/v1/cutting.grpc.pb.h"
 #include "osteon/v1/room.grpc.pb.h"
@@ -17,6 +18,13 @@
 
 namespace osteon {
 namespace {
+
+// What the room keeps of a secret: enough to know it again.
+Digest digest_of(std::string_view secret) {
+  Hasher hasher;
+  hasher.text(secret);
+  return hasher.finish();
+}
 
 // One haptic client's session. Reading stops while kMaxQueuedCuts of its cuts wait for a tick, so a client that sends
 // faster than the room cuts is slowed down by the network instead of filling memory.
@@ -58,7 +66,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink {
       StartRead(&request_);
     }
   }
-  void end(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
+  // Said by the room, so that nobody tries again as after a line that broke.
+  void end(const std::string& why) override { close({StatusCode::ABORTED, why}); }
   std::size_t waiting() const override {
     const std::lock_guard lock(mutex_);
     return outbox_.waiting();
@@ -91,10 +100,11 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink {
                            std::to_string(server_epoch_) + "; join again"));
     opened_ = true;
     author_ = AuthorId{request.author()};
+    const Digest secret = digest_of(request.secret());
     // Reading goes on after the leaves were taken, so that no cut of this author is among them.
-    host_.run_slowly([this, keep = self()] {
+    host_.run_slowly([this, keep = self(), secret] {
       const std::shared_ptr<SessionSink> sink(keep, this);
-      if (const Result<void> opened = host_.open_session(sink); !opened) return close(invalid(opened.error().message));
+      if (const Result<void> opened = host_.open_session(sink, secret); !opened) return close(invalid(opened.error().message));
       // A reader that went away meanwhile has left the host's list before it was on it.
       if (!read_on()) host_.leave(*this);
     });
@@ -263,10 +273,9 @@ class RoomServiceImpl final : public RoomBase {
       reactor->Finish(status);
       return reactor;
     }
-    const MemberKind kind = request->kind() == v1::CLIENT_KIND_HAPTIC ? MemberKind::surgeon : MemberKind::watcher;
-    host_.run_slowly([this, reactor, response, kind] {
+    host_.run_slowly([this, reactor, request, response] {
       const Case& bone = host_.bone();
-      const Result<AuthorId> author = host_.join(kind);
+      const Result<AuthorId> author = request->resume_author() != 0 ? come_back(*request) : come(*request, *response);
       if (!author) return reactor->Finish(status_of(author.error()));
       response->set_author(author->value);
       response->set_server_epoch(server_epoch_);
@@ -450,6 +459,25 @@ class RoomServiceImpl final : public RoomBase {
   }
 
  private:
+  // A new identity, and the secret that proves it.
+  Result<AuthorId> come(const v1::JoinRequest& request, v1::JoinResponse& response) {
+    const MemberKind kind = request.kind() == v1::CLIENT_KIND_HAPTIC ? MemberKind::surgeon : MemberKind::watcher;
+    std::array<std::uint8_t, 32> secret{};
+    system_random()(secret);
+    response.set_secret(secret.data(), secret.size());
+    return host_.join(kind, request.name(), digest_of(response.secret()));
+  }
+  Result<AuthorId> come_back(const v1::JoinRequest& request) {
+    std::optional<JournalHead> kept;
+    if (request.kept_room_seq() != 0) {
+      const Result<Digest> chain = wire::digest_from_wire(request.kept_chain());
+      if (!chain) return failure(ErrorCode::invalid_input, "kept_chain is not a digest of 32 bytes");
+      kept = JournalHead{RoomSeq{request.kept_room_seq()}, *chain};
+    }
+    const AuthorId author{request.resume_author()};
+    if (Result<void> may = host_.resume(author, digest_of(request.secret()), kept); !may) return tl::unexpected(may.error());
+    return author;
+  }
   static grpc::ServerUnaryReactor* refuse(grpc::ServerUnaryReactor* reactor, Status status) {
     reactor->Finish(std::move(status));
     return reactor;

@@ -21,7 +21,7 @@ void StateBoard::stop() {
 
 void StateBoard::watch(CuttingSink& sink) {
   const std::lock_guard lock(streams_mutex_);
-  Stream& stream = streams_.emplace_back(Stream{&sink, 0, {}});
+  Stream& stream = streams_.emplace_back(Stream{&sink, Pace(sink.apart(), streams_.size())});
   std::unique_lock states_lock(states_mutex_);
   const Bytes message = newest_;
   const std::uint64_t number = number_;
@@ -114,10 +114,10 @@ void StateBoard::tell(Clock::time_point now) {
   bool owed = false;
   for (Stream& stream : streams_) {
     if (stream.told == number) continue;
-    if (now < stream.next)
-      owed = true;
-    else
+    if (stream.pace.due(now))
       offer(stream, number, message, now);
+    else
+      owed = true;
   }
   states_lock.lock();
   owed_ = owed;
@@ -125,9 +125,7 @@ void StateBoard::tell(Clock::time_point now) {
 
 void StateBoard::offer(Stream& stream, std::uint64_t number, const Bytes& message, Clock::time_point now) {
   stream.told = number;
-  // In steps from the first one on: ticks beside them do not change how many there are.
-  stream.next += stream.sink->apart();
-  if (stream.next < now) stream.next = now + stream.sink->apart();
+  stream.pace.done(now);
   stream.sink->offer(message);
 }
 

@@ -60,8 +60,8 @@ class StateBoard {
   };
   struct Stream {
     CuttingSink* sink;
-    std::uint64_t told;      // the newest message that it was offered
-    Clock::time_point next;  // not before then
+    Pace pace;
+    std::uint64_t told = 0;  // the newest message that it was offered
   };
   void run();
   void tell(Clock::time_point now);

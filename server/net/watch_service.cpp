@@ -29,6 +29,9 @@ class MeshStream final : public OutStream<WriteReactor>, public MeshSink {
     const std::lock_guard lock(mutex_);
     if (closing()) return;
     outbox_->add(update);
+  }
+  void send() override {
+    const std::lock_guard lock(mutex_);
     pump();
   }
   void end(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }

@@ -103,7 +103,7 @@ bool Room::knows(AuthorId author) const { return author && author.value <= autho
 
 bool Room::proves(AuthorId author, const Digest& secret) const {
   const auto given = secrets_.find(author);
-  return given != secrets_.end() && given->second == secret;
+  return given != secrets_.end() && secret != Digest{} && given->second == secret;
 }
 
 std::uint64_t Room::lease_epoch(AuthorId holder) const {

@@ -47,8 +47,18 @@ class Surgeon {
     EXPECT_TRUE(joined.has_value()) << joined.error().message;
     session_.emplace(std::move(*joined));
     replica_.emplace(session_->bone(), BodyId{0}, session_->tools());
-    session_->open({.leaf = [this](const FieldLeaf& leaf) { on([&] { replica_->restore(leaf); }); },
-                    .complete = [this](const RoomAtJoin& room) { on([&] { complete_ = true, seq_ = room.contained, lease_ = room.lease_epoch, bodies_ = room.bodies; }); },
+    session_->open({.leaf = [this](const FieldLeaf& leaf) { on([&] { interrupted_ ? renewed_.push_back(leaf) : replica_->restore(leaf); }); },
+                    .complete =
+                        [this](const RoomAtJoin& room) {
+                          on([&] {
+                            if (interrupted_) replica_->renew(room.contained, room.bodies, renewed_, room.decided_author_seq);
+                            replica_->settle();
+                            renewed_.clear();
+                            interrupted_ = false;
+                            complete_ = true, seq_ = room.contained, lease_ = room.lease_epoch, bodies_ = room.bodies;
+                            own_ = std::max(own_, room.decided_author_seq);
+                          });
+                        },
                     .committed =
                         [this](RoomSeq seq, const Cut& cut) {
                           on([&] {
@@ -56,7 +66,9 @@ class Surgeon {
                             EXPECT_GT(seq, seq_) << "committed cuts come in order";
                             replica_->commit(seq, cut, false);
                             seq_ = seq;
-                            own_ += cut.author == session_->room().author;
+                            if (cut.author != session_->room().author) return;
+                            ++own_;
+                            EXPECT_TRUE(acknowledged_.emplace(cut.author_seq, seq).second) << "acknowledged twice";
                           });
                         },
                     .rejected = [this](RoomSeq, std::uint64_t, std::uint64_t lease, const std::string& reason) { on([&] { rejected_ = reason, lease_ = lease; }); },
@@ -72,6 +84,10 @@ class Surgeon {
                           on([&] { items_ = items, seq_ = std::max(seq_, seq); });
                         },
                     .tool = [this](RoomSeq seq) { on([&] { seq_ = seq; }); },
+                    .interrupted =
+                        [this](const Error&) {
+                          on([&] { interrupted_ = complete_, ++interruptions_; });
+                        },
                     .lost = [this](const Error& why) { on([&] { lost_ = why.message; }); }});
   }
   ~Surgeon() { session_->close(); }
@@ -81,6 +97,10 @@ class Surgeon {
   bool complete() { return read(complete_); }
   RoomSeq seq() { return read(seq_); }
   std::uint64_t own() { return read(own_); }
+  // Of own cuts: their places in the order, as the room said them.
+  std::map<std::uint64_t, RoomSeq> acknowledged() { return read(acknowledged_); }
+  bool stands() { return read(complete_) && !read(interrupted_); }
+  int interruptions() { return read(interruptions_); }
   std::string rejected() { return read(rejected_); }
   std::string lost() { return read(lost_); }
   std::uint64_t lease() { return read(lease_); }
@@ -106,7 +126,10 @@ class Surgeon {
   std::mutex mutex_;
   std::optional<RoomSession> session_;
   std::optional<haptic::Replica> replica_;
-  bool complete_ = false;
+  bool complete_ = false, interrupted_ = false;
+  int interruptions_ = 0;
+  std::vector<FieldLeaf> renewed_;
+  std::map<std::uint64_t, RoomSeq> acknowledged_;
   RoomSeq seq_;
   std::uint64_t own_ = 0, lease_ = 0;
   std::vector<BodyId> bodies_;

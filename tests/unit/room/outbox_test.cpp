@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "osteon/v1/cutting.pb.h"
@@ -61,6 +62,27 @@ TEST(MeshOutbox, ASlowReaderHoldsOneVersionOfEachBlock) {
   EXPECT_TRUE(outbox.take().empty());
   EXPECT_EQ(reader.room_seq, 10'000u);
   for (int x = 0; x < 10; ++x) EXPECT_EQ(reader.versions[x], 9'991u + static_cast<unsigned>(x == 0 ? 10 : x));
+}
+
+// However many readers stall and however long: of every block, its newest version is all that is held.
+TEST(MeshOutbox, StalledReadersShareOneVersionOfEachBlock) {
+  constexpr int kBlocks = 30, kReaders = 150;
+  MeshUpdate surface;
+  for (int x = 0; x < kBlocks; ++x) surface.blocks[key_at(x)] = block(x, 1);
+  std::vector<MeshOutbox> stalled(kReaders, MeshOutbox(surface));
+  for (MeshOutbox& outbox : stalled) EXPECT_FALSE(outbox.take().empty()) << "a message in flight, never finished";
+  std::vector<std::weak_ptr<const std::string>> made;
+  for (std::uint64_t seq = 1; seq <= 1000; ++seq) {
+    const int x = static_cast<int>(seq * 7 % kBlocks);
+    MeshUpdate update{RoomSeq{seq}, {{key_at(x), block(x, seq + 1)}}};
+    made.push_back(update.blocks.at(key_at(x)));
+    for (MeshOutbox& outbox : stalled) outbox.add(update);
+  }
+  EXPECT_EQ(std::ranges::count_if(made, [](const auto& version) { return !version.expired(); }), kBlocks);
+  for (const auto& version : made) {
+    const Bytes held = version.lock();
+    EXPECT_TRUE(!held || held.use_count() == kReaders + 1) << "shared, never copied";
+  }
 }
 
 TEST(MeshOutbox, MessagesAreBoundedAndTheSnapshotEndsOnce) {

@@ -1,0 +1,139 @@
+#include "tests/integration/killed_servers.hpp"
+
+#include <csignal>
+#include <thread>
+
+#include "server/journal/journal.hpp"
+#include "server/net/journal_rows.hpp"
+#include "tests/integration/stage.hpp"
+#include "tests/support/scenes/bones.hpp"
+#include "tests/support/scenes/random.hpp"
+#include "tests/unit/room/members.hpp"
+
+namespace osteon::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr double kWidth_mm = 12.0;
+
+// Cuts without end, as fast as the session takes them, up to some that wait.
+class Hand {
+ public:
+  Hand(const std::string& address, const std::filesystem::path& cache, std::uint64_t seed)
+      : surgeon_(address, cache), random_(seed), burr_(find_tool("burr-round-5").value()), thread_([this] { cut(); }) {}
+  ~Hand() { rest(); }
+  void rest() {
+    over_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+  Surgeon& surgeon() { return surgeon_; }
+  [[nodiscard]] std::uint64_t sent() const { return sent_; }
+
+ private:
+  void cut() {
+    constexpr std::uint64_t kMostWaiting = 40;
+    while (!over_) {
+      if (sent_ >= surgeon_.own() + kMostWaiting) {
+        std::this_thread::sleep_for(1ms);
+        continue;
+      }
+      // Dimples of a bur in the upper face: of these no crumb comes off.
+      const Vec3 at{random_.between(-5, 5), random_.between(-5, 5), random_.between(-0.5, 0.5)};
+      Cut cut = straight_cut(burr_, at, at, {0, 0, -1}, sent_ + 1);
+      cut.author = surgeon_.author();
+      if (surgeon_.session().send(cut)) ++sent_;
+      std::this_thread::sleep_for(500us);
+    }
+  }
+
+  Surgeon surgeon_;
+  Random random_;
+  const Tool burr_;
+  std::atomic<bool> over_{false};
+  std::atomic<std::uint64_t> sent_{0};
+  std::thread thread_;
+};
+
+// What the journal has of each author: the places of his cuts, by their numbers.
+std::map<AuthorId, std::map<std::uint64_t, RoomSeq>> read_places(const std::filesystem::path& file, KilledServers& report) {
+  std::map<AuthorId, std::map<std::uint64_t, RoomSeq>> places;
+  Result<Journal> journal = Journal::open(file);
+  if (!journal) {
+    report.fault = journal.error().message;
+    return places;
+  }
+  const Result<void> read = journal->read(RoomSeq{1}, [&](const JournalRow& one) {
+    const Result<RoomRow> row = row_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
+    if (!row) report.fault = row.error().message;
+    if (!row) return false;
+    const auto* cut = std::get_if<CutRow>(&row->what);
+    if (cut && !places[cut->cut.author].emplace(cut->cut.author_seq, one.place).second) ++report.twice;
+    return true;
+  });
+  if (!read) report.fault = read.error().message;
+  return places;
+}
+
+}  // namespace
+
+KilledServers kill_servers(int kills, std::uint64_t seed) {
+  KilledServers report;
+  Random random(seed);
+  TempDir folder;
+  const std::filesystem::path file = folder / "room.journal";
+  Stage stage(kWidth_mm, {"--journal", file.string()});
+  const std::vector<std::string> again{"--journal", file.string(), "--listen", stage.address()};
+  std::vector<std::unique_ptr<Hand>> hands;
+  for (std::uint64_t i = 0; i < 2; ++i) hands.push_back(std::make_unique<Hand>(stage.address(), folder / "cache", seed * 2 + i));
+  const auto acknowledged = [&] {
+    std::uint64_t all = 0;
+    for (const auto& hand : hands) all += hand->surgeon().acknowledged().size();
+    return all;
+  };
+  const auto all_stand = [&] {
+    return std::ranges::all_of(hands, [](const auto& hand) { return hand->surgeon().stands(); });
+  };
+  auto listens = std::chrono::steady_clock::now();
+  for (; report.kills < kills && report.fault.empty(); ++report.kills) {
+    if (!wait_until(all_stand, 60s)) report.fault = "a hand did not come back to its room";
+    if (report.kills > 0) report.back.record(std::chrono::steady_clock::now() - listens);
+    const std::uint64_t before = acknowledged();
+    std::this_thread::sleep_for(std::chrono::microseconds(random.index(60'000)));
+    stage.server().signal(SIGKILL);
+    (void)stage.server().wait(10s);
+    if (acknowledged() == before) ++report.killed_idle;
+    const auto started = std::chrono::steady_clock::now();
+    stage.start_server(again);
+    listens = std::chrono::steady_clock::now();
+    report.up.record(listens - started);
+  }
+  for (const auto& hand : hands) hand->rest();
+  const auto settled = [&] {
+    return std::ranges::all_of(hands, [](const auto& hand) {
+      return hand->surgeon().stands() && hand->surgeon().own() >= hand->sent();
+    });
+  };
+  if (report.fault.empty() && !wait_until(settled, 60s)) report.fault = "what was cut was not decided in the end";
+  std::this_thread::sleep_for(300ms);
+  const std::string hash = status_of(hands.front()->surgeon().session().room()).field_hash();
+  for (const auto& hand : hands) report.hashes_that_differ += wire::to_wire(hand->surgeon().hash()) != hash;
+  (void)stage.server().terminate();
+
+  const auto places = read_places(file, report);
+  for (const auto& hand : hands) {
+    report.sent += hand->sent();
+    const auto found = places.find(hand->surgeon().author());
+    const std::map<std::uint64_t, RoomSeq> kept = found == places.end() ? std::map<std::uint64_t, RoomSeq>{} : found->second;
+    report.kept += kept.size();
+    if (!kept.empty()) report.missing += kept.rbegin()->first - kept.size();
+    for (const auto& [author_seq, place] : hand->surgeon().acknowledged()) {
+      ++report.acknowledged;
+      const auto row = kept.find(author_seq);
+      report.lost += row == kept.end() || row->second != place;
+    }
+  }
+  return report;
+}
+
+}  // namespace osteon::test
