@@ -111,7 +111,7 @@ struct Observers::Observer {
   std::optional<Stream> mesh, states;
 };
 
-Observers::Observers(const std::string& address, int count, int stalled) {
+Observers::Observers(const std::string& address, int count, int stalled, int states_hz) {
   for (int i = 0; i < count; ++i) {
     auto observer = std::make_unique<Observer>();
     observer->reads = i >= stalled;
@@ -131,6 +131,7 @@ Observers::Observers(const std::string& address, int count, int stalled) {
     mesh.set_author(joined.author());
     v1::WatchCuttingRequest states;
     states.set_author(joined.author());
+    states.set_most_hz(static_cast<std::uint32_t>(states_hz));
     observer->mesh.emplace(observer->channel, "/osteon.v1.WatchService/WatchMesh", mesh, observer->reads);
     observer->states.emplace(observer->channel, "/osteon.v1.WatchService/WatchCutting", states, observer->reads);
     observers_.push_back(std::move(observer));

@@ -24,10 +24,11 @@ struct Received {
 
 [[nodiscard]] inline std::chrono::nanoseconds machine_time() { return std::chrono::steady_clock::now().time_since_epoch(); }
 
-// Each has a connection of its own, as people on different machines would. The first `stalled` of them never read.
+// Each has a connection of its own, as people on different machines would. The first `stalled` of them never read. They
+// want the tools' states `states_hz` times a second, 0: all.
 class Observers {
  public:
-  Observers(const std::string& address, int count, int stalled);
+  Observers(const std::string& address, int count, int stalled, int states_hz);
   ~Observers();  // ends all streams
   Observers(const Observers&) = delete;
   Observers& operator=(const Observers&) = delete;

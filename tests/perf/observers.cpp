@@ -88,7 +88,8 @@ class Author {
     session_->open(std::move(events));
     OSTEON_CHECK(wait_until([&] { return complete_.load(); }, 20s));
   }
-  ~Author() { session_->close(); }
+  ~Author() { close(); }
+  void close() { session_->close(); }
 
   void cut_for(std::chrono::seconds duration) {
     const auto burr = find_tool("burr-round-5");
@@ -149,8 +150,8 @@ class Author {
 };
 
 // [a process of its own] Observers that say when they are there, wait for a place of the order, and write what they got.
-int watch(const std::string& address, int count, int stalled, const std::string& file) {
-  Observers observers(address, count, stalled);
+int watch(const std::string& address, int count, int stalled, int states_hz, const std::string& file) {
+  Observers observers(address, count, stalled, states_hz);
   if (!observers.wait_for(RoomSeq{0}, 60s)) return 1;
   std::cout << "ready" << std::endl;
   std::uint64_t last = 0;
@@ -161,8 +162,8 @@ int watch(const std::string& address, int count, int stalled, const std::string&
   for (std::size_t i = 0; i < received.size(); ++i)
     for (const auto* stream : {&received[i].mesh, &received[i].states})
       for (const Arrival& arrival : *stream)
-        out << i << ' ' << (stream == &received[i].mesh ? 'm' : 's') << ' ' << arrival.at.count() << ' ' << arrival.contains.value << ' '
-            << arrival.bytes << '\n';
+        out << i << ' ' << (stream == &received[i].mesh ? 'm' : 's') << ' ' << arrival.at.count() << ' '
+            << arrival.contains.value << ' ' << arrival.bytes << '\n';
   out.close();
   std::cout << (there && out ? "done" : "late") << std::endl;
   return 0;
@@ -180,16 +181,16 @@ std::vector<Received> read_received(const std::filesystem::path& file, std::size
   return received;
 }
 
-// From each commit until each observer's first message that contains it.
+// From each cut's sending or commit until each observer's first message that contains it.
 template <class Stream>
-std::vector<double> delays_ms(const std::map<RoomSeq, Author::Times>& commits, const std::vector<Received>& received, Stream stream,
-                              nanoseconds from, nanoseconds Author::Times::* since) {
+std::vector<double> delays_ms(const std::map<RoomSeq, Author::Times>& commits, const std::vector<Received>& received,
+                              Stream stream, nanoseconds from, nanoseconds Author::Times::* since) {
   std::vector<double> delays;
   for (const Received& observer : received) {
     auto arrival = (observer.*stream).begin();
     for (const auto& [place, times] : commits) {
       while (arrival != (observer.*stream).end() && arrival->contains < place) ++arrival;
-      OSTEON_CHECK(arrival != (observer.*stream).end());
+      if (arrival == (observer.*stream).end()) break;  // the last ones may come without a change of any state
       if (times.committed >= from) delays.push_back(ms(arrival->at - times.*since));
     }
   }
@@ -214,7 +215,7 @@ json rates(const std::vector<Received>& received, Stream stream, nanoseconds fro
     pauses.push_back(ms(longest));
   }
   std::ranges::sort(rates);
-  const double all_s = 1e-9 * static_cast<double>((until - from).count()) * static_cast<double>(std::max<std::size_t>(1, received.size()));
+  const double all_s = 1e-9 * static_cast<double>((until - from).count()) * static_cast<double>(received.size());
   return {{"per_s_min", rounded(rates.empty() ? 0 : rates.front())},
           {"per_s_p50", rounded(quantile(rates, 0.5))},
           {"pause_ms", spread(pauses)},
@@ -223,7 +224,8 @@ json rates(const std::vector<Received>& received, Stream stream, nanoseconds fro
 
 struct Setting {
   std::filesystem::path server_program, case_folder;
-  std::chrono::seconds duration;
+  std::chrono::seconds duration{10};
+  int states_hz = 30;
 };
 
 json measure(const Setting& setting, int count, int stalled) {
@@ -235,7 +237,8 @@ json measure(const Setting& setting, int count, int stalled) {
   Author author(*address, temp / "cache");
   const Usage alone = usage_of(server.pid());
   Process readers(program("osteon-observers"), {"--watch", *address, "--observers", std::to_string(count), "--stalled",
-                                                std::to_string(stalled), "--file", temp / "received"});
+                                                std::to_string(stalled), "--states-hz",
+                                                std::to_string(setting.states_hz), "--file", temp / "received"});
   OSTEON_CHECK(readers.read_line(90s) == "ready");
 
   const Usage before = usage_of(server.pid()), readers_before = usage_of(readers.pid()), own_before = usage_of(::getpid());
@@ -245,6 +248,7 @@ json measure(const Setting& setting, int count, int stalled) {
   const Usage after = usage_of(server.pid()), readers_after = usage_of(readers.pid()), own_after = usage_of(::getpid());
   const RoomSeq last = author.wait_for_all();
   readers.write(std::to_string(last.value) + "\n");
+  author.close();
   const bool everyone_there = readers.read_line(60s) == "done";
   const auto received = read_received(temp / "received", static_cast<std::size_t>(count - stalled));
   (void)readers.wait(20s);
@@ -271,7 +275,9 @@ json measure(const Setting& setting, int count, int stalled) {
   out["server_cores"] = share(before, after);
   out["readers_cores"] = share(readers_before, readers_after);
   out["author_cores"] = share(own_before, own_after);
-  out["server_mb"] = {{"alone", rounded(alone.resident_mb)}, {"watched", rounded(before.resident_mb)}, {"after", rounded(after.resident_mb)}};
+  out["server_mb"] = {{"alone", rounded(alone.resident_mb)},
+                      {"watched", rounded(before.resident_mb)},
+                      {"after", rounded(after.resident_mb)}};
   out["surface_mb"] = rounded(1e-6 * summary.value("surface_bytes", 0.0));
   out["surface_blocks"] = summary.value("surface_blocks", 0);
   out["mesh_update_us"] = summary["mesh_update_after_cut"];
@@ -293,19 +299,21 @@ int main(int argc, char** argv) {
   using namespace osteon::test;
   int observers = 150, stalled = 10, few = 10, seconds = 10;
   std::string address, file, only;
-  Setting setting{program("osteon-server"), {}, {}};
+  Setting setting{program("osteon-server"), {}};
   CLI::App app("Measures a room that many watch.", "osteon-observers");
   app.add_option("--observers", observers, "How many watch")->capture_default_str();
   app.add_option("--stalled", stalled, "How many of them never read")->capture_default_str();
   app.add_option("--few", few, "How many watch in the run that the others are compared with")->capture_default_str();
   app.add_option("--seconds", seconds, "How long is cut in each run")->capture_default_str();
-  app.add_option("--case", setting.case_folder, "Folder of the case; a block of layers without it. The hand burs its upper face at z = 0");
+  app.add_option("--case", setting.case_folder, "Folder of the case; without it a block of layers, whose face at z = 0 is burred");
   app.add_option("--server-program", setting.server_program, "The osteon-server to measure")->capture_default_str();
   app.add_option("--only", only, "One of the runs alone: few, all, stalled");
+  app.add_option("--states-hz", setting.states_hz, "How often a second they want the tools' states; 0: every change")
+      ->capture_default_str();
   app.add_option("--watch", address, "[the measuring process itself] HOST:PORT of the server to watch");
   app.add_option("--file", file, "[the measuring process itself] where it writes what it has received");
   CLI11_PARSE(app, argc, argv);
-  if (!address.empty()) return watch(address, observers, stalled, file);
+  if (!address.empty()) return watch(address, observers, stalled, setting.states_hz, file);
 
   const TempDir temp;
   if (setting.case_folder.empty()) setting.case_folder = make_block(temp);
