@@ -17,18 +17,20 @@ double SendRate::tokens(Time now) const {
   return std::min(static_cast<double>(params_.burst_bytes), tokens_ + seconds(now - filled_) * params_.bytes_per_s);
 }
 
-SendRate::Time SendRate::next(Time now, Time wanted) const {
+SendRate::Time SendRate::next(Time now, Time wanted, std::size_t needed_bytes) const {
   if (last_ == Time::min()) return now;
   Time at = std::max(now, last_ + params_.interval);
   at = std::max(at, std::min(wanted, last_ + params_.idle_interval));
-  const double lacking = static_cast<double>(params_.least_bytes) - tokens(at);
+  const std::size_t needed = std::min(needed_bytes, kMostDatagramBytes) + params_.overhead_bytes;
+  const double lacking = static_cast<double>(std::max(params_.least_bytes, needed)) - tokens(at);
   if (lacking > 0.0) at += Time(static_cast<std::int64_t>(std::ceil(lacking / params_.bytes_per_s * 1e9)));
   return at;
 }
 
 std::size_t SendRate::budget(Time now) const {
   if (next(now, now) > now) return 0;
-  return std::min(kMostDatagramBytes, static_cast<std::size_t>(tokens(now)) - params_.overhead_bytes);
+  // A byte that is there but for rounding is there.
+  return std::min(kMostDatagramBytes, static_cast<std::size_t>(tokens(now) + 1e-3) - params_.overhead_bytes);
 }
 
 void SendRate::sent(Time now, std::size_t bytes) {

@@ -30,8 +30,9 @@ class SendRate {
   explicit SendRate(SendRateParams params = {}) : params_(params), tokens_(static_cast<double>(params.burst_bytes)) {}
 
   // When the next packet may go, at `now` or later. `wanted`: when there will be something to say, `now` or earlier for at
-  // once, Time::max() for nothing; then it is one that keeps the session alive.
-  [[nodiscard]] Time next(Time now, Time wanted) const;
+  // once, Time::max() for nothing; then it is one that keeps the session alive. `needed_bytes`: the least budget() that it is
+  // worth going with, such as for one long item.
+  [[nodiscard]] Time next(Time now, Time wanted, std::size_t needed_bytes = 0) const;
   // Largest whole datagram that may go now, at most kMostDatagramBytes; 0 where next() is later.
   [[nodiscard]] std::size_t budget(Time now) const;
   // A datagram of so many bytes went.

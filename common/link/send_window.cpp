@@ -75,6 +75,18 @@ std::size_t SendWindow::head_bytes(const SendItem& item) const {
   return item.head.empty() ? 0 : item.head.size() + limits_.bytes_per_head;
 }
 
+bool SendWindow::oldest_overdue(Time now) const {
+  return unsent_ < waiting_.size() && waiting_.front().first_sent + retransmission_time() <= now;
+}
+
+std::size_t SendWindow::least_room(Time now) const {
+  std::size_t room = 0;
+  const auto add = [&](const Waiting& waiting) { room += waiting.item.bytes.size() + head_bytes(waiting.item); };
+  if (oldest_overdue(now)) add(waiting_.front());
+  if (unsent_ > 0) add(waiting_[waiting_.size() - unsent_]);
+  return room;
+}
+
 // A packet on its way to being full.
 class SendWindow::Filling {
  public:
@@ -129,7 +141,7 @@ SendWindow::Picked SendWindow::pick(Time now, std::size_t budget_bytes, int repe
   Filling packet(*this, budget_bytes);
   // Of what is on its way the oldest has mostly arrived, and is no neighbour of the others: alone it would take a head of its
   // own in every packet.
-  if (waiting_.front().first_sent + retransmission_time() <= now) packet.add(oldest_);
+  if (oldest_overdue(now)) packet.add(oldest_);
   const std::uint64_t fresh = next() - unsent_;
   for (std::uint64_t number = fresh; number < next(); ++number)
     if (!packet.add(number)) return packet.take(now);

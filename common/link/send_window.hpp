@@ -65,6 +65,8 @@ class SendWindow {
   // so that it is in every packet until it has arrived; those never sent, in order and without a gap; those that were last
   // sent longer ago than the retransmission time; and those in fewer than `repeats` packets, the least often sent first.
   Picked pick(Time now, std::size_t budget_bytes, int repeats);
+  // Room that pick() must be given for what goes first to go: with less, packet after packet, a long item would never be sent.
+  [[nodiscard]] std::size_t least_room(Time now) const;
   // When pick() will next have something to send; none when all is acknowledged.
   [[nodiscard]] std::optional<Time> next_due(Time now, int repeats) const;
 
@@ -94,6 +96,7 @@ class SendWindow {
   };
   class Filling;
   [[nodiscard]] std::size_t head_bytes(const SendItem& item) const;
+  [[nodiscard]] bool oldest_overdue(Time now) const;
   void forget_oldest();
   [[nodiscard]] const Waiting* find(std::uint64_t number) const;
   Waiting* find(std::uint64_t number) { return const_cast<Waiting*>(std::as_const(*this).find(number)); }

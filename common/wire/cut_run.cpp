@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <limits>
 #include <string_view>
 
@@ -20,7 +21,9 @@ void put_varint(std::string& out, std::uint64_t value) {
   out += static_cast<char>(value);
 }
 
-std::uint64_t zigzag(std::int64_t value) { return static_cast<std::uint64_t>(value) << 1 ^ static_cast<std::uint64_t>(value >> 63); }
+std::uint64_t zigzag(std::int64_t value) {
+  return static_cast<std::uint64_t>(value) << 1 ^ static_cast<std::uint64_t>(value >> 63);
+}
 std::int64_t unzigzag(std::uint64_t value) { return static_cast<std::int64_t>(value >> 1 ^ (0 - (value & 1))); }
 
 // Reads what was put; after the first fault everything is 0 and `good` false.
@@ -114,7 +117,6 @@ void put_cut(std::string& out, const Cut& cut, const QuantisedPose& from, std::u
 bool get_cut(Reader& in, Cut& cut, const QuantisedPose& from) {
   const std::uint64_t what = in.varint();
   const std::uint64_t knots = what >> 2;
-  if (!in.good || knots > in.rest.size()) return false;  // each takes a byte at least
   if ((what & 1) != 0) {
     const std::uint64_t path_us = in.varint();
     if (path_us > std::numeric_limits<std::uint32_t>::max()) return false;
@@ -122,16 +124,15 @@ bool get_cut(Reader& in, Cut& cut, const QuantisedPose& from) {
   }
   if ((what & 2) == 0) cut.path.push_back(from);
   Numbers last = numbers_of(from), by{};
-  for (std::uint64_t k = 0; k < knots; ++k) {
+  for (std::uint64_t k = 0; k < knots; ++k) {  // each takes a byte at least, so the bytes bound them
     const std::uint8_t flag = in.byte();
     Numbers knot = (flag & kSecondOrder) != 0 ? moved(last, by) : last;
     for (std::size_t i = 0; i < knot.size(); ++i) {
       if ((flag >> i & 1) == 0) continue;
       const std::int64_t by_this = unzigzag(in.varint());
-      const std::int64_t most = i < kPositions ? std::numeric_limits<std::int32_t>::max() : std::numeric_limits<std::int16_t>::max();
+      const std::int64_t most = i < kPositions ? INT32_MAX : INT16_MAX;
       if (by_this > most || by_this < -most - 1) return false;
       knot[i] += static_cast<std::uint32_t>(by_this);
-      if (i >= kPositions) knot[i] &= 0xffff;
     }
     if (!in.good) return false;
     cut.path.push_back(pose_of(knot));
@@ -267,7 +268,7 @@ std::optional<Digest> ToolNumbers::tool_of(std::uint32_t number) const {
 }
 
 bool CutSender::push(const Cut& cut) {
-  OSTEON_CHECK(cut.author_seq == window_.next() && cut.level >= 0 && cut.level < kLevels);
+  OSTEON_CHECK(cut.author_seq == window_.next() && cut.level >= 0 && cut.level < kLevels && fits_a_packet(cut));
   const RunState before = state_ ? *state_ : state_before(cut);
   SendItem item;
   put_cut(item.bytes, cut, before.pose, before.last.path_us);
@@ -282,11 +283,10 @@ bool RowSender::push(const SessionRow& row) {
   const std::uint64_t index = window_.next();
   if (row.kind != SessionRowKind::committed) return window_.push(piece_of(row, index)).has_value();
   const Cut& cut = row.cut;
-  OSTEON_CHECK(cut.level >= 0 && cut.level < kLevels);
+  OSTEON_CHECK(cut.level >= 0 && cut.level < kLevels && fits_a_packet(cut));
   const auto known = states_.find(cut.author);
   const RunState before = known != states_.end() ? known->second.run : state_before(cut);
-  // A run's numbers only rise; one that does not follow begins a run.
-  const bool follows = known != states_.end() && same_run(before.last, cut) && cut.author_seq > before.last.author_seq;
+  const bool follows = known != states_.end() && same_run(before.last, cut);
   SendItem item;
   if (follows) {
     item.follows = known->second.index;
@@ -332,11 +332,9 @@ Result<std::vector<Cut>> cuts_of(const v1::CutRun& run, AuthorId author, const T
 Result<std::vector<IndexedRow>> rows_of(const v1::DownPacket& packet, const ToolNumbers& tools, std::size_t* left_out) {
   std::vector<IndexedRow> rows;
   for (const v1::RowRun& run : packet.rows()) {
-    const std::size_t before = rows.size();
     const auto read = rows_of_run(run, tools, rows);
     if (read) continue;
     if (read.error().code != ErrorCode::not_found) return tl::unexpected(read.error());
-    rows.resize(before);
     if (left_out != nullptr) ++*left_out;
   }
   for (const v1::RejectedRow& row : packet.rejected()) {

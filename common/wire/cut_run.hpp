@@ -43,12 +43,17 @@ struct RunState {
   QuantisedPose pose;   // that the next one goes on from
 };
 
+// Cuts of more knots may be too long for a packet, whatever their numbers: they go over the stream.
+inline constexpr std::size_t kMostKnotsInPacket = 24;
+[[nodiscard]] inline bool fits_a_packet(const Cut& cut) { return cut.path.size() <= kMostKnotsInPacket; }
+
 // Codes an author's own cuts. Item numbers are the cuts' author_seq, so the window begins with the first of them.
 class CutSender {
  public:
   // Both must outlive this.
   CutSender(SendWindow& window, const ToolNumbers& tools) : window_(window), tools_(tools) {}
-  // False, and nothing has changed, when the window is full. The cut's author_seq must be window.next().
+  // False, and nothing has changed, when the window is full. The cut's author_seq must be window.next(), and it must fit a
+  // packet.
   [[nodiscard]] bool push(const Cut& cut);
 
  private:
@@ -73,7 +78,7 @@ struct SessionRow {
 class RowSender {
  public:
   RowSender(SendWindow& window, const ToolNumbers& tools) : window_(window), tools_(tools) {}
-  // False, and nothing has changed, when the window is full.
+  // False, and nothing has changed, when the window is full. A cut that does not fit a packet must be told as streamed.
   [[nodiscard]] bool push(const SessionRow& row);
   // An author who has left: nothing of them comes any more.
   void forget(AuthorId author) { states_.erase(author); }

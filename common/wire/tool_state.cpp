@@ -20,7 +20,8 @@ template <class Integer>
 Integer steps(double value, double per_unit) {
   if (std::isnan(value)) return 0;
   using Limits = std::numeric_limits<Integer>;
-  return static_cast<Integer>(std::clamp(std::round(value * per_unit), static_cast<double>(Limits::min()), static_cast<double>(Limits::max())));
+  constexpr auto kLeast = static_cast<double>(Limits::min()), kMost = static_cast<double>(Limits::max());
+  return static_cast<Integer>(std::clamp(std::round(value * per_unit), kLeast, kMost));
 }
 
 void set_pose(v1::QuantisedPose& out, const Pose& pose) {

@@ -19,7 +19,8 @@ std::vector<Impairment::Copy> Impairment::pass(Time now, std::size_t bytes) {
       ++counts_.overflowed;
       return {};
     }
-    busy_until_ = std::max(now, busy_until_) + Time(static_cast<std::int64_t>(static_cast<double>(bytes) / quality_.bytes_per_s * 1e9));
+    const double takes_ns = static_cast<double>(bytes) / quality_.bytes_per_s * 1e9;
+    busy_until_ = std::max(now, busy_until_) + Time(static_cast<std::int64_t>(takes_ns));
     leaves = busy_until_;
   }
   if (lost) {

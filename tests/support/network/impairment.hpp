@@ -45,7 +45,9 @@ class Impairment {
   [[nodiscard]] const ImpairmentCounts& counts() const { return counts_; }
 
  private:
-  [[nodiscard]] Time up_to(Time most) { return Time(static_cast<std::int64_t>(random_.unit() * static_cast<double>(most.count()))); }
+  [[nodiscard]] Time up_to(Time most) {
+    return Time(static_cast<std::int64_t>(random_.unit() * static_cast<double>(most.count())));
+  }
 
   PathQuality quality_;
   Random random_, flips_;

@@ -125,7 +125,7 @@ struct Relay::Impl {
   }
 
   void receive(UdpSide& side) {
-    side.socket.async_receive_from(asio::buffer(side.buffer), side.from, [this, &side](const asio::error_code& error, std::size_t size) {
+    const auto came = [this, &side](const asio::error_code& error, std::size_t size) {
       if (error == asio::error::operation_aborted) return;
       if (!error) {
         if (const auto client = client_of(side)) {
@@ -136,7 +136,8 @@ struct Relay::Impl {
         }
       }
       receive(side);
-    });
+    };
+    side.socket.async_receive_from(asio::buffer(side.buffer), side.from, came);
   }
 
   std::shared_ptr<UdpSide::Client> client_of(UdpSide& side) {
@@ -155,7 +156,7 @@ struct Relay::Impl {
   }
 
   void answer(UdpSide& side, const std::shared_ptr<UdpSide::Client>& client) {
-    client->socket.async_receive(asio::buffer(client->buffer), [this, &side, client](const asio::error_code& error, std::size_t size) {
+    const auto came = [this, &side, client](const asio::error_code& error, std::size_t size) {
       if (error == asio::error::operation_aborted || error == asio::error::bad_descriptor) return;
       if (!error) {
         pass(fates[1], std::string(client->buffer.data(), size), [&side, client](const std::string& bytes) {
@@ -164,7 +165,8 @@ struct Relay::Impl {
         });
       }
       answer(side, client);
-    });
+    };
+    client->socket.async_receive(asio::buffer(client->buffer), came);
   }
 
   void pass(Impairment& fate, const std::string& bytes, const std::function<void(const std::string&)>& deliver) {
@@ -315,7 +317,8 @@ std::string Relay::Impl::command(const std::string& line) {
     return in >> value && value >= 0.0 && value <= most ? std::optional(value) : std::nullopt;
   };
   const auto in_ms = [](double ms) { return Time(static_cast<std::int64_t>(ms * 1e6)); };
-  const std::map<std::string, double*> shares{{"loss", &quality.loss}, {"reorder", &quality.reorder}, {"duplicate", &quality.duplicate}};
+  const std::map<std::string, double*> shares{
+      {"loss", &quality.loss}, {"reorder", &quality.reorder}, {"duplicate", &quality.duplicate}};
   if (const auto share = shares.find(what); share != shares.end()) {
     const auto value = number(1.0);
     if (!value) return what + " needs a share from 0 to 1";
@@ -380,7 +383,8 @@ Result<std::unique_ptr<Relay>> Relay::open(const RelayOptions& options) {
     const auto target = target_of(text);
     if (!target) return tl::unexpected(target.error());
     asio::error_code error;
-    Impl::UdpSide& side = impl->udp_sides.emplace_back(Impl::UdpSide{udp::socket(impl->io), {target->address, target->port}, {}, {}, {}});
+    impl->udp_sides.push_back({udp::socket(impl->io), {target->address, target->port}, {}, {}, {}});
+    Impl::UdpSide& side = impl->udp_sides.back();
     side.socket.open(udp::v4(), error);
     if (!error) side.socket.bind({loopback, 0}, error);
     if (!error) side.socket.non_blocking(true, error);
@@ -391,7 +395,8 @@ Result<std::unique_ptr<Relay>> Relay::open(const RelayOptions& options) {
     const auto target = target_of(text);
     if (!target) return tl::unexpected(target.error());
     asio::error_code error;
-    Impl::TcpSide& side = impl->tcp_sides.emplace_back(Impl::TcpSide{tcp::acceptor(impl->io), {target->address, target->port}});
+    impl->tcp_sides.push_back({tcp::acceptor(impl->io), {target->address, target->port}});
+    Impl::TcpSide& side = impl->tcp_sides.back();
     side.acceptor.open(tcp::v4(), error);
     if (!error) side.acceptor.bind({loopback, 0}, error);
     if (!error) side.acceptor.listen(asio::socket_base::max_listen_connections, error);
@@ -403,8 +408,9 @@ Result<std::unique_ptr<Relay>> Relay::open(const RelayOptions& options) {
 
 std::vector<std::string> Relay::addresses() const {
   std::vector<std::string> out;
-  for (const auto& side : impl_->udp_sides) out.push_back("udp 127.0.0.1:" + std::to_string(side.socket.local_endpoint().port()));
-  for (const auto& side : impl_->tcp_sides) out.push_back("tcp 127.0.0.1:" + std::to_string(side.acceptor.local_endpoint().port()));
+  const auto add = [&](const char* kind, std::uint16_t port) { out.push_back(kind + (" 127.0.0.1:" + std::to_string(port))); };
+  for (const auto& side : impl_->udp_sides) add("udp", side.socket.local_endpoint().port());
+  for (const auto& side : impl_->tcp_sides) add("tcp", side.acceptor.local_endpoint().port());
   return out;
 }
 

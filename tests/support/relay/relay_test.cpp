@@ -34,7 +34,8 @@ std::unique_ptr<UdpPort> port() {
 
 Endpoint endpoint(const std::string& address) {
   const auto colon = address.rfind(':');
-  const auto found = find_endpoint(address.substr(0, colon), static_cast<std::uint16_t>(std::stoi("0" + address.substr(colon + 1))));
+  const int number = std::stoi("0" + address.substr(colon + 1));
+  const auto found = find_endpoint(address.substr(0, colon), static_cast<std::uint16_t>(number));
   EXPECT_TRUE(found) << address;
   return found.value_or(Endpoint{});
 }
@@ -91,8 +92,8 @@ TEST(Impair, ForwardsDatagramsAndTheirAnswers) {
 
 TEST(Impair, LosesRepeatsAndReordersAsItIsTold) {
   const auto server = port(), client = port();
-  ImpairProcess relay({"--udp", to_string(server->local()), "--loss", "0.3", "--duplicate", "0.05", "--reorder", "0.1", "--delay-ms", "5",
-                       "--jitter-ms", "2", "--seed", "7"});
+  ImpairProcess relay({"--udp", to_string(server->local()), "--loss", "0.3", "--duplicate", "0.05", "--reorder", "0.1",
+                       "--delay-ms", "5", "--jitter-ms", "2", "--seed", "7"});
   const Endpoint there = endpoint(relay.udp());
   constexpr std::uint32_t kSent = 2000;
   for (std::uint32_t n = 0; n < kSent; ++n) {
@@ -169,15 +170,16 @@ tcp::socket connect(asio::io_context& io, const std::string& address) {
   tcp::socket socket(io);
   const auto colon = address.rfind(':');
   asio::error_code error;
-  socket.connect({asio::ip::make_address(address.substr(0, colon)), static_cast<std::uint16_t>(std::stoi(address.substr(colon + 1)))}, error);
+  const int number = std::stoi("0" + address.substr(colon + 1));
+  socket.connect({asio::ip::make_address(address.substr(0, colon)), static_cast<std::uint16_t>(number)}, error);
   EXPECT_FALSE(error) << address << ": " << error.message();
   return socket;
 }
 
 TEST(Impair, AStreamStaysWholeAndInOrder) {
   Echo echo;
-  ImpairProcess relay({"--tcp", echo.address(), "--loss", "0.02", "--delay-ms", "2", "--jitter-ms", "2", "--reorder", "0.2", "--duplicate", "0.2",
-                       "--seed", "3"});
+  ImpairProcess relay({"--tcp", echo.address(), "--loss", "0.02", "--delay-ms", "2", "--jitter-ms", "2", "--reorder", "0.2",
+                       "--duplicate", "0.2", "--seed", "3"});
   asio::io_context io;
   tcp::socket socket = connect(io, relay.tcp());
   std::string sent(1'000'000, '\0'), back(sent.size(), '\0');

@@ -28,6 +28,25 @@ struct PeerExtremes {
   std::uint64_t datagrams = 0, bytes = 0;  // with 28 B of header each
 };
 
+// Takes what Peer puts into a packet out of it again.
+struct PacketReader {
+  std::span<const std::uint8_t> bytes;
+  template <class T>
+  T get() {
+    T value{};
+    OSTEON_CHECK(bytes.size() >= sizeof value);
+    std::memcpy(&value, bytes.data(), sizeof value);
+    skip(sizeof value);
+    return value;
+  }
+  std::string text(std::size_t length) {
+    std::string out(reinterpret_cast<const char*>(bytes.data()), length);
+    skip(length);
+    return out;
+  }
+  void skip(std::size_t count) { bytes = bytes.subspan(count); }
+};
+
 template <class Receive = ReceiveWindow<std::string>>
 class Peer {
  public:
@@ -45,7 +64,7 @@ class Peer {
   }
 
   void heard(const Datagram& datagram, Time now) {
-    Reader in{datagram.bytes};
+    PacketReader in{datagram.bytes};
     const auto counter = in.get<std::uint64_t>(), acknowledged = in.get<std::uint64_t>(), newest = in.get<std::uint64_t>(),
                received = in.get<std::uint64_t>(), beyond = in.get<std::uint64_t>();
     const auto echo = in.get<std::int64_t>(), sent = in.get<std::int64_t>();
@@ -85,7 +104,7 @@ class Peer {
     extremes_.waiting_items = std::max(extremes_.waiting_items, window_.items_unacknowledged());
     const int repeats = params_.repeats > 0 ? params_.repeats : rate_.repeats();
     const Time wanted = unsaid_ ? now : window_.next_due(now, repeats).value_or(Time::max());
-    if (rate_.next(now, wanted) > now) return;
+    if (rate_.next(now, wanted, params_.fixed_bytes + window_.least_room(now)) > now) return;
     std::size_t budget = rate_.budget(now);
     if (params_.budget > 0) budget = std::min(budget, params_.budget);
     if (budget <= params_.fixed_bytes) return;
@@ -127,23 +146,6 @@ class Peer {
 
  private:
   static constexpr std::uint8_t kHead = 255;
-  struct Reader {
-    std::span<const std::uint8_t> bytes;
-    template <class T>
-    T get() {
-      T value{};
-      OSTEON_CHECK(bytes.size() >= sizeof value);
-      std::memcpy(&value, bytes.data(), sizeof value);
-      skip(sizeof value);
-      return value;
-    }
-    std::string text(std::size_t length) {
-      std::string out(reinterpret_cast<const char*>(bytes.data()), length);
-      skip(length);
-      return out;
-    }
-    void skip(std::size_t count) { bytes = bytes.subspan(count); }
-  };
   template <class T>
   static void put(std::string& out, T value) {
     out.append(reinterpret_cast<const char*>(&value), sizeof value);

@@ -57,6 +57,17 @@ TEST(SendRate, KeepsTheBytesASecond) {
   }
 }
 
+TEST(SendRate, WaitsForWhatALongItemNeeds) {
+  SendRateParams params;
+  params.bytes_per_s = 10'000;
+  SendRate rate(params);
+  for (SendRate::Time now = rate.next(0s, 0s, 900); now < 30s; now = rate.next(now, now, 900)) {
+    ASSERT_GE(rate.budget(now), 900u);
+    rate.sent(now, rate.budget(now));
+  }
+  EXPECT_LE(rate.next(30s, 30s, 1 << 20), 31s) << "never waits for more than a packet holds";
+}
+
 TEST(SendRate, WaitsForAPacketWorthSending) {
   SendRateParams params;
   params.bytes_per_s = 10'000;
@@ -87,7 +98,8 @@ TEST(SendRate, RepeatsAsOftenAsTheLossAsksFor) {
         if (random.unit() >= loss) rate.heard(counter, received);
       }
       EXPECT_NEAR(rate.loss(), loss, 4.0 * std::sqrt(loss * (1 - loss) / 128.0));
-      const auto late = [&](int k) { return std::pow(rate.loss(), k) * std::chrono::duration<double>(round_trip).count() / 0.008; };
+      const double in_flight = std::chrono::duration<double>(round_trip).count() / 0.008;
+      const auto late = [&](int k) { return std::pow(rate.loss(), k) * in_flight; };
       const int k = rate.repeats();
       std::printf("loss %.2f (taken for %.3f), round trip %3lld ms: in %d packets\n", loss, rate.loss(),
                   static_cast<long long>(round_trip.count()), k);

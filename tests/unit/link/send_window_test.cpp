@@ -153,6 +153,21 @@ TEST(SendWindow, SendsAllAgainToAnEndThatBeganAnew) {
   EXPECT_TRUE(window.empty());
 }
 
+// With what least_room() asks for, pick() takes what is overdue and at least one item that was never sent.
+TEST(SendWindow, SaysHowMuchRoomItNeeds) {
+  SendWindow window({1 << 20, 100, 6});
+  EXPECT_EQ(window.least_room(0s), 0u);
+  window.push(item(500, 40));
+  EXPECT_EQ(window.least_room(0s), 546u);
+  EXPECT_TRUE(window.pick(0s, 545, 5).numbers.empty());
+  EXPECT_EQ(window.pick(0s, 546, 5).numbers, Numbers{1});
+  EXPECT_EQ(window.least_room(0s), 0u);
+  window.push(item(300));
+  EXPECT_EQ(window.least_room(1ms), 300u);
+  EXPECT_EQ(window.least_room(1s), 846u) << "1 is overdue";
+  EXPECT_EQ(window.pick(1s, 846, 5).numbers, (Numbers{1, 2}));
+}
+
 // Whatever happens: the budget holds, what was never sent goes without a gap, nothing acknowledged is sent again, and the
 // bytes are those of the items and of one head for each that misses its predecessor.
 TEST(SendWindow, KeepsItsPromisesUnderAnythingThatIsAskedOfIt) {
@@ -247,7 +262,9 @@ Carried carry(std::chrono::nanoseconds one_way, double kbit_per_s, int repeats, 
   }
   EXPECT_EQ(static_cast<double>(delays_ms.size()), said) << "everything said has arrived";
   std::ranges::sort(delays_ms);
-  const auto share = [&](double s) { return delays_ms.at(static_cast<std::size_t>(s * static_cast<double>(delays_ms.size() - 1))); };
+  const auto share = [&](double of) {
+    return delays_ms.at(static_cast<std::size_t>(of * static_cast<double>(delays_ms.size() - 1)));
+  };
   return {share(0.5), share(0.99), share(0.999), bytes / said, bytes * 8.0 / 1000.0 / (14.0 * static_cast<double>(seeds))};
 }
 
@@ -261,9 +278,10 @@ TEST(SendWindow, Table) {
         const Carried c = carry(one_way, kbit, k, 8);
         if (kbit == 300.0) wide[k] = c;
         else short_of_bytes = c;
-        std::printf("one way %3lld ms, %3.0f kbit/s, k %2s: delay p50 %4.0f p99 %4.0f p99.9 %4.0f ms, %3.0f B an item, %3.0f kbit/s\n",
-                    static_cast<long long>(one_way.count()), kbit, k == 0 ? "-" : std::to_string(k).c_str(), c.p50_ms, c.p99_ms,
-                    c.p999_ms, c.bytes_per_item, c.kbit_per_s);
+        std::printf("one way %3lld ms, %3.0f kbit/s, k %2s: ", static_cast<long long>(one_way.count()), kbit,
+                    k == 0 ? "-" : std::to_string(k).c_str());
+        std::printf("delay p50 %4.0f p99 %4.0f p99.9 %4.0f ms, %3.0f B an item, %3.0f kbit/s\n", c.p50_ms, c.p99_ms, c.p999_ms,
+                    c.bytes_per_item, c.kbit_per_s);
         EXPECT_LE(c.kbit_per_s, kbit);
       }
     }

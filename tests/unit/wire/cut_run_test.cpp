@@ -62,7 +62,8 @@ Cut any_cut(Random& random, const Cut& before, bool wild) {
   if (random.unit() < 0.8) cut.path.push_back(pose);
   for (std::size_t knots = random.index(5); knots > 0; --knots) {
     if (wild && random.unit() < 0.5) pose = any_pose(random);
-    for (auto& p : pose.position) p = static_cast<std::int32_t>(static_cast<std::uint32_t>(p) + static_cast<std::uint32_t>(random.index(41)) - 20u);
+    for (auto& p : pose.position)
+      p = static_cast<std::int32_t>(static_cast<std::uint32_t>(p) + static_cast<std::uint32_t>(random.index(41)) - 20u);
     cut.path.push_back(pose);
   }
   return cut;
@@ -154,6 +155,46 @@ TEST(CutRun, ARunEndsWhereItsHeadChanges) {
   EXPECT_EQ(runs_of([](Cut& c) { c.spindle_rpm = 1; }), 2);
 }
 
+// By hand. Steps of 300, -200 and 100: a byte that says which numbers, and 2 bytes for each; the same step again: that one
+// byte. Before the knots a byte with their number.
+TEST(CutRun, TakesAsFewBytesAsItSays) {
+  const wire::ToolNumbers numbers = numbers_1_to_3();
+  SendWindow window(kWide);
+  wire::CutSender sender(window, numbers);
+  Cut cut;
+  cut.tool = digest(1);
+  cut.path_us = 8000;
+  QuantisedPose pose{{100'000, 200'000, -300'000}, {100, 200, 300, 32700}};
+  const auto bytes = [&] {
+    cut.author_seq = window.next();
+    EXPECT_TRUE(sender.push(cut));
+    return window.item(cut.author_seq).bytes.size();
+  };
+  const auto move = [&](int x, int y, int z) {
+    pose.position[0] += x;
+    pose.position[1] += y;
+    pose.position[2] += z;
+    cut.path.push_back(pose);
+  };
+  cut.path = {pose};
+  EXPECT_EQ(bytes(), 1u) << "stands still";
+  for (int k = 0; k < 10; ++k) move(300, -200, 100);
+  EXPECT_EQ(bytes(), 1u + 7 + 9);
+  cut.path = {pose};
+  move(8, 0, -8);
+  EXPECT_EQ(bytes(), 1u + 1 + 2) << "a drill on its way, 1 mm/s";
+  cut.path = {pose};
+  move(300, 0, 0);
+  move(1, 0, 0);
+  EXPECT_EQ(bytes(), 1u + 3 + 2) << "the step before would need 2 bytes to take back";
+  cut.path_us = 7000;
+  cut.path = {pose};
+  EXPECT_EQ(bytes(), 3u) << "another time";
+  cut.path.clear();
+  move(5, 0, 0);
+  EXPECT_EQ(bytes(), 1u + 2) << "begins elsewhere";
+}
+
 TEST(CutRun, IsNeverTwiceAsLongAsThePlainMessage) {
   double worst = 0;
   for (std::uint64_t seed = 1; seed <= 20000; ++seed) {
@@ -176,6 +217,37 @@ TEST(CutRun, IsNeverTwiceAsLongAsThePlainMessage) {
   }
   std::printf("at worst %.2f of the plain message\n", worst);
   EXPECT_LE(worst, 2.0);
+}
+
+// The longest that fits_a_packet() lets through, with the numbers that take most bytes.
+TEST(CutRun, TheLongestCutFitsAPacket) {
+  Cut cut;
+  cut.author = {~std::uint64_t{0}};
+  cut.author_seq = ~std::uint64_t{0} - 1;
+  cut.lease_epoch = ~std::uint64_t{0};
+  cut.body = {~0u};
+  cut.tool = digest(1);
+  cut.level = 2;
+  cut.spindle_rpm = cut.path_us = ~0u;
+  for (std::size_t k = 0; k < wire::kMostKnotsInPacket; ++k) {
+    QuantisedPose pose;
+    pose.position.fill(k % 2 == 0 ? std::numeric_limits<std::int32_t>::min() / 2 : std::numeric_limits<std::int32_t>::max() / 2);
+    pose.rotation.fill(k % 3 == 0 ? std::int16_t{-16000} : std::int16_t{16000});
+    cut.path.push_back(pose);
+  }
+  ASSERT_TRUE(wire::fits_a_packet(cut));
+  const wire::ToolNumbers none;
+  SendWindow window(kWide, cut.author_seq);
+  wire::CutSender sender(window, none);
+  ASSERT_TRUE(sender.push(cut));
+  SendWindow row_window(kWide, cut.author_seq);
+  wire::RowSender row_sender(row_window, none);
+  ASSERT_TRUE(row_sender.push(committed(cut)));
+  std::printf("%zu B up, %zu B down\n", window.least_room(0s), row_window.least_room(0s));
+  EXPECT_LE(window.least_room(0s), kMostPlainBytes - 100);
+  EXPECT_LE(row_window.least_room(0s), kMostPlainBytes - 100);
+  cut.path.resize(wire::kMostKnotsInPacket + 1);
+  EXPECT_FALSE(wire::fits_a_packet(cut));
 }
 
 TEST(CutRun, WithoutItsNumberAToolGoesByItsHash) {
@@ -381,7 +453,8 @@ TEST(CutRun, BytesOfRealCuts) {
     cut.path.assign(1, last);
     for (int k = 0; k < 2; ++k) {
       const double t = i * 0.008 + k * 0.004;
-      Pose pose = pose_along(Vec3(10 * std::cos(3 * t), 8 * std::sin(3 * t), -1) + random.in_cube(0.05), {0.3 * std::sin(t), 0.2, -1});
+      const Vec3 tip(10 * std::cos(3 * t), 8 * std::sin(3 * t), -1);
+      Pose pose = pose_along(tip + random.in_cube(0.05), {0.3 * std::sin(t), 0.2, -1});
       pose.rotation = pose.rotation * Eigen::Quaterniond(Eigen::AngleAxisd(random.between(-0.0035, 0.0035), random.direction()));
       cut.path.push_back(quantise(pose));
     }
@@ -433,7 +506,8 @@ TEST(PacketFiller, BytesOfTheWayUp) {
         state.pose_bone_device.position_mm.z() -= 0.7;
       }
       const int repeats = rate.repeats();
-      if (rate.next(t, cutting ? t : window.next_due(t, repeats).value_or(SendWindow::Time::max())) > t) continue;
+      const auto wanted = cutting ? t : window.next_due(t, repeats).value_or(SendWindow::Time::max());
+      if (rate.next(t, wanted, 100 + window.least_room(t)) > t) continue;
       wire::PacketFiller<v1::UpPacket> filler(rate.budget(t) - kSealBytes);
       v1::UpPacket head;
       v1::PacketTimes& times = *head.mutable_times();
@@ -461,8 +535,8 @@ TEST(PacketFiller, BytesOfTheWayUp) {
       if (in.acknowledged() > said_answer) answers.emplace_back(t + 80ms, said_answer = in.acknowledged());
     }
     const double cutting_kbit = bytes[0] * 8 / 8000.0, idle_kbit = bytes[1] * 8 / 8000.0;
-    std::printf("loss %2.0f %%: %.0f kbit/s in %.0f B packets while cutting, %.1f kbit/s idle (%.1f %% less)\n", 100 * loss, cutting_kbit,
-                bytes[0] / packets[0], idle_kbit, 100 * (1 - idle_kbit / cutting_kbit));
+    std::printf("loss %2.0f %%: %.0f kbit/s in %.0f B packets while cutting, %.1f kbit/s idle (%.1f %% less)\n", 100 * loss,
+                cutting_kbit, bytes[0] / packets[0], idle_kbit, 100 * (1 - idle_kbit / cutting_kbit));
     EXPECT_TRUE(window.empty());
     EXPECT_LE(cutting_kbit, 300.0);
     EXPECT_LE(idle_kbit, 0.2 * cutting_kbit);
