@@ -184,6 +184,8 @@ Result<void> Database::carry_log(bool emptied) {
   return {};
 }
 
+bool Database::read_only() const { return sqlite3_db_readonly(connection_->handle, "main") != 0; }
+
 std::uint64_t Database::log_bytes() const { return connection_->log_pages * connection_->page_bytes; }
 
 }  // namespace osteon

@@ -62,6 +62,7 @@ class Database {
 
   // Copies the log into the file, both synced; `emptied`: and cuts the log to nothing.
   [[nodiscard]] Result<void> carry_log(bool emptied);
+  [[nodiscard]] bool read_only() const;  // known once something was read
   [[nodiscard]] std::uint64_t log_bytes() const;  // not yet carried into the file
 
  private:

@@ -198,6 +198,8 @@ Result<void> JournalFile::check_tables() {
                                                ", this program reads up to version " + std::to_string(kJournalVersion) +
                                                "; open it with the program that made it");
   version_ = static_cast<int>(*version);
+  if (database_.read_only())  // of no permission to write, or of a first page that claims a file of the future
+    return failure(ErrorCode::invalid_input, file_.string() + " cannot be written to; see to its permissions, or recover it");
 
   // A damaged definition could make SQLite read the right bytes wrongly.
   const Result<std::string> tables =
@@ -217,7 +219,7 @@ Walk JournalFile::walk(const JournalHead& before, RoomSeq last,
   }
   statement->integer(0, static_cast<std::int64_t>(before.place.value)).integer(1, static_cast<std::int64_t>(last.value));
   JournalRow row;
-  for (;;) {
+  while (walked.head.place < last) {
     const Result<bool> more = statement->step();
     if (!more) {
       walked.stopped = more.error();
@@ -237,6 +239,7 @@ Walk JournalFile::walk(const JournalHead& before, RoomSeq last,
     walked.head = next;
     if (!take(row, next)) return walked;
   }
+  return walked;
 }
 
 Result<std::optional<Digest>> JournalFile::chain_at(RoomSeq place) {
@@ -396,8 +399,13 @@ Inspection JournalFile::inspect(bool files) {
   if (const auto names = registers(); !names) {
     note(names.error());
   } else {
-    for (const std::string& name : *names)
-      if (const auto value = find_register(name); !value) note(value.error());
+    for (const std::string& name : *names) {
+      const auto value = find_register(name);
+      if (!value)
+        note(value.error());
+      else if (!*value)  // its name reads the same and is of another type
+        note(damaged("the name of its register " + name).value());
+    }
   }
   return found;
 }

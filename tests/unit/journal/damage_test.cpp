@@ -53,7 +53,9 @@ class DamageTest : public ::testing::TestWithParam<bool> {
     EXPECT_GT(outcomes_.closed, 0);
     EXPECT_GT(outcomes_.refused, 0);
     EXPECT_GT(outcomes_.found, 0);
-    if (GetParam()) EXPECT_EQ(outcomes_.behind, 0) << "a journal that was closed vouches for its own end";
+    if (GetParam()) {
+      EXPECT_EQ(outcomes_.behind, 0) << "a journal that was closed vouches for its own end";
+    }
   }
 
   void look(const std::string& what) {
@@ -89,7 +91,8 @@ class DamageTest : public ::testing::TestWithParam<bool> {
     ASSERT_EQ(opened->head(), head_);
     ASSERT_TRUE(opened->check_witness(head_));
     ASSERT_EQ(opened->people().value(), (std::vector<Person>{{"p1", "Anna", 20000}}));
-    for (const Checkpoint& checkpoint : opened->checkpoints().value())
+    const std::vector<Checkpoint> checkpoints = opened->checkpoints().value();
+    for (const Checkpoint& checkpoint : checkpoints)
       if (const auto bytes = opened->read_checkpoint(checkpoint)) {
         ASSERT_EQ(*bytes, "the room at place 8");
       }
@@ -129,7 +132,7 @@ TEST_P(DamageTest, CutAtAnyLengthItIsWholeOrSaysSo) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Journal, DamageTest, ::testing::Values(true, false),
-                         [](const auto& info) { return info.param ? "Closed" : "Killed"; });
+                         [](const auto& about) { return about.param ? "Closed" : "Killed"; });
 
 }  // namespace
 }  // namespace osteon

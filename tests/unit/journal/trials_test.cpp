@@ -10,8 +10,9 @@ namespace osteon::test {
 namespace {
 
 void show(const char* what, const Tally& tally) {
-  std::printf("%s: %lu trials, %lu rows acknowledged, %lu recovered (%lu not acknowledged), %lu lost, %lu closed, %lu bad\n", what,
-              tally.trials, tally.acknowledged, tally.recovered, tally.kept_unasked, tally.lost, tally.closed, tally.bad_trials);
+  std::printf("%s: %lu trials, %lu rows acknowledged, %lu recovered, of them %lu not acknowledged, %lu lost, ", what,
+              tally.trials, tally.acknowledged, tally.recovered, tally.kept_unasked, tally.lost);
+  std::printf("%lu closed to rows, %lu bad trials\n", tally.closed, tally.bad_trials);
 }
 
 void expect_nothing_lost(const Tally& tally) {

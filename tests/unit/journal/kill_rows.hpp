@@ -1,0 +1,15 @@
+// The rows of a program that is killed, each known from its place.
+#pragma once
+#include <string>
+#include <utility>
+
+#include "server/journal/chain.hpp"
+
+namespace osteon {
+
+inline JournalRow kill_row(std::uint64_t place) {
+  std::string bytes(1 + place * 7919 % 1500, static_cast<char>(place));
+  return {RoomSeq{place}, static_cast<std::int64_t>(place * 8'000'000), std::move(bytes)};
+}
+
+}  // namespace osteon

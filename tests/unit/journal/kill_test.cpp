@@ -1,0 +1,96 @@
+// A real process that appends to a journal on the real disk, killed at any moment.
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <cstdio>
+#include <random>
+#include <thread>
+
+#include "server/journal/upkeep.hpp"
+#include "tests/support/disk/journal_trials.hpp"
+#include "tests/support/process.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/unit/journal/kill_rows.hpp"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr int kKills = 100;
+constexpr int kKillsPerJournal = 20;
+
+// The place in the last whole line of what it printed.
+std::uint64_t last_place(const std::string& out) {
+  const std::size_t end = out.rfind('\n');
+  if (end == std::string::npos) return 0;
+  const std::size_t begin = end == 0 ? std::string::npos : out.rfind('\n', end - 1);
+  return std::stoull(out.substr(begin == std::string::npos ? 0 : begin + 1));
+}
+
+TEST(JournalKill, LosesNoAcknowledgedRowAndLetsTheNextOneIn) {
+  std::mt19937_64 random(1);
+  std::uint64_t acknowledged = 0, kept = 0;
+  for (int round = 0; round < kKills / kKillsPerJournal; ++round) {
+    const test::TempDir folder;
+    const std::filesystem::path file = folder / "journal";
+    std::uint64_t before = 0;
+    for (int kill = 0; kill < kKillsPerJournal; ++kill) {
+      test::Process writer(test::program("journal_kill_writer"), {file.string(), std::to_string(random())});
+      // Anywhere: while it is made or opened, or later in the work.
+      const auto lines = kill % 4 == 0 ? 0 : random() % 12;
+      for (std::uint64_t i = 0; i < lines; ++i) ASSERT_TRUE(writer.read_line(60s)) << writer.err();
+      std::this_thread::sleep_for(std::chrono::microseconds(random() % 8000));
+      ASSERT_TRUE(writer.running()) << writer.err();
+      writer.signal(SIGKILL);
+      ASSERT_EQ(writer.wait(60s), 128 + SIGKILL);
+      const std::uint64_t told = std::max(before, last_place(writer.out()));
+      acknowledged += told - before;
+
+      if (!std::filesystem::exists(file)) {
+        ASSERT_EQ(told, 0u);
+        continue;
+      }
+      auto journal = Journal::open(file);
+      ASSERT_TRUE(journal) << journal.error().message;
+      ASSERT_EQ(journal->closed_because(), nullptr) << journal->closed_because()->message;
+      std::vector<JournalRow> rows;
+      ASSERT_TRUE(journal->read(RoomSeq{1}, [&](const JournalRow& row) {
+        rows.push_back(row);
+        return true;
+      }));
+      ASSERT_GE(rows.size(), told);
+      ASSERT_LE(rows.size(), told + 4) << "more than the batch that was under way";
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        const JournalRow expected = kill_row(i + 1);
+        ASSERT_EQ(rows[i].place, expected.place);
+        ASSERT_EQ(rows[i].at_ns, expected.at_ns);
+        ASSERT_EQ(rows[i].bytes, expected.bytes);
+      }
+      ASSERT_EQ(journal->head(), test::plain_head("bone", rows));
+      for (const Checkpoint& checkpoint : journal->checkpoints().value_or(std::vector<Checkpoint>{}))
+        ASSERT_TRUE(journal->read_checkpoint(checkpoint));
+      kept += rows.size() - told;
+      before = rows.size();
+    }
+  }
+  std::printf("%d kills, %lu rows acknowledged, %lu found, 0 lost\n", kKills, acknowledged, acknowledged + kept);
+  EXPECT_GT(acknowledged, 5u * kKills);
+}
+
+// Both at once: the holder of a journal is alive, then killed.
+TEST(JournalKill, TheLockEndsWithItsHolder) {
+  const test::TempDir folder;
+  const std::filesystem::path file = folder / "journal";
+  test::Process writer(test::program("journal_kill_writer"), {file.string(), "1"});
+  ASSERT_TRUE(writer.read_line(60s)) << writer.err();
+  const auto second = Journal::open(file);
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().message, file.string() + " is in use by another process; close the room there first");
+  writer.signal(SIGKILL);
+  ASSERT_TRUE(writer.wait(60s));
+  EXPECT_TRUE(Journal::open(file));
+}
+
+}  // namespace
+}  // namespace osteon

@@ -1,0 +1,42 @@
+// Appends rows to a journal until it is killed, and prints the place of each as soon as it is acknowledged:
+// journal_kill_writer FILE SEED. Each row is made from its place alone, so that whoever killed it knows what to find.
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+#include "server/journal/journal.hpp"
+#include "tests/unit/journal/kill_rows.hpp"
+
+int main(int argc, char** argv) {
+  using namespace osteon;
+  if (argc != 3) return 2;
+  const std::filesystem::path file = argv[1];
+  std::uint64_t random = std::strtoull(argv[2], nullptr, 10);
+  JournalOptions options;
+  options.most_log_bytes = 200 << 10;  // so that it is carried into the file every now and then
+  auto journal = std::filesystem::exists(file) ? Journal::open(file, options) : Journal::create(file, "bone", options);
+  if (!journal || journal->closed_because() != nullptr) {
+    std::fprintf(stderr, "%s\n", journal ? journal->closed_because()->message.c_str() : journal.error().message.c_str());
+    return 1;
+  }
+  std::uint64_t place = journal->head().place.value;
+  for (;;) {
+    random = random * 6364136223846793005u + 1442695040888963407u;
+    std::vector<JournalRow> rows;
+    for (std::uint64_t i = 0; i <= (random >> 33) % 4; ++i) rows.push_back(kill_row(++place));
+    if (const auto done = journal->append(rows); !done) {
+      std::fprintf(stderr, "%s\n", done.error().message.c_str());
+      return 1;
+    }
+    char line[32];
+    const int length = std::snprintf(line, sizeof line, "%llu\n", static_cast<unsigned long long>(place));
+    if (::write(STDOUT_FILENO, line, static_cast<std::size_t>(length)) != length) return 1;
+    if ((random >> 40) % 8 == 0) {
+      auto checkpoint = journal->begin_checkpoint(journal->head(), "");
+      if (!checkpoint || !checkpoint->write("room") || !checkpoint->finish() || !journal->add_checkpoint(std::move(*checkpoint)))
+        return 1;
+    }
+  }
+}
