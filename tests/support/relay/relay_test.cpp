@@ -51,7 +51,7 @@ struct Arrived {
   std::vector<std::uint32_t> numbers;
   Endpoint from;
 };
-Arrived drain(UdpPort& at, std::chrono::milliseconds quiet = 300ms) {
+Arrived drain(UdpPort& at, std::chrono::milliseconds quiet = 400ms) {
   Arrived out;
   DatagramBuffer buffer;
   for (auto last = std::chrono::steady_clock::now(); std::chrono::steady_clock::now() - last < quiet;) {
@@ -100,7 +100,7 @@ TEST(Impair, LosesRepeatsAndReordersAsItIsTold) {
     send(*client, there, numbered(n));
     if (n % 20 == 19) std::this_thread::sleep_for(2ms);  // so that no buffer of the system overflows
   }
-  const auto numbers = drain(*server).numbers;
+  const auto numbers = drain(*server, 1500ms).numbers;
   unsigned long long given = 0, lost = 0, twice = 0, held_back = 0;
   const std::string counts = relay.command("counts");
   ASSERT_EQ(std::sscanf(counts.c_str(), "ok udp %llu %llu %llu %llu", &given, &lost, &twice, &held_back), 4) << counts;
