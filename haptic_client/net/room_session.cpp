@@ -17,6 +17,8 @@
 #include "common/core/check.hpp"
 #include "common/link/backoff.hpp"
 #include "common/wire/convert.hpp"
+#include "haptic_client/net/cuts_underway.hpp"
+#include "haptic_client/net/session_reader.hpp"
 #include "osteon/v1/cutting.grpc.pb.h"
 #include "osteon/v1/room.grpc.pb.h"
 
@@ -31,12 +33,6 @@ constexpr auto kCaseSilence = 60s;  // a whole case takes no longer on one machi
 
 Error cannot_cache(const fs::path& path, const std::string& why) {
   return {ErrorCode::internal, "cannot keep the case in the cache: " + path.string() + ": " + why + "; give another folder with --cache"};
-}
-
-std::vector<BodyId> bodies_of(const google::protobuf::RepeatedField<std::uint32_t>& ids) {
-  std::vector<BodyId> bodies;
-  for (const std::uint32_t id : ids) bodies.push_back(BodyId{id});
-  return bodies;
 }
 
 // Writes the case's files as they come. A correct server sends these names and no others.
@@ -164,7 +160,6 @@ struct RoomSession::Impl {
   struct Line {
     grpc::ClientContext context;
     std::unique_ptr<grpc::ClientReaderWriter<v1::SessionRequest, v1::SessionResponse>> stream;
-    bool may_send = false;  // it is known what the room has decided; under the session's mutex
   };
 
   void run();
@@ -173,9 +168,6 @@ struct RoomSession::Impl {
   void write(Line& line);
   // Until it succeeds or the session is closed. Error: the server answers, and refuses.
   Result<void> join_again();
-  Result<void> deliver(Line& line, const v1::SessionResponse& response);
-  void decided(std::uint64_t author_seq);
-  void send_again(Line& line, std::uint64_t decided_author_seq);
   [[nodiscard]] bool ends() const {
     const std::lock_guard lock(mutex);
     return over || closing;
@@ -190,18 +182,16 @@ struct RoomSession::Impl {
   std::thread thread;
   // Of that thread.
   wire::JoinedRoom joined;                    // newest
-  std::optional<wire::KeptEvents> kept;
+  std::optional<SessionReader> reader;
 
   mutable std::mutex mutex;
   std::condition_variable wake;
   Line* line = nullptr;                       // the open one
-  std::deque<v1::Cut> cuts;                   // to be sent
-  std::deque<v1::Cut> sent;                   // and not known to be decided
-  std::optional<v1::CuttingState> state;      // the newest that was not sent
+  CutsUnderway underway{kMaxWaitingCuts};
   bool closing = false, over = false;
 };
 
-// On the line's writer thread: cuts before states, so that a state never tells of bone that the server still has.
+// On the line's writer thread.
 void RoomSession::Impl::write(Line& open) {
   v1::SessionRequest request;
   request.mutable_open()->set_author(joined.author.value);
@@ -211,110 +201,18 @@ void RoomSession::Impl::write(Line& open) {
   while (written) {
     {
       std::unique_lock lock(mutex);
-      wake.wait(lock, [&] { return (open.may_send && (!cuts.empty() || state)) || closing || over || line != &open; });
+      wake.wait(lock, [&] { return underway.something_to_send() || closing || over || line != &open; });
       if (over || line != &open) break;
-      if (open.may_send && !cuts.empty()) {
-        *request.mutable_cut() = cuts.front();
-        sent.push_back(std::move(cuts.front()));
-        cuts.pop_front();
-      } else if (open.may_send && state) {
-        *request.mutable_state() = std::move(*state);
-        state.reset();
-      } else {
+      if (const std::optional<Cut> cut = underway.take_cut())
+        *request.mutable_cut() = wire::to_wire(*cut);
+      else if (const std::optional<CuttingState> state = underway.take_state())
+        *request.mutable_state() = wire::to_wire(*state);
+      else
         break;
-      }
     }
     written = open.stream->Write(request);
   }
   open.stream->WritesDone();
-}
-
-// Everything that the room has not decided follows again, in order: a cut may have been lost on its way there, or its
-// answer on the way back.
-void RoomSession::Impl::send_again(Line& open, std::uint64_t decided_author_seq) {
-  decided(decided_author_seq);
-  const std::lock_guard lock(mutex);
-  cuts.insert(cuts.begin(), std::make_move_iterator(sent.begin()), std::make_move_iterator(sent.end()));
-  sent.clear();
-  open.may_send = true;
-  wake.notify_all();
-}
-
-void RoomSession::Impl::decided(std::uint64_t author_seq) {
-  const std::lock_guard lock(mutex);
-  while (!sent.empty() && sent.front().author_seq() <= author_seq) sent.pop_front();
-  while (!cuts.empty() && cuts.front().author_seq() <= author_seq) cuts.pop_front();
-}
-
-Result<void> RoomSession::Impl::deliver(Line& open, const v1::SessionResponse& response) {
-  switch (response.message_case()) {
-    case v1::SessionResponse::kLeaf: {
-      const Result<FieldLeaf> leaf = wire::from_wire(response.leaf());
-      if (!leaf) return tl::unexpected(leaf.error());
-      if (events.leaf) events.leaf(*leaf);
-      return {};
-    }
-    case v1::SessionResponse::kComplete: {
-      const v1::FieldComplete& row = response.complete();
-      if (events.complete)
-        events.complete({RoomSeq{row.room_seq()}, bodies_of(row.bodies()), row.lease_epoch(), row.decided_author_seq()});
-      send_again(open, row.decided_author_seq());
-      return {};
-    }
-    case v1::SessionResponse::kTool: {
-      const Result<Tool> tool = wire::from_wire(response.tool().tool());
-      if (!tool) return tl::unexpected(tool.error());
-      tools->add(*tool);
-      if (events.tool && response.tool().room_seq() != 0) events.tool(RoomSeq{response.tool().room_seq()});
-      return {};
-    }
-    case v1::SessionResponse::kChange: {
-      const v1::BoneChange& row = response.change();
-      BonePart part{RoomSeq{row.room_seq()}, bodies_of(row.bodies()), row.lease_epoch(), {}, row.last()};
-      for (const v1::FieldLeaf& wire_leaf : row.leaves()) {
-        Result<FieldLeaf> leaf = wire::from_wire(wire_leaf);
-        if (!leaf) return tl::unexpected(leaf.error());
-        if (std::ranges::find(part.bodies, leaf->body) == part.bodies.end())
-          return failure(ErrorCode::invalid_input, "change.leaves has one of a body that is gone");
-        part.leaves.push_back(std::move(*leaf));
-      }
-      if (events.change) events.change(std::move(part));
-      return {};
-    }
-    case v1::SessionResponse::kScene: {
-      std::vector<SceneItem> items;
-      for (const v1::SceneItem& wire_item : response.scene().items()) {
-        const Result<SceneItem> item = wire::from_wire(wire_item);
-        if (!item) return tl::unexpected(item.error());
-        if (!tools->find(item->tool)) return failure(ErrorCode::invalid_input, "scene.items names a tool that was not sent");
-        items.push_back(*item);
-      }
-      if (events.scene) events.scene(RoomSeq{response.scene().room_seq()}, items);
-      return {};
-    }
-    case v1::SessionResponse::kCommitted: {
-      const Result<Cut> cut = wire::from_wire(response.committed().cut());
-      if (!cut) return tl::unexpected(cut.error());
-      const ToolBox::Entry* tool = tools->find(cut->tool);
-      if (!tool || !tool->body.cuts()) return failure(ErrorCode::invalid_input, "committed.cut names a tool that was not sent");
-      if (cut->author == room.author) decided(cut->author_seq);
-      if (events.committed) events.committed(RoomSeq{response.committed().room_seq()}, *cut);
-      return {};
-    }
-    case v1::SessionResponse::kRejected: {
-      const v1::RejectedCut& row = response.rejected();
-      decided(row.author_seq());
-      if (events.rejected) events.rejected(RoomSeq{row.room_seq()}, row.author_seq(), row.lease_epoch(), row.reason());
-      return {};
-    }
-    case v1::SessionResponse::kKept: {
-      const Result<Digest> chain = wire::digest_from_wire(response.kept().chain());
-      if (!chain) return tl::unexpected(chain.error());
-      kept = {RoomSeq{response.kept().room_seq()}, *chain};
-      return {};
-    }
-    default: return failure(ErrorCode::unsupported, "SessionResponse.message is not known to this client");
-  }
 }
 
 grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) {
@@ -323,7 +221,9 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
     if (closing || over) return grpc::Status::CANCELLED;
     open.stream = stub->Session(&open.context);
     line = &open;
+    underway.stop();
   }
+  reader->begin();
   std::thread writer([&] { write(open); });
   v1::SessionResponse response;
   while (!broken && open.stream->Read(&response)) {
@@ -331,7 +231,7 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
       const std::lock_guard lock(mutex);
       if (over) break;
     }
-    if (const Result<void> delivered = deliver(open, response); !delivered) {
+    if (const Result<void> delivered = reader->take(std::move(response)); !delivered) {
       broken = Error{delivered.error().code, "the server sent what no correct server sends: " + delivered.error().message};
       open.context.TryCancel();
     }
@@ -373,7 +273,7 @@ Result<void> RoomSession::Impl::join_again() {
       wake.wait_for(lock, backoff.next(), [&] { return closing || over; });
       if (closing || over) return {};
     }
-    Result<wire::JoinedRoom> again = wire::join_again(joined, wire::ClientKind::haptic, kept);
+    Result<wire::JoinedRoom> again = wire::join_again(joined, wire::ClientKind::haptic, reader->kept());
     if (again) {
       joined = std::move(*again);
       return {};
@@ -454,24 +354,33 @@ Result<std::uint32_t> RoomSession::set_item(const SceneItem& item) {
 
 void RoomSession::open(RoomEvents events) {
   OSTEON_CHECK(!impl_->stub);
+  Impl& impl = *impl_;
+  impl.reader.emplace(
+      impl.room.author, impl.tools, events,
+      [&impl](std::uint64_t author_seq) {
+        const std::lock_guard lock(impl.mutex);
+        impl.underway.decided(author_seq);
+      },
+      [&impl](std::uint64_t author_seq) {
+        const std::lock_guard lock(impl.mutex);
+        impl.underway.go_on(author_seq);
+        impl.wake.notify_all();
+      });
   impl_->events = std::move(events);
   impl_->stub = v1::CuttingService::NewStub(impl_->room.channel);
   impl_->thread = std::thread([impl = impl_.get()] { impl->run(); });
 }
 
 bool RoomSession::send(const Cut& cut) {
-  v1::Cut message = wire::to_wire(cut);
   const std::lock_guard lock(impl_->mutex);
-  if (impl_->closing || impl_->over || impl_->cuts.size() + impl_->sent.size() >= kMaxWaitingCuts) return false;
-  impl_->cuts.push_back(std::move(message));
+  if (impl_->closing || impl_->over || !impl_->underway.push(cut)) return false;
   impl_->wake.notify_all();
   return true;
 }
 
 void RoomSession::send(const CuttingState& state) {
-  v1::CuttingState message = wire::to_wire(state);
   const std::lock_guard lock(impl_->mutex);
-  impl_->state = std::move(message);
+  impl_->underway.push(state);
   impl_->wake.notify_all();
 }
 

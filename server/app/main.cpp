@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <string>
 #include <utility>
@@ -16,6 +17,7 @@
 #include "common/runtime/progress.hpp"
 #include "common/runtime/stop_signal.hpp"
 #include "common/volume/mesh_distance.hpp"
+#include "server/app/journal_commands.hpp"
 #include "server/net/room_server.hpp"
 
 namespace {
@@ -196,7 +198,10 @@ int main(int argc, char** argv) {
   CLI::App app("Owns the bone of a case: applies the cuts of haptic clients in one order and streams the surface and the "
                "tools' states to viewers and audio clients.",
                kProgram);
-  app.add_option("--case", options.case_folder, "Folder of the case, as osteon-import writes it")->required();
+  app.add_option("--case", options.case_folder, "Folder of the case, as osteon-import writes it");
+  std::function<Result<void>()> journal_command;
+  add_journal_commands(app, journal_command);
+  app.require_subcommand(0, 1);
   app.add_option("--listen", options.listen, "HOST:PORT on this machine; port 0 lets the system choose")->capture_default_str();
   app.add_option("--address-file", options.address_file, "Written with HOST:PORT when clients may come");
   app.add_option("--tools", options.tools_folder,
@@ -218,7 +223,13 @@ int main(int argc, char** argv) {
   app.add_option("--summary", options.summary_file, "JSON written at the end: field hash, counts, ticks, latencies");
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
 
+  if (journal_command) {
+    const Result<void> done = journal_command();
+    return done ? 0 : log::exit_with(kProgram, done.error());
+  }
   log::open(kProgram);
+  if (options.case_folder.empty())
+    return log::exit_with(kProgram, {ErrorCode::invalid_input, "--case is required; see osteon-server --help"});
   const StopSignal stop;
   const Result<void> outcome = run(options, stop);
   return outcome ? 0 : log::exit_with(kProgram, outcome.error());

@@ -6,9 +6,9 @@
 
 namespace osteon {
 
-Committer::Committer(Write write, std::function<void(const Error&)> failed)
+Committer::Committer(Write write, std::function<void(const Error&)> failed, bool apart)
     : write_(std::move(write)), failed_(std::move(failed)) {
-  if (write_) thread_ = std::thread([this] { run(); });
+  if (write_ && apart) thread_ = std::thread([this] { run(); });
 }
 
 Committer::~Committer() {
@@ -21,11 +21,8 @@ Committer::~Committer() {
 }
 
 void Committer::commit(std::vector<RoomRow> rows, std::vector<Tell> tells) {
-  if (!write_) {
-    for (const Tell& tell : tells) tell({});
-    return;
-  }
   if (rows.empty() && tells.empty()) return;
+  if (!thread_.joinable()) return keep(rows, tells);
   const std::lock_guard lock(mutex_);
   std::ranges::move(rows, std::back_inserter(rows_));
   std::ranges::move(tells, std::back_inserter(tells_));
@@ -33,7 +30,7 @@ void Committer::commit(std::vector<RoomRow> rows, std::vector<Tell> tells) {
 }
 
 void Committer::drain() {
-  if (!write_) return;
+  if (!thread_.joinable()) return;
   std::unique_lock lock(mutex_);
   wake_.wait(lock, [&] { return !busy_ && rows_.empty() && tells_.empty(); });
 }
@@ -53,6 +50,22 @@ std::optional<Error> Committer::failure() const {
   return failure_;
 }
 
+void Committer::keep(const std::vector<RoomRow>& rows, const std::vector<Tell>& tells) {
+  Result<void> durable;
+  if (const std::optional<Error> failed = failure()) durable = tl::unexpected(*failed);
+  if (write_ && durable && !rows.empty()) {
+    const auto begun = std::chrono::steady_clock::now();
+    durable = write_(rows);
+    {
+      const std::lock_guard lock(mutex_);
+      times_.record(std::chrono::steady_clock::now() - begun);
+      if (!durable) failure_ = durable.error();
+    }
+    if (!durable && failed_) failed_(durable.error());
+  }
+  for (const Tell& tell : tells) tell(durable);
+}
+
 void Committer::run() {
   std::unique_lock lock(mutex_);
   while (true) {
@@ -62,23 +75,9 @@ void Committer::run() {
     const std::vector<Tell> tells = std::exchange(tells_, {});
     writing_ = rows.size();
     busy_ = true;
-    Result<void> durable = failure_ ? Result<void>(tl::unexpected(*failure_)) : Result<void>{};
     lock.unlock();
-
-    const auto begun = std::chrono::steady_clock::now();
-    const bool writes = durable && !rows.empty();
-    if (writes) durable = write_(rows);
-    const auto took = std::chrono::steady_clock::now() - begun;
-    if (writes && !durable) {
-      lock.lock();
-      failure_ = durable.error();
-      lock.unlock();
-      if (failed_) failed_(durable.error());
-    }
-    for (const Tell& tell : tells) tell(durable);
-
+    keep(rows, tells);
     lock.lock();
-    if (writes) times_.record(took);
     writing_ = 0;
     busy_ = false;
     wake_.notify_all();

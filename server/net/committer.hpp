@@ -24,8 +24,8 @@ class Committer {
   using Tell = std::function<void(const Result<void>& durable)>;
 
   // Without a `write` nothing is kept, and all is told at once on the caller's thread. `failed`: called once, on the
-  // committing thread, before anyone is told of the error.
-  explicit Committer(Write write, std::function<void(const Error&)> failed = {});
+  // committing thread, before anyone is told of the error. `apart` false: no thread; commit() itself writes and tells.
+  explicit Committer(Write write, std::function<void(const Error&)> failed = {}, bool apart = true);
   ~Committer();  // commits what was handed over
   Committer(const Committer&) = delete;
   Committer& operator=(const Committer&) = delete;
@@ -41,6 +41,8 @@ class Committer {
 
  private:
   void run();
+  // Writes and tells, without the mutex.
+  void keep(const std::vector<RoomRow>& rows, const std::vector<Tell>& tells);
 
   const Write write_;
   const std::function<void(const Error&)> failed_;

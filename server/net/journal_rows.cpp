@@ -1,5 +1,7 @@
 #include "server/net/journal_rows.hpp"
 
+#include <google/protobuf/util/json_util.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -257,6 +259,18 @@ Result<RoomRow> row_from_bytes(RoomSeq place, std::chrono::nanoseconds at, std::
   Result<What> what = read(in);
   if (!what) return in_row(what.error());
   return RoomRow{place, at, AuthorId{in.author()}, std::move(*what)};
+}
+
+Result<std::string> row_as_json(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes) {
+  v1::JournalRow in;
+  std::string event;
+  google::protobuf::util::JsonPrintOptions names;
+  names.preserve_proto_field_names = true;
+  if (!in.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) ||
+      !google::protobuf::util::MessageToJsonString(in, &event, names).ok())
+    return bad("row " + std::to_string(place.value) + ": it is no row of a room");
+  return "{\"place\":" + std::to_string(place.value) + ",\"at_s\":" + std::to_string(std::chrono::duration<double>(at).count()) +
+         ",\"event\":" + event + "}";
 }
 
 }  // namespace osteon

@@ -33,4 +33,7 @@ struct RoomGenesis {
 // Error invalid_input, naming the row and the field.
 [[nodiscard]] Result<RoomRow> row_from_bytes(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes);
 
+// {"place": 12, "at_s": 3.25, "event": {...}}, on one line.
+[[nodiscard]] Result<std::string> row_as_json(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes);
+
 }  // namespace osteon

@@ -60,6 +60,7 @@ void MeshRoom::stop() {
 }
 
 void MeshRoom::run() {
+  const auto about = rates_.mesh / (2 * Pace::kTurns);
   Clock::time_point next{};
   bool due = false;
   while (true) {
@@ -71,12 +72,16 @@ void MeshRoom::run() {
       else if (!owed_)
         wake_.wait(lock, called);
       if (!due_ && end_) return;
-      // A first cut is shown at once, a row of cuts at the mesh rate.
-      wake_.wait_until(lock, next, [&] { return end_; });
+      // A first cut is shown at once, a row of cuts at the mesh rate: with the tick that comes about then, so that what it
+      // has committed goes at once.
+      if (Clock::now() < next) {
+        wake_.wait_until(lock, next - about, [&] { return end_; });
+        fresh_ = false;
+        wake_.wait_until(lock, next + about, [&] { return fresh_ || end_; });
+      }
       due = std::exchange(due_, false);
     }
-    // Of the ticks that wake this thread, the one that comes about then: what it has committed goes at once.
-    next = Clock::now() + rates_.mesh / turns_ - rates_.mesh / (2 * Pace::kTurns);
+    next = Clock::now() + rates_.mesh / turns_;
     update(due);
   }
 }
@@ -88,7 +93,7 @@ void MeshRoom::changed(Clock::time_point arrived) {
 
 void MeshRoom::wake() {
   const std::lock_guard lock(wake_mutex_);
-  due_ = true;
+  due_ = fresh_ = true;
   wake_.notify_one();
 }
 

@@ -114,6 +114,7 @@ class MeshRoom {
   std::condition_variable wake_;
   std::vector<Clock::time_point> unmeshed_;  // arrivals of events whose blocks are not made yet
   bool due_ = false, end_ = false;
+  bool fresh_ = false;  // woken since it was set to false
 
   mutable std::mutex stats_mutex_;
   DurationHistogram update_;

@@ -70,21 +70,29 @@ void SessionOutbox::set_leaves(std::vector<FieldLeaf> leaves) {
   leaves_known_ = true;
 }
 
-bool SessionOutbox::add(RoomSeq place, Bytes row) { return place <= contained_ || add_answer(std::move(row)); }
-
-bool SessionOutbox::add_answer(Bytes row) {
+bool SessionOutbox::add(RoomSeq place, Bytes row) {
+  if (!takes(place)) return true;
   if (rows_.size() >= kMaxRows) return false;
-  rows_.push_back(std::move(row));
+  rows_.push_back({++index_, std::move(row)});
   return true;
 }
 
+bool SessionOutbox::add_answer(Bytes row) {
+  if (rows_.size() >= kMaxRows) return false;
+  rows_.push_back({0, std::move(row)});
+  return true;
+}
+
+void SessionOutbox::arrived(std::uint64_t index) {
+  std::erase_if(rows_, [&](const Row& row) { return row.index != 0 && row.index <= index; });
+}
+
 MessageParts SessionOutbox::take() {
-  const auto next_of = [](std::deque<Bytes>& rows) {
-    Bytes row = std::move(rows.front());
-    rows.pop_front();
-    return MessageParts{std::move(row)};
-  };
-  if (!before_.empty()) return next_of(before_);
+  if (!before_.empty()) {
+    MessageParts parts{std::move(before_.front())};
+    before_.pop_front();
+    return parts;
+  }
   if (!leaves_known_) return {};
   v1::SessionResponse response;
   if (next_leaf_ < leaves_.size()) {
@@ -99,7 +107,13 @@ MessageParts SessionOutbox::take() {
   }
   if (complete_) return {std::exchange(complete_, nullptr)};
   if (rows_.empty()) return {};
-  return next_of(rows_);
+  const Row row = std::move(rows_.front());
+  rows_.pop_front();
+  if (row.index == 0) return {row.bytes};
+  // The row itself is shared by all streams: its number goes behind it, as protobuf merges.
+  v1::SessionResponse number;
+  number.set_index(row.index);
+  return {row.bytes, serialised(number)};
 }
 
 }  // namespace osteon

@@ -69,8 +69,13 @@ class SessionOutbox {
   // rows set leaves as they are at their place.
   void set_leaves(std::vector<FieldLeaf> leaves);
   // A row of the room's order; one up to `contained` is skipped. False when kMaxRows wait already; the row is then
-  // not taken.
+  // not taken. Rows that are taken count from 1 on, and carry their number.
   [[nodiscard]] bool add(RoomSeq place, Bytes row);
+  [[nodiscard]] bool takes(RoomSeq place) const { return place > contained_; }
+  // Of the newest row that was taken.
+  [[nodiscard]] std::uint64_t index() const { return index_; }
+  // The reader has rows up to this number by another way: those that still wait need not be sent.
+  void arrived(std::uint64_t index);
   // An answer outside the order: the first outcome of a cut that was sent again.
   [[nodiscard]] bool add_answer(Bytes row);
   [[nodiscard]] MessageParts take();
@@ -83,7 +88,12 @@ class SessionOutbox {
   bool leaves_known_ = false;
   std::deque<Bytes> before_;
   Bytes complete_;  // null: said
-  std::deque<Bytes> rows_;
+  struct Row {
+    std::uint64_t index = 0;  // 0: an answer outside the order
+    Bytes bytes;
+  };
+  std::deque<Row> rows_;
+  std::uint64_t index_ = 0;
 };
 
 }  // namespace osteon

@@ -43,18 +43,25 @@ struct RoomHost::Impl {
         rates_(rates),
         room_began(Clock::now() - std::chrono::duration_cast<Clock::duration>(room.time())),
         mesh(room, room_mutex, {rates.mesh, rates.looks}, detail, [this] { return board.tool_tips_mm(); }),
-        committer(k ? [k](std::span<const RoomRow> rows) { return k->write(rows); } : Committer::Write{}, [this](const Error& why) { close_room(why); }) {
+        committer(k ? [k](std::span<const RoomRow> rows) { return k->write(rows); } : Committer::Write{},
+                  [this](const Error& why) { close_room(why); }, !driven()) {
     authors = room.authors();
   }
 
+  [[nodiscard]] bool driven() const { return rates_.tick.count() == 0; }
   void run_ticks();
+  // Whether anything was decided.
+  bool tick(std::chrono::nanoseconds now, bool last);
   void run_jobs();
   void run_pieces();
   void decide(QueuedCut& queued);
   void decide(QueuedEvent& queued);
   void later(Committer::Tell tell) { tells.push_back(std::move(tell)); }  // [tick] when what was decided is durable
   [[nodiscard]] MessageParts rows_of(const RoomEvent& event) const;
-  void tell_kept();
+  void tell_kept(std::chrono::nanoseconds now);
+  void note_changed(Clock::time_point arrived) {
+    if (!driven()) mesh.changed(arrived);
+  }
   void close_room(const Error& why);
   [[nodiscard]] std::optional<Error> closed() const;
   void end_sessions(const std::string& why);
@@ -109,33 +116,38 @@ struct RoomHost::Impl {
 
   std::optional<std::string> ended;       // under sessions_mutex: why new sessions end at once
   std::optional<BoneStatus> last_status;  // of the job thread
+  std::vector<Queued> batch;              // of the tick thread
   std::vector<Committer::Tell> tells;     // of the tick thread
-  Clock::time_point next_kept{};          // of the tick thread: when it is next said how much is kept
+  std::chrono::nanoseconds next_kept{};   // of the tick thread: when it is next said how much is kept
   Committer committer;                    // the last member with a thread: it tells the others
 
   std::thread tick_thread, piece_thread, job_thread;
 };
 
+bool RoomHost::Impl::tick(std::chrono::nanoseconds now, bool last) {
+  {
+    const std::lock_guard lock(queue_mutex);
+    std::swap(batch, queue);
+    queue_closed = last;
+  }
+  room.set_time(now);
+  for (Queued& queued : batch) std::visit([this](auto& one) { decide(one); }, queued);
+  const bool decided = !batch.empty();
+  batch.clear();
+  committer.commit(room.take_rows(), std::exchange(tells, {}));
+  board.publish(RoomSeq{room_seq});
+  return decided;
+}
+
 void RoomHost::Impl::run_ticks() {
   PeriodicTimer timer(rates_.tick);
   TickStats own;
   MemoryReserve reserve(kCutReserve);
-  std::vector<Queued> batch;
   bool last = false;
   while (!last) {
     timer.wait(own);
     last = stopping;
-    {
-      const std::lock_guard lock(queue_mutex);
-      std::swap(batch, queue);
-      queue_closed = last;
-    }
-    room.set_time(Clock::now() - room_began);
-    for (Queued& queued : batch) std::visit([this](auto& one) { decide(one); }, queued);
-    committer.commit(room.take_rows(), std::exchange(tells, {}));
-    const bool decided = !batch.empty();
-    batch.clear();
-    board.publish(RoomSeq{room_seq});
+    const bool decided = tick(Clock::now() - room_began, last);
     if (decided) {
       mesh.wake();
       const std::lock_guard lock(pieces_mutex);
@@ -167,11 +179,11 @@ void RoomHost::Impl::decide(QueuedCut& queued) {
       sink->refuse(why);
       sink->decided();
     });
-  if (!outcome->report.changed_leaves.empty()) mesh.changed(queued.arrived);
+  if (!outcome->report.changed_leaves.empty()) note_changed(queued.arrived);
   const Bytes row = outcome->committed() ? cut_row(outcome->room_seq, queued.cut)
                                          : rejection_row(outcome->room_seq, queued.cut.author_seq, outcome->lease_epoch,
                                                          outcome->rejection);
-  tell_kept();
+  tell_kept(room.time());
   later([this, sink = queued.sink, row, place = outcome->room_seq, repeated = outcome->repeated,
          to_all = outcome->committed()](const Result<void>& durable) {
     if (durable) {
@@ -200,7 +212,7 @@ void RoomHost::Impl::decide(QueuedEvent& queued) {
     rows = rows_of(*event);
     event->leaves.clear();
     if (event->scene || event->bone) show_scene();
-    if (event->bone) mesh.changed(queued.arrived);
+    if (event->bone) note_changed(queued.arrived);
   }
   later([this, rows = std::move(rows), event = std::move(event), answer = std::move(queued.answer)](const Result<void>& durable) {
     if (!durable) return answer(tl::unexpected(durable.error()));
@@ -214,9 +226,9 @@ void RoomHost::Impl::decide(QueuedEvent& queued) {
 }
 
 // [tick] Every second, what a client may hold the room to.
-void RoomHost::Impl::tell_kept() {
-  if (!keeper || Clock::now() < next_kept) return;
-  next_kept = Clock::now() + std::chrono::seconds(1);
+void RoomHost::Impl::tell_kept(std::chrono::nanoseconds now) {
+  if (!keeper || now < next_kept) return;
+  next_kept = now + std::chrono::seconds(1);
   later([this](const Result<void>& durable) {
     if (!durable) return;
     const Bytes row = kept_row(keeper->head());
@@ -273,9 +285,10 @@ void RoomHost::Impl::run_jobs() {
 RoomHost::RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress, Detail detail,
                    RoomKeeper* keeper)
     : impl_(std::make_unique<Impl>(std::move(room), rates, detail, keeper)) {
-  impl_->mesh.make_whole_surface(progress);
+  if (!impl_->driven()) impl_->mesh.make_whole_surface(progress);
   impl_->room_seq = impl_->room.room_seq().value;
   impl_->show_scene();
+  if (impl_->driven()) return;
   impl_->tick_thread = std::thread([this] { impl_->run_ticks(); });
   impl_->mesh.start();
   impl_->piece_thread = std::thread([this] { impl_->run_pieces(); });
@@ -327,7 +340,15 @@ HostHealth RoomHost::health() const {
   return health;
 }
 
+void RoomHost::tick(std::chrono::nanoseconds now) {
+  OSTEON_CHECK(impl_->driven());
+  impl_->tick(now, false);
+  (void)impl_->room.take_changes();
+  (void)impl_->room.take_stale_blocks();
+}
+
 void RoomHost::run_slowly(std::function<void()> job) {
+  if (impl_->driven()) return job();
   const std::lock_guard lock(impl_->jobs_mutex);
   if (impl_->jobs_end) return;
   impl_->jobs.push_back(std::move(job));
@@ -345,26 +366,32 @@ Result<void> RoomHost::resume(AuthorId author, const Digest& secret, const std::
   return impl_->keeper->check_witness(*kept);
 }
 
-Result<AuthorId> RoomHost::join(MemberKind kind, const std::string& name, const Digest& secret) {
+void RoomHost::join(MemberKind kind, const std::string& name, const Digest& secret,
+                    std::function<void(const Result<AuthorId>&)> answer) {
   std::uint32_t person = 0;
   if (impl_->keeper && !name.empty()) {
     const Result<std::uint32_t> known = impl_->keeper->person(name);
-    if (!known) return tl::unexpected(known.error());
+    if (!known) return answer(tl::unexpected(known.error()));
     person = *known;
   }
-  std::promise<Result<AuthorId>> answer;
   queue_event(
-      [&](Room& room) -> Result<RoomEvent> {
+      [=](Room& room) -> Result<RoomEvent> {
         RoomEvent event;
         event.kind = EventKind::join;
         event.author = room.join(kind, person, secret);
         event.room_seq = room.room_seq();
         return event;
       },
-      [this, &answer](const Result<RoomEvent>& event) {
-        if (event) impl_->authors = std::max<std::uint64_t>(impl_->authors, event->author.value);
-        answer.set_value(event ? Result<AuthorId>(event->author) : tl::unexpected(event.error()));
+      [this, answer = std::move(answer)](const Result<RoomEvent>& event) {
+        if (!event) return answer(tl::unexpected(event.error()));
+        impl_->authors = std::max<std::uint64_t>(impl_->authors, event->author.value);
+        answer(event->author);
       });
+}
+
+Result<AuthorId> RoomHost::join(MemberKind kind, const std::string& name, const Digest& secret) {
+  std::promise<Result<AuthorId>> answer;
+  join(kind, name, secret, [&](const Result<AuthorId>& author) { answer.set_value(author); });
   return answer.get_future().get();
 }
 

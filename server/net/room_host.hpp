@@ -38,6 +38,7 @@ class SessionSink : public StreamSink {
 };
 
 struct HostRates {
+  // Zero: driven. The host has no thread and no surface; its owner calls tick(), and slow requests are answered at once.
   std::chrono::nanoseconds tick{1'000'000'000 / 120};
   std::chrono::nanoseconds mesh{1'000'000'000 / 30};
   std::chrono::nanoseconds looks{250'000'000};   // at most so often the surface follows the looks of viewers and the tools
@@ -86,10 +87,15 @@ class RoomHost {
   [[nodiscard]] HostHealth health() const;
   [[nodiscard]] Digest surface_hash() const;  // of the newest blocks
 
+  // [owner of a driven host] Decides what is queued, keeps it, and tells of it. `now`: since any start, never falls.
+  void tick(std::chrono::nanoseconds now);
+
   // Runs `job` on the thread for slow requests, in order; it may call the functions below.
   void run_slowly(std::function<void()> job);
-  // Waits until it is durable, so not on the tick or the committing thread. Error unavailable: the room has stopped or
-  // keeps nothing any more.
+  // `answer` is called when it is durable, on the committing thread. Error unavailable: the room has stopped or keeps nothing
+  // any more.
+  void join(MemberKind kind, const std::string& name, const Digest& secret, std::function<void(const Result<AuthorId>&)> answer);
+  // The same; waits, so not on the tick or the committing thread, nor of a driven host.
   [[nodiscard]] Result<AuthorId> join(MemberKind kind, const std::string& name = {}, const Digest& secret = {});
   // Whether an earlier connection may go on. `kept`: what it was told is safe, if anything. Errors: invalid_input (not the
   // secret of which the author has the digest), unavailable (the room has lost what was said to be safe).

@@ -6,12 +6,12 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <variant>
 #include <vector>
 
 #include "common/core/digest.hpp"
 #include "common/field/cut.hpp"
+#include "common/field/rejection.hpp"
 #include "common/tools/scene_item.hpp"
 #include "common/volume/cut_history.hpp"
 
@@ -19,25 +19,6 @@ namespace osteon {
 
 // What a client may do in a room: only a surgeon's cuts are taken.
 enum class MemberKind : std::uint8_t { surgeon, watcher };
-
-// Why a cut was not taken. Kept in journals: numbers stay.
-enum class Rejection : std::uint8_t {
-  none = 0,
-  body = 1,       // no such body
-  lease = 2,      // made under a lease that is over
-  tool = 3,       // not a registered tool, or one that does not cut
-  level = 4,      // finer than the tool or the case allows
-  path = 5,       // no knots or too many
-  rotation = 6,   // a quaternion far from unit
-  place = 7,      // too far from the bone
-  sweep = 8,      // too long a way for one cut
-  spindle = 9,    // faster than any spindle
-  time = 10,      // more tool time than has passed since the lease was granted
-  rate = 11,      // more volume swept than a room can evaluate
-  power = 12,     // more bone than any motor can take in that time
-};
-inline constexpr int kRejections = 13;
-[[nodiscard]] std::string_view sentence(Rejection reason);
 
 struct JoinRow {
   AuthorId author;         // given here, never again

@@ -177,8 +177,9 @@ Bytes row(std::uint64_t seq) {
 
 v1::SessionResponse parsed(const MessageParts& parts) {
   v1::SessionResponse response;
-  EXPECT_EQ(parts.size(), 1u);
-  EXPECT_TRUE(response.ParseFromString(*parts.front()));
+  std::string all;
+  for (const Bytes& part : parts) all += *part;
+  EXPECT_TRUE(response.ParseFromString(all));
   return response;
 }
 
@@ -197,10 +198,30 @@ TEST(SessionOutbox, SendsLeavesThenCompleteThenOnlyTheRowsAfterThem) {
   EXPECT_EQ(parsed(outbox.take()).leaf().origin().x(), 0);
   EXPECT_EQ(parsed(outbox.take()).leaf().origin().x(), 8);
   EXPECT_EQ(parsed(outbox.take()).complete().room_seq(), 4u);
-  EXPECT_EQ(parsed(outbox.take()).committed().room_seq(), 5u);
+  const v1::SessionResponse first = parsed(outbox.take());
+  EXPECT_EQ(first.committed().room_seq(), 5u);
+  EXPECT_EQ(first.index(), 1u) << "the first after the leaves";
   EXPECT_TRUE(outbox.take().empty());
   EXPECT_TRUE(outbox.add_answer(row(2))) << "an old outcome told again";
-  EXPECT_EQ(parsed(outbox.take()).committed().room_seq(), 2u);
+  const v1::SessionResponse again = parsed(outbox.take());
+  EXPECT_EQ(again.committed().room_seq(), 2u);
+  EXPECT_EQ(again.index(), 0u) << "it has no place in the order of this session";
+}
+
+// What a reader has had by another way is not sent again; its numbers stay.
+TEST(SessionOutbox, LeavesOutWhatHasArrived) {
+  SessionOutbox outbox;
+  outbox.begin(RoomSeq{0}, {}, complete(0));
+  outbox.set_leaves({});
+  (void)outbox.take();
+  for (std::uint64_t seq = 1; seq <= 5; ++seq) EXPECT_TRUE(outbox.add(RoomSeq{seq}, row(seq)));
+  EXPECT_TRUE(outbox.add_answer(row(1)));
+  outbox.arrived(3);
+  EXPECT_EQ(outbox.waiting(), 3u);
+  EXPECT_EQ(outbox.index(), 5u);
+  EXPECT_EQ(parsed(outbox.take()).index(), 4u);
+  EXPECT_EQ(parsed(outbox.take()).index(), 5u);
+  EXPECT_EQ(parsed(outbox.take()).index(), 0u) << "an answer is not a row of the order";
 }
 
 TEST(SessionOutbox, GivesUpAReaderThatIsTooFarBehind) {

@@ -1,0 +1,50 @@
+// What a room tells a haptic client.
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "common/core/id.hpp"
+#include "common/core/result.hpp"
+#include "common/field/cut.hpp"
+#include "common/field/field_hash.hpp"
+#include "common/tools/scene_item.hpp"
+
+namespace osteon {
+
+// Where a room stands when all leaves were sent: they contain every event up to this place.
+struct RoomAtJoin {
+  RoomSeq contained;
+  std::vector<BodyId> bodies;
+  std::uint64_t lease_epoch = 0;
+  std::uint64_t decided_author_seq = 0;  // the caller's cuts up to this one were decided: they are in the leaves or rejected
+};
+
+// A part of an event that changed the bone otherwise than by a cut: leaves to set, of bodies to hold.
+struct BonePart {
+  RoomSeq place;
+  std::vector<BodyId> bodies;      // any other is gone
+  std::uint64_t lease_epoch = 0;   // cuts of an earlier one will be rejected
+  std::vector<FieldLeaf> leaves;
+  bool last = false;               // part of the event
+};
+
+// What comes down. Called on the session's own thread, one after the other: the scene, every leaf, then `complete`, then
+// events in room_seq order; one may come as a change and as a scene. When the line breaks, `interrupted`, and once it is
+// made again, all of that anew: the scene, every leaf, `complete`, and cuts that were sent and not decided are sent again.
+// `lost` comes at most once and last, and never after close(). Tools go to tools() before anything that names them.
+struct RoomEvents {
+  std::function<void(const FieldLeaf& leaf)> leaf;
+  std::function<void(const RoomAtJoin& room)> complete;
+  std::function<void(RoomSeq place, const Cut& cut)> committed;  // of anyone, the caller's own included
+  // The caller's; what he cut on top of it falls too, and `lease_epoch` is that of his lease from now on.
+  std::function<void(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason)> rejected;
+  std::function<void(BonePart&& part)> change;
+  std::function<void(RoomSeq place, const std::vector<SceneItem>& items)> scene;  // all that stand from now on
+  std::function<void(RoomSeq place)> tool;  // one was added
+  std::function<void(const Error& why)> interrupted;
+  std::function<void(const Error& why)> lost;  // for good: the room is over, or knows this client no more
+};
+
+}  // namespace osteon

@@ -1,0 +1,140 @@
+#include "haptic_client/net/session_reader.hpp"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "common/field/rejection.hpp"
+#include "common/wire/convert.hpp"
+
+namespace osteon {
+namespace {
+
+std::vector<BodyId> bodies_of(const google::protobuf::RepeatedField<std::uint32_t>& ids) {
+  std::vector<BodyId> bodies;
+  for (const std::uint32_t id : ids) bodies.push_back(BodyId{id});
+  return bodies;
+}
+
+}  // namespace
+
+SessionReader::SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomEvents events,
+                             std::function<void(std::uint64_t)> decided, std::function<void(std::uint64_t)> complete)
+    : own_(own), tools_(std::move(tools)), events_(std::move(events)), decided_(std::move(decided)), complete_(std::move(complete)) {}
+
+void SessionReader::begin() { rows_ = ReceiveWindow<Row>(); }
+
+Result<void> SessionReader::take(v1::SessionResponse response) {
+  if (response.index() == 0) return deliver(response);
+  const std::uint64_t index = response.index();
+  rows_.offer(index, std::move(response));
+  return pass_on();
+}
+
+Result<void> SessionReader::take(wire::IndexedRow row) {
+  // What it stands for comes over the stream; and a tool that is not known yet, too.
+  if (row.row.kind == wire::SessionRowKind::streamed) return {};
+  if (row.row.kind == wire::SessionRowKind::committed && !cuts(row.row.cut)) return {};
+  rows_.offer(row.index, std::move(row.row));
+  return pass_on();
+}
+
+Result<void> SessionReader::pass_on() {
+  while (const std::optional<Row> row = rows_.take())
+    if (Result<void> delivered = std::visit([&](const auto& one) { return deliver(one); }, *row); !delivered) return delivered;
+  return {};
+}
+
+bool SessionReader::cuts(const Cut& cut) const {
+  const ToolBox::Entry* tool = tools_->find(cut.tool);
+  return tool && tool->body.cuts();
+}
+
+void SessionReader::committed(RoomSeq place, const Cut& cut) {
+  if (cut.author == own_) decided_(cut.author_seq);
+  if (events_.committed) events_.committed(place, cut);
+}
+
+void SessionReader::rejected(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason) {
+  decided_(author_seq);
+  if (events_.rejected) events_.rejected(place, author_seq, lease_epoch, reason);
+}
+
+Result<void> SessionReader::deliver(const wire::SessionRow& row) {
+  if (row.kind == wire::SessionRowKind::committed)
+    committed(row.room_seq, row.cut);
+  else
+    rejected(row.room_seq, row.author_seq, row.lease_epoch, std::string(sentence(static_cast<Rejection>(row.reason))));
+  return {};
+}
+
+Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
+  switch (response.message_case()) {
+    case v1::SessionResponse::kLeaf: {
+      const Result<FieldLeaf> leaf = wire::from_wire(response.leaf());
+      if (!leaf) return tl::unexpected(leaf.error());
+      if (events_.leaf) events_.leaf(*leaf);
+      return {};
+    }
+    case v1::SessionResponse::kComplete: {
+      const v1::FieldComplete& row = response.complete();
+      complete_(row.decided_author_seq());
+      if (events_.complete)
+        events_.complete({RoomSeq{row.room_seq()}, bodies_of(row.bodies()), row.lease_epoch(), row.decided_author_seq()});
+      return {};
+    }
+    case v1::SessionResponse::kTool: {
+      const Result<Tool> tool = wire::from_wire(response.tool().tool());
+      if (!tool) return tl::unexpected(tool.error());
+      tools_->add(*tool);
+      if (events_.tool && response.tool().room_seq() != 0) events_.tool(RoomSeq{response.tool().room_seq()});
+      return {};
+    }
+    case v1::SessionResponse::kChange: {
+      const v1::BoneChange& row = response.change();
+      BonePart part{RoomSeq{row.room_seq()}, bodies_of(row.bodies()), row.lease_epoch(), {}, row.last()};
+      for (const v1::FieldLeaf& wire_leaf : row.leaves()) {
+        Result<FieldLeaf> leaf = wire::from_wire(wire_leaf);
+        if (!leaf) return tl::unexpected(leaf.error());
+        if (std::ranges::find(part.bodies, leaf->body) == part.bodies.end())
+          return failure(ErrorCode::invalid_input, "change.leaves has one of a body that is gone");
+        part.leaves.push_back(std::move(*leaf));
+      }
+      if (events_.change) events_.change(std::move(part));
+      return {};
+    }
+    case v1::SessionResponse::kScene: {
+      std::vector<SceneItem> items;
+      for (const v1::SceneItem& wire_item : response.scene().items()) {
+        const Result<SceneItem> item = wire::from_wire(wire_item);
+        if (!item) return tl::unexpected(item.error());
+        if (!tools_->find(item->tool)) return failure(ErrorCode::invalid_input, "scene.items names a tool that was not sent");
+        items.push_back(*item);
+      }
+      if (events_.scene) events_.scene(RoomSeq{response.scene().room_seq()}, items);
+      return {};
+    }
+    case v1::SessionResponse::kCommitted: {
+      const Result<Cut> cut = wire::from_wire(response.committed().cut());
+      if (!cut) return tl::unexpected(cut.error());
+      if (!cuts(*cut)) return failure(ErrorCode::invalid_input, "committed.cut names a tool that was not sent");
+      committed(RoomSeq{response.committed().room_seq()}, *cut);
+      return {};
+    }
+    case v1::SessionResponse::kRejected: {
+      const v1::RejectedCut& row = response.rejected();
+      rejected(RoomSeq{row.room_seq()}, row.author_seq(), row.lease_epoch(), row.reason());
+      return {};
+    }
+    case v1::SessionResponse::kKept: {
+      const Result<Digest> chain = wire::digest_from_wire(response.kept().chain());
+      if (!chain) return tl::unexpected(chain.error());
+      kept_ = {RoomSeq{response.kept().room_seq()}, *chain};
+      return {};
+    }
+    case v1::SessionResponse::kLink: return {};  // the session's own
+    default: return failure(ErrorCode::unsupported, "SessionResponse.message is not known to this client");
+  }
+}
+
+}  // namespace osteon

@@ -1,0 +1,55 @@
+// Turns what comes from a room, over its stream and over the fast path, into one order of events.
+#pragma once
+#include <functional>
+#include <memory>
+#include <optional>
+#include <variant>
+
+#include "common/core/result.hpp"
+#include "common/link/receive_window.hpp"
+#include "common/tools/tool_box.hpp"
+#include "common/wire/cut_run.hpp"
+#include "common/wire/room_client.hpp"
+#include "haptic_client/net/room_events.hpp"
+#include "osteon/v1/cutting.pb.h"
+
+namespace osteon {
+
+// Every row after the leaves comes over the stream; rejections and cuts of anyone may come sooner over the fast path. Whichever
+// is first counts. Not synchronised.
+class SessionReader {
+ public:
+  // `decided`: own cuts up to a number are decided; `complete`: the same, and from here on cuts may be sent. Both are called
+  // before the event itself.
+  SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomEvents events, std::function<void(std::uint64_t)> decided,
+                std::function<void(std::uint64_t)> complete);
+
+  // A stream begins: its leaves and rows count anew.
+  void begin();
+  // Error: the server sent what no correct server sends; nothing more of the stream is to be taken.
+  [[nodiscard]] Result<void> take(v1::SessionResponse response);
+  // A row of the fast path that belongs to the present stream.
+  [[nodiscard]] Result<void> take(wire::IndexedRow row);
+  // Every row up to this one was passed on.
+  [[nodiscard]] std::uint64_t taken() const { return rows_.acknowledged(); }
+  // The newest that the room has said is kept.
+  [[nodiscard]] const std::optional<wire::KeptEvents>& kept() const { return kept_; }
+
+ private:
+  using Row = std::variant<v1::SessionResponse, wire::SessionRow>;
+  [[nodiscard]] Result<void> pass_on();
+  [[nodiscard]] Result<void> deliver(const v1::SessionResponse& response);
+  [[nodiscard]] Result<void> deliver(const wire::SessionRow& row);
+  [[nodiscard]] bool cuts(const Cut& cut) const;  // with a tool that was sent
+  void committed(RoomSeq place, const Cut& cut);
+  void rejected(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason);
+
+  const AuthorId own_;
+  const std::shared_ptr<ToolBox> tools_;  // shared with the replica's fields
+  const RoomEvents events_;
+  const std::function<void(std::uint64_t)> decided_, complete_;
+  ReceiveWindow<Row> rows_;
+  std::optional<wire::KeptEvents> kept_;
+};
+
+}  // namespace osteon
