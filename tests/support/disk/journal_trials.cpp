@@ -253,6 +253,13 @@ Tally failing_disk_trials(std::uint64_t first_seed, std::uint64_t count, int err
     writer.check_failed();
     writer.drop();
     if (random() % 2 == 0) disk.power_returns();
+    // The power may also fail while the next process puts things in order.
+    if (random() % 2 == 0) {
+      disk.fail_power_at(1 + random() % 40);
+      static_cast<void>(writer.open());
+      writer.drop();
+      disk.power_returns();
+    }
     if (writer.open() && writer.journal().closed_because() != nullptr) {
       ++tally.closed;
       writer.recover();

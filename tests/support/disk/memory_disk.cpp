@@ -69,7 +69,8 @@ struct MemoryDisk::Sqlite {
     MemoryDisk* disk;
     Contents content;
     std::string folder;
-    bool new_log;  // its name is synced with its first bytes, as SQLite does on a real disk
+    bool new_log;    // its name is synced with its first bytes, as SQLite does on a real disk
+    bool powersafe;  // SQLite was told that a torn write spoils nothing beside it, which is not so
   };
 
   static MemoryDisk& disk_of(sqlite3_vfs* vfs) { return *static_cast<MemoryDisk*>(vfs->pAppData); }
@@ -122,7 +123,7 @@ struct MemoryDisk::Sqlite {
   }
   static int control(sqlite3_file*, int, void*) { return SQLITE_NOTFOUND; }
   static int sector_size(sqlite3_file* file) { return static_cast<int>(file_of(file).disk->sector_bytes_); }
-  static int character(sqlite3_file*) { return 0; }  // promises nothing: a torn write spoils its whole sectors
+  static int character(sqlite3_file* file) { return file_of(file).powersafe ? SQLITE_IOCAP_POWERSAFE_OVERWRITE : 0; }
 
   static int open(sqlite3_vfs* vfs, const char* name, sqlite3_file* file, int flags, int* flags_out) {
     static const sqlite3_io_methods kMethods{1,       close,   read,    write,       truncate,  sync,    size,
@@ -140,7 +141,9 @@ struct MemoryDisk::Sqlite {
       if (const int reason = disk.change_names({{path, content}})) return told(disk, reason, SQLITE_CANTOPEN);
     }
     const bool log = (flags & SQLITE_OPEN_CREATE) != 0 && (flags & (SQLITE_OPEN_WAL | SQLITE_OPEN_MAIN_JOURNAL)) != 0;
-    new (file) File{{&kMethods}, &disk, std::move(content), folder_of(path).string(), log};
+    // As SQLite's own: so it is unless it is told otherwise.
+    const bool powersafe = (flags & SQLITE_OPEN_MAIN_DB) != 0 && sqlite3_uri_boolean(name, "psow", 1) != 0;
+    new (file) File{{&kMethods}, &disk, std::move(content), folder_of(path).string(), log, powersafe};
     ++disk.open_files_;
     if (flags_out != nullptr) *flags_out = flags;
     return SQLITE_OK;
