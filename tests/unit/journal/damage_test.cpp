@@ -92,10 +92,13 @@ class DamageTest : public ::testing::TestWithParam<bool> {
     ASSERT_TRUE(opened->check_witness(head_));
     ASSERT_EQ(opened->people().value(), (std::vector<Person>{{"p1", "Anna", 20000}}));
     const std::vector<Checkpoint> checkpoints = opened->checkpoints().value();
-    for (const Checkpoint& checkpoint : checkpoints)
+    for (const Checkpoint& checkpoint : checkpoints) {
+      ASSERT_EQ(checkpoint.at, plain_head("bone", {rows_.begin(), rows_.begin() + 8}));
+      ASSERT_EQ(checkpoint.meta, "meta");
       if (const auto bytes = opened->read_checkpoint(checkpoint)) {
         ASSERT_EQ(*bytes, "the room at place 8");
       }
+    }
     ASSERT_EQ(opened->next_server_epoch().value(), 2u);
     const JournalRow next{RoomSeq{13}, 0, "next"};
     ASSERT_TRUE(opened->append({&next, 1}));
