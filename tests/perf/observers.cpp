@@ -305,7 +305,7 @@ int main(int argc, char** argv) {
   app.add_option("--stalled", stalled, "How many of them never read")->capture_default_str();
   app.add_option("--few", few, "How many watch in the run that the others are compared with")->capture_default_str();
   app.add_option("--seconds", seconds, "How long is cut in each run")->capture_default_str();
-  app.add_option("--case", setting.case_folder, "Folder of the case; without it a block of layers, whose face at z = 0 is burred");
+  app.add_option("--case", setting.case_folder, "Folder of the case; without it a block of layers, burred at z = 0");
   app.add_option("--server-program", setting.server_program, "The osteon-server to measure")->capture_default_str();
   app.add_option("--only", only, "One of the runs alone: few, all, stalled");
   app.add_option("--states-hz", setting.states_hz, "How often a second they want the tools' states; 0: every change")
