@@ -1,0 +1,155 @@
+#include "common/wire/client_link.hpp"
+
+#include <algorithm>
+
+#include "common/core/check.hpp"
+
+namespace osteon::wire {
+namespace {
+
+using namespace std::chrono_literals;
+using Time = LinkHalf::Time;
+
+// Packets that hold the answer to one challenge: at 30 % loss all are lost once in 15000 moves.
+constexpr int kEchoes = 8;
+constexpr Time kPartnerForgotten = 2s;
+
+bool at_the_bone(const HeardState& state) {
+  return state.state.phase == CuttingPhase::cutting || state.state.phase == CuttingPhase::rubbing;
+}
+
+bool has_news(const HeardState& said, const HeardState& now, const PoseDeadband& band) {
+  return has_moved(said.state.pose_bone_tool, now.state.pose_bone_tool, band) ||
+         has_moved(said.state.pose_bone_device, now.state.pose_bone_device, band) || said.buttons != now.buttons ||
+         said.state.phase != now.state.phase;
+}
+
+}  // namespace
+
+ClientLink::ClientLink(const SessionKeys& keys, std::uint64_t first_author_seq, std::uint64_t first_index,
+                       const LinkOptions& options)
+    : half_(keys.session, keys.up, keys.down, first_author_seq, options),
+      rows_(first_index, options.most_ahead) {}
+
+bool ClientLink::push(const Cut& cut) {
+  if (half_.begin(cut.author_seq) && fits_a_packet(cut)) {
+    if (!sender_ || cut.author_seq != coded_ + 1) sender_.emplace(half_.window(), tools_);
+    if (sender_->push(cut)) {
+      coded_ = cut.author_seq;
+      return true;
+    }
+  }
+  half_.goes_over_stream();
+  return false;
+}
+
+void ClientLink::set_state(const CuttingState& state, std::uint32_t buttons) {
+  state_ = {state, buttons};
+  moved_ = !said_ || has_news(*said_, *state_, half_.options().deadband);
+}
+
+void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
+  DatagramBuffer plain;
+  const auto opened = half_.open(datagram, now, plain);
+  if (!opened) return;
+  // All of it is read before anything is believed.
+  v1::DownPacket packet;
+  if (!packet.ParseFromArray(opened->plain.data(), static_cast<int>(opened->plain.size()))) return half_.malformed();
+  const std::string& token = packet.path_challenge();
+  if (!token.empty() && token.size() != echo_.size()) return half_.malformed();
+  std::size_t left_out = 0;
+  const auto rows = rows_of(packet, tools_, &left_out);
+  if (!rows) return half_.malformed();
+  if (std::ranges::any_of(*rows, [](const IndexedRow& row) { return !fits_a_packet(row.row.cut); })) return half_.malformed();
+  std::vector<HeardState> states;
+  for (const v1::ToolState& sent : packet.partners()) {
+    const auto known = partners_.find(sent.author());
+    HeardState state = known == partners_.end() ? HeardState{} : known->second.state;
+    const auto newer = take_over(sent, state);
+    if (!newer) return half_.malformed();
+    if (*newer) states.push_back(std::move(state));
+  }
+
+  half_.left_out(left_out);
+  if (!token.empty()) {
+    std::ranges::copy(token, echo_.begin());
+    echoes_left_ = kEchoes;
+    half_.repeat_news(kEchoes);
+    return;  // a challenge goes where the server does not know yet whether its client is there, and holds nothing else
+  }
+  half_.is_alive(now);
+  half_.heard(packet, *opened, now);
+  if (opened->newest) {
+    lease_epoch_ = packet.lease_epoch();
+    frozen_ = packet.frozen();
+  }
+  for (const IndexedRow& row : *rows)
+    if (row.row.kind != SessionRowKind::streamed) rows_.offer(row.index, row.row);
+  if (!rows->empty() || left_out > 0) half_.answer();
+  for (HeardState& state : states) keep_partner(std::move(state), now);
+}
+
+void ClientLink::keep_partner(HeardState state, Time now) {
+  const std::uint64_t author = state.state.author.value;
+  if (partners_.size() == kMostPartners && !partners_.contains(author))
+    partners_.erase(std::ranges::min_element(partners_, {}, [](const auto& entry) { return entry.second.heard_at; }));
+  partners_[author] = {std::move(state), now};
+}
+
+std::vector<HeardState> ClientLink::partners(Time now) const {
+  std::vector<HeardState> heard;
+  for (const auto& [author, partner] : partners_)
+    if (now - partner.heard_at < kPartnerForgotten) heard.push_back(partner.state);
+  return heard;
+}
+
+std::optional<IndexedRow> ClientLink::take_row() {
+  auto row = rows_.take();
+  if (!row) return {};
+  return IndexedRow{rows_.acknowledged(), std::move(*row)};
+}
+
+// When the state itself asks for a packet.
+Time ClientLink::state_due() const {
+  if (moved_) return said_at_ + half_.options().state_interval;
+  return state_ && at_the_bone(*state_) ? effort_at_ + half_.options().effort_interval : Time::max();
+}
+
+// A part of the packet that goes now, empty where there is nothing new to say.
+v1::UpPacket ClientLink::state_part(Time now) const {
+  v1::UpPacket part;
+  const Time interval = half_.options().effort_interval;
+  if (state_ && (state_due() <= now || now - said_at_ >= interval))
+    *part.mutable_state() = to_tool_state(state_->state, state_->buttons, now - effort_at_ >= interval);
+  return part;
+}
+
+void ClientLink::said_state(const v1::UpPacket& part, Time now) {
+  if (!part.has_state()) return;
+  said_ = state_;
+  said_at_ = now;
+  if (part.state().has_effort()) effort_at_ = now;
+  moved_ = false;
+}
+
+Time ClientLink::next(Time now) const { return half_.next(now, state_due()); }
+
+std::span<const std::uint8_t> ClientLink::send(Time now, std::span<std::uint8_t> into) {
+  if (next(now) > now) return {};
+  PacketFiller<v1::UpPacket> filler(half_.room(now));
+  const std::uint64_t taken = rows_.acknowledged();
+  auto head = half_.head<v1::UpPacket>(now, taken, rows_.beyond(taken));
+  if (echoes_left_ > 0) {
+    --echoes_left_;
+    head.set_path_echo(echo_.data(), echo_.size());
+  }
+  const bool has_room = filler.add(head);
+  OSTEON_CHECK(has_room);
+  // The state goes before repeated cuts, but not before a cut that would never find room beside it.
+  const v1::UpPacket state = state_part(now);
+  if (state.ByteSizeLong() + half_.window().least_room(now) <= filler.room() && filler.add(state)) said_state(state, now);
+  half_.add_items(filler, now);
+  return half_.seal(filler.take(), now, into);
+}
+
+}  // namespace osteon::wire

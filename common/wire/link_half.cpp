@@ -1,0 +1,142 @@
+#include "common/wire/link_half.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/core/check.hpp"
+
+namespace osteon::wire {
+namespace {
+
+using namespace std::chrono_literals;
+using Time = LinkHalf::Time;
+
+// What a packet holds beside items and states, at most: the seal, times, acknowledgement, a path token, epoch and frozen.
+constexpr std::size_t kFixedBytes = kSealBytes + 57 + 22 + 18 + 14;
+
+std::uint64_t in_us(Time time) { return static_cast<std::uint64_t>(time / 1us); }
+
+// Nothing for what no clock shows.
+std::optional<Time> from_us(std::uint64_t us) {
+  constexpr std::uint64_t kMost_us = std::uint64_t{1} << 50;  // 36 years
+  return us < kMost_us ? std::optional<Time>(std::chrono::microseconds(us)) : std::nullopt;
+}
+
+}  // namespace
+
+LinkOptions server_link_options() {
+  LinkOptions options;
+  options.rate.interval = 4ms;
+  options.rate.bytes_per_s = 1'000'000.0 / 8.0;
+  return options;
+}
+
+LinkHalf::LinkHalf(std::uint32_t session, const SealKey& out, const SealKey& in, std::uint64_t first, const LinkOptions& options)
+    : options_(options),
+      sealer_(session, out, options.seal),
+      opener_(session, in, options.seal),
+      window_(options.window, first),
+      rate_(options.rate),
+      last_(first - 1),
+      acknowledged_(first - 1),
+      sent_upto_(first - 1) {
+  OSTEON_CHECK(first > 0);
+}
+
+std::optional<Opened> LinkHalf::open(std::span<const std::uint8_t> datagram, Time now, std::span<std::uint8_t> into) {
+  const auto opened = opener_.open(datagram, now, into);
+  if (!opened) return {};
+  ++counts_.packets_received;
+  counts_.bytes_received += datagram.size();
+  newest_ = std::max(newest_, opened->counter);
+  return opened;
+}
+
+void LinkHalf::heard(const v1::PacketTimes& times, const Opened& opened, Time now) {
+  if (opened.newest) {
+    peer_sent_us_ = times.sent_us();
+    peer_came_ = now;
+  }
+  // Nothing of ours had come yet, or it speaks of packets that never went.
+  if (times.heard_counter() == 0 || times.heard_counter() >= sealer_.counter() || times.heard_packets() > counts_.packets_sent)
+    return;
+  rate_.heard(times.heard_counter(), times.heard_packets());
+  const auto sent = from_us(times.echo_sent_us()), peer_received = from_us(times.echo_received_us()),
+             peer_sent = from_us(times.sent_us());
+  if (!sent || !peer_received || !peer_sent || !clock_.add({*sent, *peer_received, *peer_sent, now})) return;
+  const Time round_trip = clock_.at(now)->round_trip;
+  window_.set_round_trip(round_trip);
+  rate_.set_round_trip(round_trip);
+}
+
+bool LinkHalf::acknowledge(std::uint64_t upto, std::uint64_t beyond) {
+  if (upto > last_) return false;
+  acknowledged_ = std::max(acknowledged_, upto);
+  if (upto <= sent_upto_) {
+    window_.acknowledge(upto, beyond);
+    return true;
+  }
+  // It has come over the stream, before any packet held it. What is left was in no packet either.
+  sent_upto_ = std::min(upto, window_.next() - 1);
+  const bool known = window_.restart(sent_upto_);
+  OSTEON_CHECK(known);
+  return true;
+}
+
+bool LinkHalf::begin(std::uint64_t number) {
+  OSTEON_CHECK(number == last_ + 1);
+  last_ = number;
+  if (window_.empty() && window_.next() != number) {
+    // All before went over the stream.
+    window_ = SendWindow(options_.window, number);
+    if (const auto reading = peer_came_ ? clock_.at(*peer_came_) : std::nullopt) window_.set_round_trip(reading->round_trip);
+    sent_upto_ = number - 1;
+  }
+  while (window_.next() < number)
+    if (!window_.push({})) return false;
+  return true;
+}
+
+Time LinkHalf::keep_alive_interval() const {
+  // The other end gives this one up when all packets of `alive_for` were lost: k of them, with loss^k <= 10^-4. One more, as
+  // delays vary.
+  const double loss = std::clamp(rate_.loss(), 0.01, 0.5);
+  const auto packets = static_cast<int>(std::ceil(std::log(1e-4) / std::log(loss))) + 1;
+  return options_.alive_for / packets;
+}
+
+Time LinkHalf::next(Time now, Time wanted) const {
+  if (!sent_at_) return now;
+  if (answer_due_ || news_left_ > 0) wanted = now;
+  if (const auto due = window_.next_due(now, rate_.repeats())) wanted = std::min(wanted, *due);
+  const Time keep_alive = *sent_at_ + keep_alive_interval();
+  // Where nobody answers, packets only ask whether anybody is there again.
+  wanted = alive(now) ? std::min(wanted, keep_alive) : keep_alive;
+  return rate_.next(now, wanted, kFixedBytes + window_.least_room(now));
+}
+
+void LinkHalf::put_times(v1::PacketTimes& times, Time now) const {
+  times.set_sent_us(in_us(now));
+  times.set_heard_counter(newest_);
+  times.set_heard_packets(counts_.packets_received);
+  if (!peer_came_) return;
+  times.set_echo_sent_us(peer_sent_us_);
+  times.set_echo_received_us(in_us(*peer_came_));
+}
+
+std::span<const std::uint8_t> LinkHalf::seal(std::string_view plain, Time now, std::span<std::uint8_t> into) {
+  rate_.sent(now, plain.size() + kSealBytes);
+  sent_at_ = now;
+  answer_due_ = false;
+  news_left_ = std::max(0, news_left_ - 1);
+  return seal_beside(plain, now, into);
+}
+
+std::span<const std::uint8_t> LinkHalf::seal_beside(std::string_view plain, Time now, std::span<std::uint8_t> into) {
+  const auto datagram = sealer_.seal({reinterpret_cast<const std::uint8_t*>(plain.data()), plain.size()}, now, into);
+  ++counts_.packets_sent;
+  counts_.bytes_sent += datagram.size();
+  return datagram;
+}
+
+}  // namespace osteon::wire

@@ -1,0 +1,143 @@
+// What the two ends of the fast path have in common: sealing, when a packet goes, which items it repeats, and what the other
+// end says of those that came. ClientLink and ServerLink add what is in the packets.
+#pragma once
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "common/link/clock_offset.hpp"
+#include "common/link/path_watch.hpp"
+#include "common/link/pose_deadband.hpp"
+#include "common/link/sealed.hpp"
+#include "common/link/send_rate.hpp"
+#include "common/link/send_window.hpp"
+#include "common/wire/packet_filler.hpp"
+
+namespace osteon::wire {
+
+struct LinkOptions {
+  SendRateParams rate;
+  SealRules seal;
+  SendWindowLimits window{.bytes_per_head = kRunBytes};
+  std::uint64_t most_ahead = 1024;  // items that came and wait for one before them
+  // Nothing heard for so long: the link counts as dead, and what it carries goes over the stream as well.
+  std::chrono::nanoseconds alive_for = std::chrono::milliseconds(500);
+  // At 30 % loss each way all challenges are lost in one move of 1000, and the others take less than a second.
+  PathRules path{.retry_after = std::chrono::milliseconds(100), .tries = 6};
+  PoseDeadband deadband;
+  std::chrono::nanoseconds effort_interval = std::chrono::milliseconds(33);   // between forces and the like of one tool
+  std::chrono::nanoseconds state_interval = std::chrono::milliseconds(16);    // between states of one tool that moves
+  std::chrono::nanoseconds times_interval = std::chrono::milliseconds(30);    // between packets that hold times
+};
+// The way down has no limit as tight as the way up, and what a session is told waits for its next packet.
+[[nodiscard]] LinkOptions server_link_options();
+
+struct LinkCounts {
+  std::uint64_t packets_sent = 0, bytes_sent = 0;          // sealed, without headers of UDP and IP
+  std::uint64_t packets_received = 0, bytes_received = 0;  // authentic ones, each once
+  std::uint64_t malformed = 0;      // authentic, but not what a correct peer sends: nothing was taken from them
+  std::uint64_t left_out = 0;       // runs whose tool was not known yet
+  std::uint64_t streamed = 0;       // items that could only go over the stream
+};
+
+// Items are numbered one by one. Those that cannot go in packets come to the other end over the stream, under their number;
+// to the window they are items without bytes, which are acknowledged as all others are. One thread; times since any start,
+// not before it.
+class LinkHalf {
+ public:
+  using Time = std::chrono::nanoseconds;
+
+  // `first`: number of the first item to go out.
+  LinkHalf(std::uint32_t session, const SealKey& out, const SealKey& in, std::uint64_t first, const LinkOptions& options);
+  LinkHalf(const LinkHalf&) = delete;
+  LinkHalf& operator=(const LinkHalf&) = delete;
+
+  // --- what comes
+  // The plain bytes of an authentic datagram that was not here before, within `into` (kMostDatagramBytes).
+  [[nodiscard]] std::optional<Opened> open(std::span<const std::uint8_t> datagram, Time now, std::span<std::uint8_t> into);
+  void malformed() { ++counts_.malformed; }
+  void left_out(std::uint64_t runs) { counts_.left_out += runs; }
+  // What a packet says of ours. What no correct peer says is ignored.
+  template <class Packet>
+  void heard(const Packet& packet, const Opened& opened, Time now) {
+    if (packet.has_times()) heard(packet.times(), opened, now);
+    acknowledge(packet.acknowledged(), packet.acknowledged_beyond());
+  }
+  // The other end is there, by a packet that shows that it can be reached.
+  void is_alive(Time now) { heard_at_ = now; }
+  // See SendWindow::acknowledge; `upto` may lie beyond what ever went in packets. False where no such item exists.
+  bool acknowledge(std::uint64_t upto, std::uint64_t beyond = 0);
+
+  // --- what goes
+  // The next item is this one, and the window is ready for it. False where it has to go over the stream. Every item is
+  // announced here, in order.
+  [[nodiscard]] bool begin(std::uint64_t number);
+  void goes_over_stream() { ++counts_.streamed; }
+  // An acknowledgement has something to say, and goes with the next packet.
+  void answer() { answer_due_ = true; }
+  // News that nobody acknowledges go at once, in so many packets, as some are lost.
+  void repeat_news(int packets) { news_left_ = std::max(news_left_, packets); }
+
+  // When a packet goes, where the end itself wants one at `wanted` (Time::max(): not at all).
+  [[nodiscard]] Time next(Time now, Time wanted) const;
+  // Plain bytes of the packet that goes now.
+  [[nodiscard]] std::size_t room(Time now) const { return rate_.budget(now) - kSealBytes; }
+  // Its beginning. `acknowledged`, `beyond`: of what came (ReceiveWindow).
+  template <class Packet>
+  [[nodiscard]] Packet head(Time now, std::uint64_t acknowledged, std::uint64_t beyond) {
+    Packet packet;
+    if (!timed_at_ || now - *timed_at_ >= options_.times_interval) {
+      put_times(*packet.mutable_times(), now);
+      timed_at_ = now;
+    }
+    packet.set_acknowledged(acknowledged);
+    packet.set_acknowledged_beyond(beyond);
+    return packet;
+  }
+  template <class Packet>
+  void add_items(PacketFiller<Packet>& filler, Time now) {
+    const SendWindow::Picked picked = filler.add_items(window_, now, rate_.repeats());
+    if (!picked.numbers.empty()) sent_upto_ = std::max(sent_upto_, picked.numbers.back());
+  }
+  // The datagram at the beginning of `into` (kMostDatagramBytes), counted as one that went now.
+  std::span<const std::uint8_t> seal(std::string_view plain, Time now, std::span<std::uint8_t> into);
+  // One that goes beside the pace.
+  std::span<const std::uint8_t> seal_beside(std::string_view plain, Time now, std::span<std::uint8_t> into);
+
+  // --- how it fares
+  [[nodiscard]] bool alive(Time now) const { return heard_at_ && now - *heard_at_ < options_.alive_for; }
+  [[nodiscard]] std::uint64_t acknowledged() const { return acknowledged_; }
+  [[nodiscard]] SendWindow& window() { return window_; }
+  [[nodiscard]] const SendWindow& window() const { return window_; }
+  [[nodiscard]] const SendRate& rate() const { return rate_; }
+  [[nodiscard]] std::optional<ClockReading> clock(Time now) const { return clock_.at(now); }
+  [[nodiscard]] const LinkCounts& counts() const { return counts_; }
+  [[nodiscard]] const OpenCounts& open_counts() const { return opener_.counts(); }
+  [[nodiscard]] const LinkOptions& options() const { return options_; }
+
+ private:
+  void heard(const v1::PacketTimes& times, const Opened& opened, Time now);
+  void put_times(v1::PacketTimes& times, Time now) const;
+  [[nodiscard]] Time keep_alive_interval() const;
+
+  const LinkOptions options_;
+  Sealer sealer_;
+  Opener opener_;
+  SendWindow window_;
+  SendRate rate_;
+  ClockOffset clock_;
+  LinkCounts counts_;
+  std::uint64_t last_;          // item that was announced
+  std::uint64_t acknowledged_;  // every item up to this one
+  std::uint64_t sent_upto_;     // every item up to this one was in a packet, or has arrived without
+  std::uint64_t newest_ = 0;    // counter that came
+  // Of the newest packet with times: as it says itself, and when it came.
+  std::uint64_t peer_sent_us_ = 0;
+  std::optional<Time> peer_came_;
+  std::optional<Time> heard_at_, sent_at_, timed_at_;
+  bool answer_due_ = false;
+  int news_left_ = 0;
+};
+
+}  // namespace osteon::wire

@@ -1,0 +1,161 @@
+#include "common/wire/server_link.hpp"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "common/core/check.hpp"
+
+namespace osteon::wire {
+namespace {
+
+using namespace std::chrono_literals;
+using Time = LinkHalf::Time;
+
+constexpr Time kPartnerRefresh = 250ms;  // a state may be lost, and the tool rest
+
+}  // namespace
+
+ServerLink::ServerLink(const SessionKeys& keys, AuthorId author, FillRandom random, std::uint64_t first_author_seq,
+                       std::uint64_t first_index, const LinkOptions& options)
+    : half_(keys.session, keys.down, keys.up, first_index, options),
+      author_(author),
+      path_(std::move(random), options.path),
+      cuts_(first_author_seq, options.most_ahead),
+      decided_(first_author_seq - 1),
+      sender_(half_.window(), tools_) {}
+
+void ServerLink::receive(const Endpoint& from, std::span<const std::uint8_t> datagram, Time now) {
+  DatagramBuffer plain;
+  const auto opened = half_.open(datagram, now, plain);
+  if (!opened) return;
+  // All of it is read before anything is believed.
+  v1::UpPacket packet;
+  if (!packet.ParseFromArray(opened->plain.data(), static_cast<int>(opened->plain.size()))) return half_.malformed();
+  PathToken token{};
+  const std::string& echo = packet.path_echo();
+  if (!echo.empty() && echo.size() != token.size()) return half_.malformed();
+  std::ranges::copy(echo, token.begin());
+  std::vector<Cut> cuts;
+  std::uint64_t left_out = 0;
+  for (const v1::CutRun& run : packet.cuts()) {
+    auto read = cuts_of(run, author_, tools_);
+    if (!read && read.error().code != ErrorCode::not_found) return half_.malformed();
+    if (!read) ++left_out;
+    else std::ranges::move(*read, std::back_inserter(cuts));
+  }
+  if (!std::ranges::all_of(cuts, fits_a_packet)) return half_.malformed();
+  HeardState state = state_;
+  const auto newer = packet.has_state() ? take_over(packet.state(), state) : false;
+  if (!newer) return half_.malformed();
+
+  half_.left_out(left_out);
+  path_.heard(from, opened->newest, datagram.size(), now);
+  if (!echo.empty()) path_.echoed(from, token, now);
+  if (from == path_.address()) half_.is_alive(now);
+  half_.heard(packet, *opened, now);
+  for (Cut& cut : cuts) {
+    const std::uint64_t number = cut.author_seq;
+    cuts_.offer(number, std::move(cut));
+  }
+  if (packet.cuts_size() > 0) half_.answer();
+  if (*newer) {
+    state_ = std::move(state);
+    state_.state.author = author_;
+    state_is_new_ = true;
+  }
+}
+
+void ServerLink::decided(std::uint64_t author_seq) {
+  OSTEON_CHECK(author_seq >= decided_ && author_seq <= cuts_.acknowledged());
+  if (author_seq != decided_) half_.answer();
+  decided_ = author_seq;
+}
+
+std::optional<HeardState> ServerLink::take_state() {
+  if (!std::exchange(state_is_new_, false)) return {};
+  return state_;
+}
+
+bool ServerLink::push(const IndexedRow& row) {
+  const bool fits = row.row.kind != SessionRowKind::streamed && fits_a_packet(row.row.cut);
+  if (half_.begin(row.index) && fits && sender_.push(row.row)) return true;
+  half_.goes_over_stream();
+  return false;
+}
+
+void ServerLink::set_partners(std::span<const HeardState> partners) {
+  std::map<std::uint64_t, Partner> kept;
+  for (const HeardState& state : partners.first(std::min(partners.size(), kMostPartners))) {
+    const std::uint64_t author = state.state.author.value;
+    const auto known = partners_.find(author);
+    Partner& partner = kept[author] = known == partners_.end() ? Partner{} : std::move(known->second);
+    partner.state = state;
+  }
+  partners_ = std::move(kept);
+}
+
+void ServerLink::set_lease_epoch(std::uint64_t epoch) {
+  if (std::exchange(lease_epoch_, epoch) != epoch) half_.repeat_news(half_.rate().repeats());
+}
+
+void ServerLink::set_frozen(bool frozen) {
+  if (std::exchange(frozen_, frozen) != frozen) half_.repeat_news(half_.rate().repeats());
+}
+
+Time ServerLink::due(const Partner& partner) const {
+  const bool is_new = partner.state.state.state_seq > partner.said_seq;
+  return partner.said_at + (is_new ? half_.options().state_interval : kPartnerRefresh);
+}
+
+Time ServerLink::next(Time now) const {
+  if (!path_.address().is_set()) return Time::max();
+  Time wanted = Time::max();
+  for (const auto& [author, partner] : partners_) wanted = std::min(wanted, due(partner));
+  return half_.next(now, wanted);
+}
+
+std::optional<ServerLink::Out> ServerLink::challenge(Time now, std::span<std::uint8_t> into) {
+  constexpr std::size_t kBytes = kSealBytes + 2 + sizeof(PathToken);
+  const auto due = path_.challenge_due(kBytes, now);
+  if (!due) return {};
+  v1::DownPacket packet;
+  packet.set_path_challenge(due->token.data(), due->token.size());
+  const auto bytes = half_.seal_beside(packet.SerializeAsString(), now, into);
+  OSTEON_CHECK(bytes.size() == kBytes);
+  return Out{due->to, bytes};
+}
+
+std::optional<ServerLink::Out> ServerLink::send(Time now, std::span<std::uint8_t> into) {
+  if (auto out = challenge(now, into)) return out;
+  if (next(now) > now) return {};
+  PacketFiller<v1::DownPacket> filler(half_.room(now));
+  auto head = half_.head<v1::DownPacket>(now, decided_, cuts_.beyond(decided_));
+  head.set_lease_epoch(lease_epoch_);
+  head.set_frozen(frozen_);
+  const bool has_room = filler.add(head);
+  OSTEON_CHECK(has_room);
+  // Tools may take half of the room before rows, which are repeated as far as it goes, and then what is left.
+  add_partners(filler, now, std::max(filler.room() / 2, half_.window().least_room(now)));
+  half_.add_items(filler, now);
+  add_partners(filler, now, 0);
+  return Out{path_.address(), half_.seal(filler.take(), now, into)};
+}
+
+void ServerLink::add_partners(PacketFiller<v1::DownPacket>& filler, Time now, std::size_t keep_free) {
+  std::vector<Partner*> waiting;
+  for (auto& [author, partner] : partners_)
+    if (due(partner) <= now) waiting.push_back(&partner);
+  std::ranges::sort(waiting, {}, [](const Partner* partner) { return partner->said_at; });
+  for (Partner* partner : waiting) {
+    const bool with_effort = now - partner->effort_at >= half_.options().effort_interval;
+    v1::DownPacket part;
+    *part.add_partners() = to_tool_state(partner->state.state, partner->state.buttons, with_effort);
+    if (part.ByteSizeLong() + keep_free > filler.room() || !filler.add(part)) continue;
+    partner->said_seq = partner->state.state.state_seq;
+    partner->said_at = now;
+    if (with_effort) partner->effort_at = now;
+  }
+}
+
+}  // namespace osteon::wire

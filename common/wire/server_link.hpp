@@ -1,0 +1,101 @@
+// The room's end of the fast path of one session: the other end of ClientLink. A state machine that is polled: no socket, no
+// clock, no thread.
+#pragma once
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+
+#include "common/link/path_watch.hpp"
+#include "common/link/receive_window.hpp"
+#include "common/wire/cut_run.hpp"
+#include "common/wire/link_half.hpp"
+#include "common/wire/tool_state.hpp"
+
+namespace osteon::wire {
+
+// One thread. `now`: since any start, not before it, the same for all calls.
+class ServerLink {
+ public:
+  using Time = LinkHalf::Time;
+  static constexpr std::size_t kMostPartners = 16;
+
+  // The first cut to come has `first_author_seq`, and the first row to be pushed `first_index`. `random`: for the tokens of
+  // challenges.
+  ServerLink(const SessionKeys& keys, AuthorId author, FillRandom random, std::uint64_t first_author_seq = 1,
+             std::uint64_t first_index = 1, const LinkOptions& options = server_link_options());
+
+  // As the session has been told, or will be, over the stream.
+  [[nodiscard]] ToolNumbers& tools() { return tools_; }
+
+  // Anything may come from anywhere. What is not authentic changes nothing, and nobody hears of it.
+  void receive(const Endpoint& from, std::span<const std::uint8_t> datagram, Time now);
+  // A cut that came over the stream. False: it has come before, or is too far ahead of what was taken.
+  bool offer(const Cut& cut) { return cuts_.offer(cut.author_seq, cut); }
+  // Cuts in order of their author_seq, each once.
+  [[nodiscard]] std::optional<Cut> take_cut() { return cuts_.take(); }
+  // Cuts up to here were decided, and what was decided is kept: they are acknowledged.
+  void decided(std::uint64_t author_seq);
+  // Newest state of the tool, once.
+  [[nodiscard]] std::optional<HeardState> take_state();
+
+  // Every row of the session, in order of its index. False: the client gets it over the stream only, since it is of kind
+  // streamed or too long for a packet, or since too much is unacknowledged. While the link is not alive(), every row above
+  // acknowledged() goes over the stream too.
+  [[nodiscard]] bool push(const IndexedRow& row);
+  // The session's word over the stream: it has taken the rows up to here.
+  void acknowledge(std::uint64_t index) { half_.acknowledge(index); }
+  // The author has left: their cuts come no more.
+  void forget(AuthorId author) { sender_.forget(author); }
+  // Newest states of others' tools; at most kMostPartners count. Who is not among them is not spoken of any more.
+  void set_partners(std::span<const HeardState> partners);
+  void set_lease_epoch(std::uint64_t epoch);
+  void set_frozen(bool frozen);
+
+  struct Out {
+    Endpoint to;
+    std::span<const std::uint8_t> bytes;
+  };
+  // When send() has something beside challenges, at `now` or later; Time::max() before the client's address is proven.
+  // Challenges are due after receive(), and then in turns: send() is called at every turn of the loop.
+  [[nodiscard]] Time next(Time now) const;
+  // What is due, within `into` (kMostDatagramBytes); to be called until there is nothing.
+  [[nodiscard]] std::optional<Out> send(Time now, std::span<std::uint8_t> into);
+
+  // The client is known to be at address(), and was heard from there lately.
+  [[nodiscard]] bool alive(Time now) const { return half_.alive(now); }
+  [[nodiscard]] const Endpoint& address() const { return path_.address(); }
+  [[nodiscard]] std::uint64_t moves() const { return path_.moves(); }
+  // The session has taken the rows up to this one.
+  [[nodiscard]] std::uint64_t acknowledged() const { return half_.acknowledged(); }
+  // The client's clock as seen from here, and the round trip.
+  [[nodiscard]] std::optional<ClockReading> clock(Time now) const { return half_.clock(now); }
+  [[nodiscard]] double loss() const { return half_.rate().loss(); }  // on the way down
+  [[nodiscard]] const LinkHalf& half() const { return half_; }
+
+ private:
+  struct Partner {
+    HeardState state;
+    std::uint64_t said_seq = 0;
+    Time said_at = -std::chrono::hours(1), effort_at = said_at;
+  };
+  [[nodiscard]] Time due(const Partner& partner) const;
+  [[nodiscard]] std::optional<Out> challenge(Time now, std::span<std::uint8_t> into);
+  void add_partners(PacketFiller<v1::DownPacket>& filler, Time now, std::size_t keep_free);
+
+  LinkHalf half_;
+  ToolNumbers tools_;
+  const AuthorId author_;
+  PathWatch path_;
+  ReceiveWindow<Cut> cuts_;
+  std::uint64_t decided_;
+  HeardState state_;
+  bool state_is_new_ = false;
+
+  RowSender sender_;
+  std::map<std::uint64_t, Partner> partners_;  // by author
+  std::uint64_t lease_epoch_ = 0;
+  bool frozen_ = false;
+};
+
+}  // namespace osteon::wire
