@@ -131,7 +131,9 @@ struct JournalCopying {
     } else {
       for (const std::string& name : *names) {
         const auto value = state.source->find_register(name);
-        const Result<void> set = value ? state.target->set_register(name, value->value_or("")) : left_out(value.error());
+        Result<void> set;
+        if (!value) set = left_out(value.error());
+        if (value && *value) set = state.target->set_register(name, **value);
         if (!set) return set;
       }
     }

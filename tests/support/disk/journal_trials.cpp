@@ -278,4 +278,28 @@ Tally failing_disk_trials(std::uint64_t first_seed, std::uint64_t count, int err
   return tally;
 }
 
+Tally forgotten_sync_trials(std::uint64_t first_seed, std::uint64_t count) {
+  Tally tally;
+  for (std::uint64_t seed = first_seed; seed < first_seed + count; ++seed) {
+    std::mt19937_64 random(seed * 2 + 1);
+    MemoryDisk disk(seed, random() % 2 == 0 ? 512 : 4096);
+    JournalWriter writer(seed, disk);
+    if (writer.open()) writer.work(static_cast<int>(random() % 12));
+    disk.fail_sync_at(1, EIO, MemoryDisk::Lasting::from_then_on);
+    if (writer.is_open()) writer.work(20);
+    const bool failed = disk.has_failed();
+    writer.drop();
+    disk.mend();
+    disk.fail_power_at(1 + random() % 24);
+    static_cast<void>(writer.open());
+    writer.drop();
+    disk.power_returns();
+    if (writer.open()) writer.check();
+    tally.closed += writer.is_open() && writer.journal().closed_because() != nullptr ? 1 : 0;
+    writer.drop();
+    add(tally, writer, seed, failed);
+  }
+  return tally;
+}
+
 }  // namespace osteon::test

@@ -82,4 +82,8 @@ struct Tally {
 // Then the process goes, in half of the trials the power too, and the room goes on from what is there.
 [[nodiscard]] Tally failing_disk_trials(std::uint64_t first_seed, std::uint64_t count, int error);
 
+// A sync fails, and nothing can be noted about it; the next process finds what looks written, and the power fails while it
+// opens the journal.
+[[nodiscard]] Tally forgotten_sync_trials(std::uint64_t first_seed, std::uint64_t count);
+
 }  // namespace osteon::test

@@ -56,5 +56,14 @@ TEST(JournalTrials, LosesNothingAcknowledgedWhenTheDiskIsFullAtAnyWrite) {
   EXPECT_GT(tally.closed, 300u);
 }
 
+// What looks written after a failed sync is not: the next process must write it anew before it builds on it.
+TEST(JournalTrials, LosesNothingAcknowledgedWhereAFailedSyncWasForgotten) {
+  const Tally tally = forgotten_sync_trials(1, 1000);
+  show("forgotten sync", tally);
+  expect_nothing_lost(tally);
+  EXPECT_EQ(tally.failed, 1000u);
+  EXPECT_EQ(tally.closed, 0u);
+}
+
 }  // namespace
 }  // namespace osteon::test

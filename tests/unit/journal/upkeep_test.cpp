@@ -266,17 +266,32 @@ TEST(Migration, TakesAFirstVersionIntoACopyWithTheSameChain) {
   EXPECT_EQ(migrate_journal(now, folder / "newer").error().code, ErrorCode::exists);
 }
 
+// What another program has changed in a journal.
+void change(const std::filesystem::path& file, const char* sql) {
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
+  ASSERT_EQ(sqlite3_exec(database, sql, nullptr, nullptr, nullptr), SQLITE_OK);
+  ASSERT_EQ(sqlite3_close(database), SQLITE_OK);
+}
+
 TEST(Migration, RefusesAVersionOfTheFuture) {
   const test::TempDir folder;
   { ASSERT_TRUE(Journal::create(folder / "journal", "bone")->close()); }
-  sqlite3* database = nullptr;
-  ASSERT_EQ(sqlite3_open((folder / "journal").c_str(), &database), SQLITE_OK);
-  ASSERT_EQ(sqlite3_exec(database, "PRAGMA user_version=3", nullptr, nullptr, nullptr), SQLITE_OK);
-  ASSERT_EQ(sqlite3_close(database), SQLITE_OK);
+  change(folder / "journal", "PRAGMA user_version=3");
   const auto opened = Journal::open(folder / "journal");
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::unsupported);
   EXPECT_THAT(opened.error().message, HasSubstr("of version 3, this program reads up to version 2"));
+}
+
+TEST(Migration, RefusesTablesThatAreNotThoseOfTheVersion) {
+  const test::TempDir folder;
+  { ASSERT_TRUE(Journal::create(folder / "journal", "bone")->close()); }
+  change(folder / "journal", "CREATE TRIGGER t AFTER INSERT ON rows BEGIN DELETE FROM rows WHERE place = new.place; END");
+  const auto opened = Journal::open(folder / "journal");
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().code, ErrorCode::invalid_input);
+  EXPECT_THAT(opened.error().message, HasSubstr("how its tables of version 2 are made"));
 }
 
 }  // namespace
