@@ -99,8 +99,8 @@ bool LinkHalf::begin(std::uint64_t number) {
 
 Time LinkHalf::keep_alive_interval() const {
   // The other end gives this one up when all packets of `alive_for` were lost: k of them, with loss^k <= 10^-4. One more, as
-  // delays vary.
-  const double loss = std::clamp(rate_.loss(), 0.01, 0.5);
+  // delays vary. Before anything is known of the path it is taken for a bad one, so that the first packet soon gets through.
+  const double loss = heard_at_ ? std::clamp(rate_.loss(), 0.01, 0.5) : 0.5;
   const auto packets = static_cast<int>(std::ceil(std::log(1e-4) / std::log(loss))) + 1;
   return options_.alive_for / packets;
 }
@@ -113,6 +113,12 @@ Time LinkHalf::next(Time now, Time wanted) const {
   // Where nobody answers, packets only ask whether anybody is there again.
   wanted = alive(now) ? std::min(wanted, keep_alive) : keep_alive;
   return rate_.next(now, wanted, kFixedBytes + window_.least_room(now));
+}
+
+std::size_t LinkHalf::room(Time now) const {
+  constexpr std::size_t kAsking = 280;  // where perhaps nobody hears it
+  const std::size_t budget = rate_.budget(now);
+  return (alive(now) ? budget : std::min(budget, kAsking)) - kSealBytes;
 }
 
 void LinkHalf::put_times(v1::PacketTimes& times, Time now) const {

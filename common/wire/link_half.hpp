@@ -82,7 +82,7 @@ class LinkHalf {
   // When a packet goes, where the end itself wants one at `wanted` (Time::max(): not at all).
   [[nodiscard]] Time next(Time now, Time wanted) const;
   // Plain bytes of the packet that goes now.
-  [[nodiscard]] std::size_t room(Time now) const { return rate_.budget(now) - kSealBytes; }
+  [[nodiscard]] std::size_t room(Time now) const;
   // Its beginning. `acknowledged`, `beyond`: of what came (ReceiveWindow).
   template <class Packet>
   [[nodiscard]] Packet head(Time now, std::uint64_t acknowledged, std::uint64_t beyond) {

@@ -1,0 +1,243 @@
+#include "tests/unit/wire/link_trial.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace osteon::test {
+
+Trial::Trial(const TrialOptions& options)
+    : options_(options), network(time, options.seed), random_(options.seed), server_port(network.open(node(1))) {
+  network.set_quality(options.quality);
+  server_port->on_arrival([this] { hear_server(); });
+  for (std::size_t c = 0; c < kClients; ++c) {
+    const SessionKeys keys = make_session_keys(static_cast<std::uint32_t>(c + 1), seeded(options.seed * 3 + c));
+    clients.push_back(std::make_unique<Client>(c, keys, options));
+    sessions.push_back(std::make_unique<Session>(c, keys, options));
+    for (std::uint32_t tool = 1; tool <= kClients; ++tool) {
+      clients[c]->link.tools().add(tool, tool_of(tool));
+      sessions[c]->link.tools().add(tool, tool_of(tool));
+    }
+    move_client(c, node(2 + c));
+    time.post(Time{}, [this, c] { turn(c); });
+    time.post(kCut / 2 * static_cast<int>(c), [this, c] { make_cuts(c); });
+  }
+  time.post(3ms, [this] { tick(); });
+}
+
+void Trial::move_client(std::size_t c, const Endpoint& to) {
+  clients[c]->port.reset();
+  clients[c]->port = network.open(to);
+  clients[c]->port->on_arrival([this, c] { turn(c); });
+}
+
+bool Trial::settled() const {
+  for (std::size_t c = 0; c < kClients; ++c) {
+    if (sessions[c]->cuts.size() != clients[c]->cuts.size() || sessions[c]->kept != clients[c]->cuts.size()) return false;
+    if (clients[c]->rows.size() != sessions[c]->rows.size()) return false;
+    if (clients[c]->link.acknowledged() != sessions[c]->kept) return false;
+  }
+  return true;
+}
+
+Time Trial::settle(Time patience) {
+  const Time from = time.now();
+  while (!settled() && time.now() - from < patience) time.run_until(time.now() + 10ms);
+  return time.now() - from;
+}
+
+bool Trial::exact() const {
+  for (std::size_t c = 0; c < kClients; ++c) {
+    const auto &came = sessions[c]->cuts, &made = clients[c]->cuts;
+    if (came.size() > made.size() || !std::equal(came.begin(), came.end(), made.begin())) return false;
+    const auto &taken = clients[c]->rows, &told = sessions[c]->rows;
+    if (taken.size() > told.size()) return false;
+    for (std::size_t i = 0; i < taken.size(); ++i)
+      if (taken[i].index != i + 1 || taken[i].row != told[i].row) return false;
+    if (clients[c]->link.acknowledged() > sessions[c]->kept) return false;
+  }
+  return true;
+}
+
+void Trial::stream(Action there) {
+  Time at = time.now() + options_.stream_delay;
+  for (const auto& [from, until] : stream_stops_)
+    if (time.now() >= from && time.now() < until) at = std::max(at, until + 2 * options_.stream_delay);
+  stream_at_ = std::max(stream_at_, at);
+  time.post(stream_at_, std::move(there));
+}
+
+void Trial::wake(std::optional<Time>& wakes_at, Time at, Action action) {
+  if (at == Time::max() || (wakes_at && *wakes_at <= at && *wakes_at > time.now())) return;
+  wakes_at = at;
+  time.post(at, std::move(action));
+}
+
+void Trial::make_cuts(std::size_t c) {
+  Client& client = *clients[c];
+  time.post_in(kCut, [this, c] { make_cuts(c); });
+  CuttingState& state = client.state;
+  ++state.state_seq;
+  state.phase = client.cutting ? CuttingPhase::cutting : CuttingPhase::free;
+  state.tool_name = "drill-3.5";
+  // A hand trembles by less than anyone sees.
+  const Pose tremor{.position_mm = random_.in_cube(0.004)};
+  if (client.cutting) {
+    const std::uint64_t number = client.cuts.size() + 1;
+    Cut cut = options_.cut ? options_.cut(c, number) : drilling(client, number);
+    cut.author = client.author;
+    cut.author_seq = number;
+    state.pose_bone_tool = state.pose_bone_device = dequantise(cut.path.back());
+    client.cuts.push_back(cut);
+    client.made_at.push_back(time.now());
+    client.most_waiting = std::max(client.most_waiting, client.link.half().window().bytes_unacknowledged());
+    if (!client.link.push(cut)) {
+      ++client.refused;
+      stream([this, c, cut] { sessions[c]->link.offer(cut); });
+    }
+  }
+  CuttingState said = state;
+  said.pose_bone_tool.position_mm += tremor.position_mm;
+  client.link.set_state(said, 0);
+  turn(c);
+}
+
+Digest Trial::tool_of(std::uint64_t number) {
+  Digest tool;
+  tool.bytes.fill(static_cast<std::uint8_t>(number));
+  return tool;
+}
+
+Cut Trial::drilling(const Client& client, std::uint64_t number) {
+  Cut cut;
+  cut.lease_epoch = 1 + number / 300;
+  cut.tool = tool_of(client.author.value - 9);
+  cut.spindle_rpm = 1000;
+  cut.path_us = 8000;
+  QuantisedPose pose = client.cuts.empty() ? QuantisedPose{} : client.cuts.back().path.back();
+  cut.path.push_back(pose);
+  for (std::size_t knots = random_.unit() < options_.long_cuts ? 30 : 1 + random_.index(2); knots > 0; --knots) {
+    for (auto& p : pose.position) p += static_cast<std::int32_t>(random_.index(101)) - 50;
+    for (auto& r : pose.rotation) r = static_cast<std::int16_t>(r - static_cast<std::int16_t>(random_.index(21)) + 10);
+    cut.path.push_back(pose);
+  }
+  return cut;
+}
+
+void Trial::turn(std::size_t c) {
+  Client& client = *clients[c];
+  const Time now = time.now();
+  DatagramBuffer buffer;
+  while (const auto got = client.port->receive(buffer)) client.link.receive(got->bytes, now);
+  while (auto row = client.link.take_row()) {
+    const bool of_other = row->row.kind == wire::SessionRowKind::committed && row->row.cut.author != client.author;
+    if (of_other) {
+      const Client& other = *clients[row->row.cut.author.value - 10];
+      const Time since = other.made_at.at(row->row.cut.author_seq - 1);
+      client.felt_ms.push_back(std::chrono::duration<double, std::milli>(now - since).count());
+    }
+    client.rows.push_back(std::move(*row));
+  }
+  if (!client.link.alive(now)) {
+    for (std::uint64_t n = std::max(client.link.acknowledged(), client.streamed_cuts) + 1; n <= client.cuts.size(); ++n) {
+      stream([this, c, cut = client.cuts[n - 1]] { sessions[c]->link.offer(cut); });
+      client.streamed_cuts = n;
+    }
+    if (client.said_rows != client.link.rows_taken()) {
+      client.said_rows = client.link.rows_taken();
+      stream([this, c, upto = client.said_rows] { sessions[c]->link.acknowledge(upto); });
+    }
+  }
+  for (;;) {
+    const auto bytes = client.link.send(now, buffer);
+    if (bytes.empty()) break;
+    client.uplink_bytes += bytes.size() + 28;
+    if (!tap || !tap(c, bytes)) client.port->send(server_port->local(), bytes);
+  }
+  wake(client.wakes_at, client.link.next(now), [this, c] { turn(c); });
+}
+
+void Trial::hear_server() {
+  DatagramBuffer buffer;
+  while (const auto got = server_port->receive(buffer)) {
+    const auto session = session_of(got->bytes);
+    if (!session || *session < 1 || *session > kClients) continue;
+    sessions[*session - 1]->link.receive(got->from, got->bytes, time.now());
+    server_turn(*session - 1);
+  }
+}
+
+void Trial::server_turn(std::size_t c) {
+  Session& session = *sessions[c];
+  DatagramBuffer buffer;
+  while (const auto out = session.link.send(time.now(), buffer)) {
+    session.downlink_bytes += out->bytes.size() + 28;
+    server_port->send(out->to, out->bytes);
+  }
+  wake(session.wakes_at, session.link.next(time.now()), [this, c] { server_turn(c); });
+}
+
+void Trial::tell(std::size_t c, wire::SessionRow row) {
+  Session& session = *sessions[c];
+  session.rows.push_back({session.rows.size() + 1, std::move(row)});
+  if (!session.link.push(session.rows.back())) stream_row(c, session.rows.size());
+}
+
+void Trial::stream_row(std::size_t c, std::uint64_t index) {
+  stream([this, c, row = sessions[c]->rows[index - 1]] {
+    if (clients[c]->link.offer(row)) ++clients[c]->rows_by_stream;
+    turn(c);
+  });
+}
+
+void Trial::tick() {
+  time.post_in(kTick, [this] { tick(); });
+  std::vector<std::pair<std::size_t, Cut>> decided;
+  for (std::size_t c = 0; c < kClients; ++c) {
+    while (auto cut = sessions[c]->link.take_cut()) {
+      sessions[c]->cuts.push_back(*cut);
+      decided.emplace_back(c, std::move(*cut));
+    }
+  }
+  const bool event = random_.unit() < options_.events;
+  if (!decided.empty() || event) time.post_in(kKeep, [this, decided, event] { keep(decided, event); });
+  for (std::size_t c = 0; c < kClients; ++c) {
+    Session& session = *sessions[c];
+    if (auto state = sessions[c]->link.take_state()) {
+      const std::vector<wire::HeardState> partners{*state};
+      sessions[1 - c]->link.set_partners(partners);
+    }
+    if (!session.link.alive(time.now())) {
+      for (std::uint64_t i = std::max(session.link.acknowledged(), session.streamed_rows) + 1; i <= session.rows.size(); ++i)
+        stream_row(c, session.streamed_rows = i);
+      if (session.said_kept != session.kept) {
+        session.said_kept = session.kept;
+        stream([this, c, upto = session.kept] { clients[c]->link.acknowledge(upto); });
+      }
+    }
+    server_turn(c);
+  }
+}
+
+void Trial::keep(const std::vector<std::pair<std::size_t, Cut>>& decided, bool event) {
+  for (const auto& [author, cut] : decided) {
+    const RoomSeq seq{++room_seq_};
+    if (options_.reject_each != 0 && cut.author_seq % options_.reject_each == 0) {
+      tell(author, {.room_seq = seq, .kind = wire::SessionRowKind::rejected, .author_seq = cut.author_seq, .reason = 3,
+                    .lease_epoch = 1 + cut.author_seq / 300});
+    } else {
+      for (std::size_t c = 0; c < kClients; ++c)
+        tell(c, {.room_seq = seq, .kind = wire::SessionRowKind::committed, .cut = cut});
+    }
+    sessions[author]->kept = cut.author_seq;
+  }
+  if (event) {
+    const RoomSeq seq{++room_seq_};
+    for (std::size_t c = 0; c < kClients; ++c) tell(c, {.room_seq = seq, .kind = wire::SessionRowKind::streamed});
+  }
+  for (std::size_t c = 0; c < kClients; ++c) {
+    sessions[c]->link.decided(sessions[c]->kept);
+    server_turn(c);
+  }
+}
+
+}  // namespace osteon::test
