@@ -1,15 +1,22 @@
 #include "tests/fuzz/targets.hpp"
 
+#include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "common/core/check.hpp"
+#include "common/wire/client_link.hpp"
 #include "common/wire/convert.hpp"
+#include "common/wire/server_link.hpp"
 #include "tests/fuzz/datagram_target.hpp"
 
 namespace osteon::fuzz {
 namespace {
+
+using namespace std::chrono_literals;
 
 Bytes bytes_of(const std::string& text) { return {text.begin(), text.end()}; }
 
@@ -83,6 +90,92 @@ void decode_any_block(std::span<const std::uint8_t> data) {
     for (const std::uint32_t vertex : triangle) OSTEON_CHECK(vertex < mesh->positions_mm.size());
 }
 
+// What a peer with the key says, whatever it is, neither ends the other end of the fast path nor makes it grow.
+SessionKeys link_keys() {
+  return make_session_keys(3, [](std::span<std::uint8_t> bytes) { std::ranges::fill(bytes, std::uint8_t{0x3c}); });
+}
+
+wire::ServerLink server_end() {
+  return {link_keys(), {1}, [](std::span<std::uint8_t> bytes) { std::ranges::fill(bytes, std::uint8_t{0x7e}); }};
+}
+
+void as_up_packet(std::span<const std::uint8_t> plain) {
+  wire::ServerLink link = server_end();
+  Cut cut = a_cut();
+  for (; cut.author_seq <= 3; ++cut.author_seq)
+    OSTEON_CHECK(link.push({cut.author_seq, {.room_seq = {9}, .kind = wire::SessionRowKind::committed, .cut = cut}}));
+  Sealer sealer(link_keys().session, link_keys().up);
+  DatagramBuffer buffer;
+  const Endpoint client{0, 1, 1};
+  for (auto now = 1000ms; now < 1020ms; now += 5ms) {
+    link.receive(client, sealer.seal(plain, now, buffer), now);
+    while (const auto out = link.send(now, buffer)) OSTEON_CHECK(out->to == client && out->bytes.size() <= kMostDatagramBytes);
+    while (const auto taken = link.take_cut()) OSTEON_CHECK(wire::fits_a_packet(*taken));
+    (void)link.take_state();
+  }
+  OSTEON_CHECK(link.acknowledged() <= 3);
+}
+
+void as_down_packet(std::span<const std::uint8_t> plain) {
+  wire::ClientLink link(link_keys());
+  OSTEON_CHECK(link.push(a_cut()));
+  Sealer sealer(link_keys().session, link_keys().down);
+  DatagramBuffer buffer;
+  for (auto now = 1000ms; now < 1040ms; now += 10ms) {
+    link.receive(sealer.seal(plain, now, buffer), now);
+    OSTEON_CHECK(link.send(now, buffer).size() <= kMostDatagramBytes);
+    while (const auto row = link.take_row()) OSTEON_CHECK(wire::fits_a_packet(row->row.cut));
+    OSTEON_CHECK(link.partners(now).size() <= wire::ClientLink::kMostPartners);
+  }
+  OSTEON_CHECK(link.acknowledged() <= 1);
+}
+
+CuttingState a_state() {
+  CuttingState state;
+  state.author = {4};
+  state.state_seq = 3;
+  state.tool_name = "drill";
+  state.pose_bone_device.position_mm.z() = -0.5;
+  return state;
+}
+
+// Packets as the two ends make them, with everything in them that there is.
+Bytes an_up_packet() {
+  SendWindow window;
+  const wire::ToolNumbers tools;
+  wire::CutSender sender(window, tools);
+  OSTEON_CHECK(sender.push(a_cut()));
+  v1::UpPacket packet;
+  packet.set_acknowledged_beyond(5);
+  packet.mutable_times()->set_sent_us(1'000'000);
+  packet.set_path_echo(std::string(16, '\x7e'));
+  *packet.mutable_state() = wire::to_tool_state(a_state(), 1, true);
+  packet.add_cuts()->ParseFromString(window.item(1).head);
+  packet.mutable_cuts(0)->set_cuts(window.item(1).bytes);
+  return bytes_of(packet.SerializeAsString());
+}
+
+Bytes a_down_packet() {
+  SendWindow window;
+  const wire::ToolNumbers tools;
+  wire::RowSender sender(window, tools);
+  OSTEON_CHECK(sender.push({.room_seq = {1}, .kind = wire::SessionRowKind::committed, .cut = a_cut()}));
+  OSTEON_CHECK(sender.push({.room_seq = {2}, .kind = wire::SessionRowKind::rejected, .author_seq = 2, .reason = 1}));
+  v1::DownPacket packet;
+  OSTEON_CHECK(packet.ParseFromString(window.item(2).bytes));
+  packet.mutable_times()->set_sent_us(1'000'000);
+  packet.set_lease_epoch(1);
+  *packet.add_partners() = wire::to_tool_state(a_state(), 1, true);
+  packet.add_rows()->ParseFromString(window.item(1).head);
+  packet.mutable_rows(0)->set_rows(window.item(1).bytes);
+  return bytes_of(packet.SerializeAsString());
+}
+
+Target named(std::string name, Target target) {
+  target.name = std::move(name);
+  return target;
+}
+
 }  // namespace
 
 std::vector<Target> targets() {
@@ -95,7 +188,8 @@ std::vector<Target> targets() {
           {"look",
            parse_and_convert<v1::Look>,
            {bytes_of(wire::to_wire(Look{{1, 2, 3}, {4, 5, 6}, 0.001, 0.3}).SerializeAsString())}},
-          datagram_target(),
+          named("up_packet", datagram_target(as_up_packet, {an_up_packet()})),
+          named("down_packet", datagram_target(as_down_packet, {a_down_packet()})),
           {"mesh_block", decode_any_block, {a_block().bytes, a_seamed_block().bytes}}};
 }
 
