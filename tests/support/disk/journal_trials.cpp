@@ -94,7 +94,8 @@ bool JournalWriter::write_checkpoint() {
   auto file = journal_->begin_checkpoint(journal_->head(), "meta");
   if (!file) return file.error().code == ErrorCode::exists && !disk_.has_failed();
   for (std::uint64_t pieces = below(4); pieces > 0; --pieces) {
-    const std::string piece(below(2000), static_cast<char>(random_()));
+    const std::size_t size = below(2000);
+    const std::string piece(size, static_cast<char>(random_()));
     bytes += piece;
     if (!file->write(piece)) return false;
   }
@@ -222,7 +223,8 @@ Tally power_loss_trials(std::uint64_t first_seed, std::uint64_t count, bool dura
     bool failed = false;
     const std::uint64_t lives = 1 + random() % 3;
     for (std::uint64_t life = 0; life < lives; ++life) {
-      disk.fail_power_at(1 + random() % (life == 0 && random() % 8 == 0 ? 30 : 400));
+      const bool soon = life == 0 && random() % 8 == 0;  // while it is made
+      disk.fail_power_at(1 + random() % (soon ? 30 : 400));
       if (writer.open() && (life == 0 || writer.journal().closed_because() == nullptr)) writer.work(60);
       failed = failed || disk.has_failed();
       writer.drop();

@@ -74,7 +74,7 @@ TEST_F(UpkeepTest, ASoundJournalIsFoundSoundAndIsLeftAsItWas) {
 
 TEST_F(UpkeepTest, TheFirstBadRowIsNamed) {
   make(true);
-  const std::string& bytes = disk_.image().at(kFile);
+  const std::string bytes = disk_.image().at(kFile);
   const std::size_t at = bytes.find(rows_[17].bytes);
   ASSERT_NE(at, std::string::npos);
   disk_.flip_bit(kFile, 8 * at + 3);
