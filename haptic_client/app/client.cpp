@@ -102,6 +102,7 @@ class Client {
     replica.join();
     all_over_ = true;
     reporter.join();
+    outcome_.fast_path = room_.fast_path();
     room_.close();
     {
       const std::lock_guard lock(mutex_);

@@ -38,6 +38,7 @@ struct ClientOutcome {
   double removed_total_mm3 = 0;
   std::uint64_t rejected = 0, patches = 0, uncovered_ticks = 0, cuts_waiting_ticks = 0, rows_dropped = 0;
   std::uint64_t held_for_room_ticks = 0;  // in which the spindle was held because the room did not follow
+  FastPathHealth fast_path;
   std::uint64_t interruptions = 0;        // of the line to the room, after which it stood again
   double patch_p50_us = 0, patch_p99_us = 0;
   Recorder::Outcome recording;

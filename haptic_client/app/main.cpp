@@ -128,6 +128,13 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string
             {"cuts_waiting_ticks", outcome.cuts_waiting_ticks}}},
           {"held_for_room_ticks", outcome.held_for_room_ticks},
           {"interruptions", outcome.interruptions},
+          {"fast_path",
+           {{"alive", outcome.fast_path.alive},
+            {"round_trip_ms", outcome.fast_path.round_trip_ms},
+            {"loss", outcome.fast_path.loss},
+            {"packets_sent", outcome.fast_path.packets_sent},
+            {"bytes_sent", outcome.fast_path.bytes_sent},
+            {"packets_received", outcome.fast_path.packets_received}}},
           {"rows_dropped", outcome.rows_dropped},
           {"recording",
            {{"rows", outcome.recording.rows}, {"dropped", outcome.recording.dropped}, {"trouble", outcome.recording.trouble}}},
@@ -269,6 +276,8 @@ int main(int argc, char** argv) {
                  "file that is there is left alone");
   app.add_option("--cut-log", options.cut_log, "CSV with a row for each cut");
   app.add_option("--summary", options.summary, "JSON written at the end: steps, forces, loop times, field hash");
+  app.add_option("--fast-path", options.room.fast_path,
+                 "HOST:PORT for the sealed datagrams beside the stream, or off; by default the port that the server says");
   app.add_option("--cache", options.room.cache, "Folder where fetched cases are kept")->capture_default_str();
   app.add_option("--patience", options.patience_s, "Seconds to wait for the server")->capture_default_str();
   app.add_flag("--status", options.client.status, "A short line on standard output each second");

@@ -41,6 +41,8 @@ void Replica::add_own(const Cut& cut) {
 }
 
 void Replica::commit(RoomSeq place, const Cut& cut, bool own) {
+  // An answer that was given again: the bone has had this cut, and may have lost it to an undo since.
+  if (place <= room_seq_) return;
   room_seq_ = place;
   for (auto& [id, held] : bodies_) held.committed.apply(cut);
   if (own) {

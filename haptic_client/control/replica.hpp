@@ -30,7 +30,8 @@ class Replica {
   void restore(const FieldLeaf& leaf);                          // part of the field at the time of joining
   void joined(RoomSeq contained) { room_seq_ = contained; }     // all leaves were given
   void add_own(const Cut& cut);                                 // predicted at once
-  void commit(RoomSeq place, const Cut& cut, bool own);         // in room_seq order; own ones leave the prediction
+  // In room_seq order, and nothing for a place that was passed; own ones leave the prediction.
+  void commit(RoomSeq place, const Cut& cut, bool own);
   // Of our own: what it took comes back with settle(). False when it was no longer pending, as after an undo.
   bool reject(RoomSeq place, std::uint64_t author_seq);
   // Part of an event that changed the bone otherwise: leaves as they are committed now, and the bodies that exist.

@@ -24,6 +24,8 @@ class CutsUnderway {
   void stop() { may_go_ = false; }
   // The room has decided all cuts up to this one; the others go from the first on.
   void go_on(std::uint64_t decided);
+  // The line that had them may not have brought them: all that are undecided go once more.
+  void again() { next_ = 0; }
   // Decided: committed or rejected.
   void decided(std::uint64_t author_seq);
 

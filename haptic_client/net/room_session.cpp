@@ -11,6 +11,7 @@
 #include <fstream>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <thread>
 #include <utility>
 
@@ -18,6 +19,7 @@
 #include "common/link/backoff.hpp"
 #include "common/wire/convert.hpp"
 #include "haptic_client/net/cuts_underway.hpp"
+#include "haptic_client/net/fast_path.hpp"
 #include "haptic_client/net/session_reader.hpp"
 #include "osteon/v1/cutting.grpc.pb.h"
 #include "osteon/v1/room.grpc.pb.h"
@@ -33,6 +35,10 @@ constexpr auto kCaseSilence = 60s;  // a whole case takes no longer on one machi
 
 Error cannot_cache(const fs::path& path, const std::string& why) {
   return {ErrorCode::internal, "cannot keep the case in the cache: " + path.string() + ": " + why + "; give another folder with --cache"};
+}
+
+std::span<const std::uint8_t> bytes_of(const std::string& text) {
+  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
 // Writes the case's files as they come. A correct server sends these names and no others.
@@ -154,7 +160,8 @@ fs::path default_case_cache() {
 }
 
 struct RoomSession::Impl {
-  Impl(wire::JoinedRoom r, Case b) : room(std::move(r)), bone(std::move(b)), joined(room) {}
+  Impl(wire::JoinedRoom r, Case b, RoomSessionOptions o)
+      : room(std::move(r)), bone(std::move(b)), options(std::move(o)), joined(room) {}
 
   // A stream, from its opening to its end.
   struct Line {
@@ -166,8 +173,16 @@ struct RoomSession::Impl {
   // Reads until the stream ends; why it did.
   grpc::Status serve(Line& line, std::optional<Error>& broken);
   void write(Line& line);
+  // What a stream brings for the session itself.
+  void follow(const v1::SessionResponse& response);
+  void open_fast_path(std::uint64_t decided);
+  void close_fast_path();
   // Until it succeeds or the session is closed. Error: the server answers, and refuses.
   Result<void> join_again();
+  [[nodiscard]] std::shared_ptr<FastPath> fast_path() const {
+    const std::lock_guard lock(fast_mutex);
+    return fast;
+  }
   [[nodiscard]] bool ends() const {
     const std::lock_guard lock(mutex);
     return over || closing;
@@ -175,6 +190,7 @@ struct RoomSession::Impl {
 
   const wire::JoinedRoom room;
   Case bone;
+  const RoomSessionOptions options;
   std::shared_ptr<ToolBox> tools = builtin_tool_box();  // shared with the replica's fields
   RoomEvents events;
 
@@ -182,7 +198,13 @@ struct RoomSession::Impl {
   std::thread thread;
   // Of that thread.
   wire::JoinedRoom joined;                    // newest
+  std::optional<v1::LinkOffer> offer;         // of the present stream
+
+  // Order: read_mutex, then mutex, then fast_mutex.
+  std::mutex read_mutex;                      // what comes is passed on by one thread at a time
   std::optional<SessionReader> reader;
+  mutable std::mutex fast_mutex;
+  std::shared_ptr<FastPath> fast;             // of the present stream; held by those who use it just now
 
   mutable std::mutex mutex;
   std::condition_variable wake;
@@ -198,21 +220,68 @@ void RoomSession::Impl::write(Line& open) {
   request.mutable_open()->set_server_epoch(joined.server_epoch);
   request.mutable_open()->set_secret(joined.secret);
   bool written = open.stream->Write(request);
+  std::optional<Cut> cut;
+  std::optional<CuttingState> state;
   while (written) {
     {
       std::unique_lock lock(mutex);
       wake.wait(lock, [&] { return underway.something_to_send() || closing || over || line != &open; });
       if (over || line != &open) break;
-      if (const std::optional<Cut> cut = underway.take_cut())
-        *request.mutable_cut() = wire::to_wire(*cut);
-      else if (const std::optional<CuttingState> state = underway.take_state())
-        *request.mutable_state() = wire::to_wire(*state);
-      else
-        break;
+      cut = underway.take_cut();
+      state = cut ? std::nullopt : underway.take_state();
+      if (!cut && !state) break;
     }
+    if (const std::shared_ptr<FastPath> path = fast_path(); path && (cut ? path->send(*cut) : path->send(*state))) continue;
+    if (cut)
+      *request.mutable_cut() = wire::to_wire(*cut);
+    else
+      *request.mutable_state() = wire::to_wire(*state);
     written = open.stream->Write(request);
   }
   open.stream->WritesDone();
+}
+
+void RoomSession::Impl::follow(const v1::SessionResponse& response) {
+  if (response.has_link()) offer = response.link();
+  if (response.has_complete()) open_fast_path(response.complete().decided_author_seq());
+  const std::shared_ptr<FastPath> path = fast_path();
+  if (path && response.index() != 0) path->heard(response.index());
+}
+
+// Where there is none, the stream carries all.
+void RoomSession::Impl::open_fast_path(std::uint64_t decided) {
+  if (!offer || options.fast_path == "off") return;
+  const std::optional<SealKey> up = key_of(bytes_of(offer->key_up())), down = key_of(bytes_of(offer->key_down()));
+  if (!up || !down) return;
+  const std::string& at = options.fast_path.empty() ? options.address : options.fast_path;
+  std::string host = at.substr(0, at.rfind(':'));
+  if (host.size() > 2 && host.front() == '[') host = host.substr(1, host.size() - 2);
+  const std::uint32_t port = options.fast_path.empty() ? offer->udp_port()
+                                                       : static_cast<std::uint32_t>(std::strtoul(at.c_str() + at.rfind(':') + 1, nullptr, 10));
+  Result<std::unique_ptr<FastPath>> opened = FastPath::open(
+      host, static_cast<std::uint16_t>(port), {offer->session(), *up, *down}, decided + 1,
+      [this](wire::IndexedRow row) {
+        const std::lock_guard lock(read_mutex);
+        (void)reader->take(std::move(row));
+      },
+      [this] {
+        const std::lock_guard lock(mutex);
+        underway.again();
+        wake.notify_all();
+      });
+  if (!opened) return;
+  const std::lock_guard lock(fast_mutex);
+  fast = std::move(*opened);
+}
+
+void RoomSession::Impl::close_fast_path() {
+  std::shared_ptr<FastPath> closing_path;
+  {
+    const std::lock_guard lock(fast_mutex);
+    closing_path = std::move(fast);
+  }
+  // Before it is let go: whoever else holds it for a moment may be its own thread.
+  if (closing_path) closing_path->stop();
 }
 
 grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) {
@@ -223,7 +292,11 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
     line = &open;
     underway.stop();
   }
-  reader->begin();
+  {
+    const std::lock_guard lock(read_mutex);
+    reader->begin();
+  }
+  offer.reset();
   std::thread writer([&] { write(open); });
   v1::SessionResponse response;
   while (!broken && open.stream->Read(&response)) {
@@ -231,7 +304,12 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
       const std::lock_guard lock(mutex);
       if (over) break;
     }
-    if (const Result<void> delivered = reader->take(std::move(response)); !delivered) {
+    follow(response);
+    const Result<void> delivered = [&] {
+      const std::lock_guard lock(read_mutex);
+      return reader->take(std::move(response));
+    }();
+    if (!delivered) {
       broken = Error{delivered.error().code, "the server sent what no correct server sends: " + delivered.error().message};
       open.context.TryCancel();
     }
@@ -241,6 +319,7 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
     line = nullptr;
     wake.notify_all();
   }
+  close_fast_path();
   // Finish waits for the status, which comes once the writer has stopped.
   writer.join();
   return open.stream->Finish();
@@ -329,7 +408,7 @@ Result<RoomSession> RoomSession::join(const RoomSessionOptions& options, const s
   if (!room) return tl::unexpected(room.error());
   Result<Case> bone = fetch_case(*room, options.cache, stop);
   if (!bone) return tl::unexpected(bone.error());
-  auto impl = std::make_unique<Impl>(std::move(*room), std::move(*bone));
+  auto impl = std::make_unique<Impl>(std::move(*room), std::move(*bone), options);
   if (Result<void> fetched = fetch_tools(impl->room, *impl->tools); !fetched) return tl::unexpected(fetched.error());
   return RoomSession(std::move(impl));
 }
@@ -358,6 +437,7 @@ void RoomSession::open(RoomEvents events) {
   impl.reader.emplace(
       impl.room.author, impl.tools, events,
       [&impl](std::uint64_t author_seq) {
+        if (const std::shared_ptr<FastPath> path = impl.fast_path()) path->decided(author_seq);
         const std::lock_guard lock(impl.mutex);
         impl.underway.decided(author_seq);
       },
@@ -384,11 +464,17 @@ void RoomSession::send(const CuttingState& state) {
   impl_->wake.notify_all();
 }
 
+FastPathHealth RoomSession::fast_path() const {
+  const std::shared_ptr<FastPath> path = impl_->fast_path();
+  return path ? path->health() : FastPathHealth{};
+}
+
 void RoomSession::close() {
   if (!impl_ || !impl_->thread.joinable()) return;
   {
     std::unique_lock lock(impl_->mutex);
     impl_->closing = true;
+    impl_->underway.again();  // what went only in datagrams, too
     impl_->wake.notify_all();
     // The server ends the stream when it has decided what was sent; one that does not is not waited for.
     impl_->wake.wait_for(lock, kCloseTime, [&] { return impl_->over; });

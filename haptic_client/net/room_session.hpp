@@ -29,6 +29,15 @@ struct RoomSessionOptions {
   std::string name = "haptic";          // shown to others
   std::chrono::milliseconds patience{5000};
   std::filesystem::path cache = default_case_cache();  // one folder per case, named by its hash
+  // Sealed datagrams beside the stream: to the port that the server says, to this HOST:PORT instead, or "off".
+  std::string fast_path;
+};
+
+// How the fast path fares.
+struct FastPathHealth {
+  bool offered = false, alive = false;
+  double round_trip_ms = 0, loss = 0;  // loss: on the way up
+  std::uint64_t packets_sent = 0, bytes_sent = 0, packets_received = 0, bytes_received = 0;
 };
 
 class RoomSession {
@@ -57,6 +66,7 @@ class RoomSession {
   [[nodiscard]] bool send(const Cut& cut);
   // Newest wins: a state that is still waiting is replaced. Cuts that are waiting go first.
   void send(const CuttingState& state);
+  [[nodiscard]] FastPathHealth fast_path() const;
   // Ends the stream after what is waiting was sent, at most a second, and joins the thread. Again: does nothing.
   void close();
 

@@ -25,6 +25,9 @@ SessionReader::SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomE
 void SessionReader::begin() { rows_ = ReceiveWindow<Row>(); }
 
 Result<void> SessionReader::take(v1::SessionResponse response) {
+  // An answer outside the order: what it tells of is in the leaves, or came before.
+  if (response.index() == 0 && response.has_committed()) return decided_(response.committed().cut().author_seq()), Result<void>{};
+  if (response.index() == 0 && response.has_rejected()) return decided_(response.rejected().author_seq()), Result<void>{};
   if (response.index() == 0) return deliver(response);
   const std::uint64_t index = response.index();
   rows_.offer(index, std::move(response));

@@ -39,7 +39,7 @@ struct Options {
   Detail detail = Detail::automatic;
 };
 
-void log_health(const HostHealth& health) {
+void log_health(const HostHealth& health, const LinkServerHealth& links) {
   log::info("health", {{"room_seq", health.room_seq.value},
                        {"committed", health.counts.committed},
                        {"rejected", health.counts.rejected},
@@ -52,7 +52,14 @@ void log_health(const HostHealth& health) {
                        {"furthest_behind", health.furthest_behind},
                        {"sessions", health.sessions},
                        {"mesh_streams", health.mesh_streams},
-                       {"cutting_streams", health.cutting_streams}});
+                       {"cutting_streams", health.cutting_streams},
+                       {"waiting_rows", health.waiting_rows},
+                       {"commit_p99_us", health.commit.percentile_us(99)},
+                       {"links", links.links},
+                       {"links_alive", links.alive},
+                       {"datagrams_in", links.port.received},
+                       {"datagrams_out", links.port.sent},
+                       {"strangers", links.strangers}});
 }
 
 nlohmann::json durations(const DurationHistogram& histogram) {
@@ -174,17 +181,18 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   }();
   if (!server) return tl::unexpected(server.error());
   log::info("listening", {{"address", (*server)->address()},
+                          {"udp_port", (*server)->link_port()},
                           {"surface_blocks", (*server)->health().blocks},
                           {"surface_bytes", (*server)->health().surface_bytes}});
   if (!options.address_file.empty())
     if (Result<void> written = write_file(options.address_file, (*server)->address() + "\n"); !written)
       return tl::unexpected(written.error());
 
-  while (!stop.wait_for(kHealthEvery)) log_health((*server)->health());
+  while (!stop.wait_for(kHealthEvery)) log_health((*server)->health(), (*server)->link_health());
 
   log::info("stopping");
   const RoomServerSummary summary = (*server)->stop();
-  log_health(summary.health);
+  log_health(summary.health, {});
   if (!options.save_file.empty())
     if (Result<void> saved = save_fields(options.save_file, summary.fields); !saved) return saved;
   if (options.summary_file.empty()) return {};

@@ -184,16 +184,25 @@ void RoomHost::Impl::decide(QueuedCut& queued) {
                                          : rejection_row(outcome->room_seq, queued.cut.author_seq, outcome->lease_epoch,
                                                          outcome->rejection);
   tell_kept(room.time());
-  later([this, sink = queued.sink, row, place = outcome->room_seq, repeated = outcome->repeated,
+  wire::SessionRow fast{.room_seq = outcome->room_seq, .kind = wire::SessionRowKind::committed};
+  if (outcome->committed()) {
+    fast.cut = queued.cut;
+  } else {
+    fast.kind = wire::SessionRowKind::rejected;
+    fast.author_seq = queued.cut.author_seq;
+    fast.reason = static_cast<std::uint32_t>(outcome->rejection);
+    fast.lease_epoch = outcome->lease_epoch;
+  }
+  later([this, sink = queued.sink, row, fast = std::move(fast), place = outcome->room_seq, repeated = outcome->repeated,
          to_all = outcome->committed()](const Result<void>& durable) {
     if (durable) {
       const std::lock_guard lock(sessions_mutex);
       // The author may have come back on another stream meanwhile.
       const auto author = open_authors.find(sink->author());
       if (!repeated && to_all)
-        sessions.each([&](SessionSink& one) { one.offer(place, row); });
+        sessions.each([&](SessionSink& one) { one.offer(place, row, fast); });
       else if (author != open_authors.end())
-        repeated ? author->second->answer(row) : author->second->offer(place, row);
+        repeated ? author->second->answer(row) : author->second->offer(place, row, fast);
     }
     sink->decided();
   });
@@ -219,7 +228,9 @@ void RoomHost::Impl::decide(QueuedEvent& queued) {
     {
       const std::lock_guard lock(sessions_mutex);
       for (const Bytes& row : rows)
-        sessions.each([&](SessionSink& sink) { sink.offer(event->room_seq, row); });
+        sessions.each([&](SessionSink& sink) {
+          sink.offer(event->room_seq, row, {.room_seq = event->room_seq, .kind = wire::SessionRowKind::streamed});
+        });
     }
     answer(event);
   });
@@ -326,6 +337,8 @@ HostHealth RoomHost::health() const {
   health.surface_bytes = mesh.surface_bytes;
   health.furthest_behind = std::max(health.furthest_behind, mesh.furthest_behind);
   health.cutting_streams = impl_->board.streams();
+  health.waiting_rows = impl_->committer.waiting();
+  health.commit = impl_->committer.commit_times();
   {
     const std::shared_lock lock(impl_->room_mutex);
     health.stale_blocks = impl_->room.stale_blocks();
@@ -574,7 +587,7 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, co
       return failure(ErrorCode::invalid_input,
                      "open.author " + std::to_string(sink->author().value) + " has an open session; join again for another");
     if (open) {
-      open->end("a newer connection has taken its place");
+      open->replaced("another connection of the same client has taken its place");
       impl_->sessions.remove(*open);
     }
     open = sink.get();

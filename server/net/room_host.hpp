@@ -12,6 +12,7 @@
 #include "common/mechanics/cutting_state.hpp"
 #include "common/runtime/tick_stats.hpp"
 #include "common/surface/look.hpp"
+#include "common/wire/cut_run.hpp"
 #include "server/net/mesh_room.hpp"
 #include "server/net/committer.hpp"
 #include "server/net/room_keeper.hpp"
@@ -32,8 +33,12 @@ class SessionSink : public StreamSink {
   // change when its row is applied again.
   virtual void set_leaves(std::vector<FieldLeaf> leaves) = 0;
   virtual void offer(RoomSeq place, const Bytes& row) = 0;  // a whole SessionResponse
+  // The same, with what goes in few bytes of it.
+  virtual void offer(RoomSeq place, const Bytes& row, const wire::SessionRow& /*fast*/) { offer(place, row); }
   virtual void answer(const Bytes& row) = 0;                // the same, outside the room's order
   virtual void refuse(const Error& why) = 0;                // a breach of the protocol: the stream ends
+  // Another stream of its author was opened. That may be one that was given up and came late, so the author may come again.
+  virtual void replaced(const std::string& why) { end(why); }
   virtual void decided() = 0;                               // one queued cut has left the queue
 };
 
@@ -52,6 +57,8 @@ struct HostHealth {
   RoomCounts counts;
   std::size_t sessions = 0, mesh_streams = 0, cutting_streams = 0;
   std::size_t queued_cuts = 0, stale_blocks = 0;
+  std::size_t waiting_rows = 0;     // decided and not yet kept
+  DurationHistogram commit;         // of the journal's transactions
   std::size_t furthest_behind = 0;  // rows or blocks that wait for the slowest reader
   std::size_t blocks = 0;
   std::size_t surface_bytes = 0;    // of the newest blocks: what a viewer that joins is sent

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "common/runtime/log.hpp"
+#include "server/net/link_server.hpp"
 #include "server/net/services.hpp"
 
 namespace osteon {
@@ -110,6 +111,7 @@ constexpr int kShortestPingMs = 500;               // clients may ask that often
 struct RoomServer::Impl {
   std::unique_ptr<RoomKeeper> keeper;  // outlives the host, which writes to it
   std::unique_ptr<RoomHost> host;
+  std::unique_ptr<LinkServer> links;   // outlives the streams
   std::vector<std::unique_ptr<grpc::Service>> services;
   std::unique_ptr<grpc::Server> server;
   std::string address;
@@ -157,8 +159,14 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(Room room, const RoomServe
   const std::uint64_t epoch = keeper ? keeper->server_epoch() : new_server_epoch();
   impl->keeper = std::move(keeper);
   impl->host = std::make_unique<RoomHost>(std::move(room), options.rates, progress, options.detail, impl->keeper.get());
+  // Beside the streams; without it all goes over them.
+  const Result<HostPort> at = parse_listen(options.listen);
+  if (Result<std::unique_ptr<LinkServer>> links = LinkServer::open(at->host == "localhost" || at->host == "[::1]" ? at->host == "[::1]" ? "::1" : "127.0.0.1" : at->host); links)
+    impl->links = std::move(*links);
+  else
+    log::warn("no fast path", {{"reason", links.error().message}});
   impl->services.push_back(make_room_service(*impl->host, {options.case_folder, options.save}, epoch));
-  impl->services.push_back(make_cutting_service(*impl->host, epoch));
+  impl->services.push_back(make_cutting_service(*impl->host, epoch, impl->links.get()));
   impl->services.push_back(make_watch_service(*impl->host));
 
   grpc::ServerBuilder builder;
@@ -187,6 +195,8 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(Room room, const RoomServe
 
 const std::string& RoomServer::address() const { return impl_->address; }
 HostHealth RoomServer::health() const { return impl_->host->health(); }
+std::uint16_t RoomServer::link_port() const { return impl_->links ? impl_->links->port() : 0; }
+LinkServerHealth RoomServer::link_health() const { return impl_->links ? impl_->links->health() : LinkServerHealth{}; }
 
 RoomServerSummary RoomServer::stop() {
   impl_->host->find_pieces();

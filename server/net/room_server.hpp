@@ -7,6 +7,7 @@
 
 #include "common/core/result.hpp"
 #include "server/net/room_host.hpp"
+#include "server/net/link_server.hpp"
 #include "server/net/room_keeper.hpp"
 
 namespace osteon {
@@ -42,6 +43,8 @@ class RoomServer {
 
   [[nodiscard]] const std::string& address() const;  // HOST:PORT with the real port
   [[nodiscard]] HostHealth health() const;
+  [[nodiscard]] std::uint16_t link_port() const;     // UDP; 0: there is no fast path
+  [[nodiscard]] LinkServerHealth link_health() const;
   // Ends every stream with a status and joins all threads; the journal is closed cleanly, with a checkpoint. Once.
   RoomServerSummary stop();
 

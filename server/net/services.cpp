@@ -12,156 +12,12 @@
 #include "common/field/kernel.hpp"
 #include "common/link/random_bytes.hpp"
 #include "common/wire/convert.hpp"
-#include "osteon/v1/cutting.grpc.pb.h"
 #include "osteon/v1/room.grpc.pb.h"
 #include "server/net/out_stream.inl"
 
 namespace osteon {
 namespace {
 
-// What the room keeps of a secret: enough to know it again.
-Digest digest_of(std::string_view secret) {
-  Hasher hasher;
-  hasher.text(secret);
-  return hasher.finish();
-}
-
-// One haptic client's session. Reading stops while kMaxQueuedCuts of its cuts wait for a tick, so a client that sends
-// faster than the room cuts is slowed down by the network instead of filling memory.
-class SessionStream final : public OutStream<BidiReactor>, public SessionSink {
- public:
-  static constexpr int kMaxQueuedCuts = 256;
-
-  SessionStream(RoomHost& host, std::uint64_t server_epoch) : host_(host), server_epoch_(server_epoch) {}
-  void start() { StartRead(&request_); }
-
-  AuthorId author() const override { return author_; }
-  void begin(RoomSeq contained, MessageParts before, Bytes complete) override {
-    const std::lock_guard lock(mutex_);
-    outbox_.begin(contained, std::move(before), std::move(complete));
-    pump();
-  }
-  void set_leaves(std::vector<FieldLeaf> leaves) override {
-    const std::lock_guard lock(mutex_);
-    outbox_.set_leaves(std::move(leaves));
-    pump();
-  }
-  void offer(RoomSeq place, const Bytes& row) override {
-    const std::lock_guard lock(mutex_);
-    if (!closing()) send_or_give_up(outbox_.add(place, row));
-  }
-  void answer(const Bytes& row) override {
-    const std::lock_guard lock(mutex_);
-    if (!closing()) send_or_give_up(outbox_.add_answer(row));
-  }
-  void refuse(const Error& why) override { close(invalid(why.message)); }
-  void decided() override {
-    const std::lock_guard lock(mutex_);
-    --queued_;
-    if (closing()) return;
-    if (reading_ended_ && queued_ == 0) {
-      close_locked(Status::OK);
-    } else if (paused_ && queued_ < kMaxQueuedCuts) {
-      paused_ = false;
-      StartRead(&request_);
-    }
-  }
-  // Said by the room, so that nobody tries again as after a line that broke.
-  void end(const std::string& why) override { close({StatusCode::ABORTED, why}); }
-  std::size_t waiting() const override {
-    const std::lock_guard lock(mutex_);
-    return outbox_.waiting();
-  }
-
-  void OnReadDone(bool ok) override {
-    if (!ok) {
-      // The client has no more to say: what it queued is still decided and told.
-      const std::lock_guard lock(mutex_);
-      reading_ended_ = true;
-      if (queued_ == 0) close_locked(Status::OK);
-      return;
-    }
-    auto request = parse<v1::SessionRequest>(request_);
-    if (!request) return close(invalid("a SessionRequest could not be parsed"));
-    if (request->message_case() == v1::SessionRequest::kOpen) return open(request->open());
-    if (!opened_) return close(invalid("the first SessionRequest must be open"));
-    switch (request->message_case()) {
-      case v1::SessionRequest::kCut: return queue(request->cut());
-      case v1::SessionRequest::kState: return show(request->state());
-      default: return close(invalid("SessionRequest.message is not set"));
-    }
-  }
-
- private:
-  void open(const v1::SessionOpen& request) {
-    if (opened_) return close(invalid("open was sent before"));
-    if (request.server_epoch() != server_epoch_)
-      return close(invalid("open.server_epoch is " + std::to_string(request.server_epoch()) + " and the server's " +
-                           std::to_string(server_epoch_) + "; join again"));
-    opened_ = true;
-    author_ = AuthorId{request.author()};
-    const Digest secret = digest_of(request.secret());
-    // Reading goes on after the leaves were taken, so that no cut of this author is among them.
-    host_.run_slowly([this, keep = self(), secret] {
-      const std::shared_ptr<SessionSink> sink(keep, this);
-      if (const Result<void> opened = host_.open_session(sink, secret); !opened) return close(invalid(opened.error().message));
-      // A reader that went away meanwhile has left the host's list before it was on it.
-      if (!read_on()) host_.leave(*this);
-    });
-  }
-
-  void queue(const v1::Cut& message) {
-    Result<Cut> cut = wire::from_wire(message);
-    if (!cut) return close(invalid(cut.error().message));
-    if (cut->author != author_) return close(invalid("cut.author is not the author who opened the session"));
-    {
-      const std::lock_guard lock(mutex_);
-      ++queued_;
-    }
-    host_.queue_cut(std::shared_ptr<SessionSink>(self(), this), std::move(*cut), RoomHost::Clock::now());
-    read_on();
-  }
-
-  void show(const v1::CuttingState& message) {
-    Result<CuttingState> state = wire::from_wire(message);
-    if (!state) return close(invalid(state.error().message));
-    if (state->author != author_) return close(invalid("state.author is not the author who opened the session"));
-    host_.offer_state(std::move(*state));
-    read_on();
-  }
-
-  // Reads the next request, or waits for decided() to do so. False when gRPC has let go of the stream.
-  bool read_on() {
-    const std::lock_guard lock(mutex_);
-    if (done()) return false;
-    paused_ = queued_ >= kMaxQueuedCuts;
-    if (!closing() && !paused_) StartRead(&request_);
-    return true;
-  }
-
-  void send_or_give_up(bool taken) {
-    if (taken)
-      pump();
-    else
-      close_locked({StatusCode::RESOURCE_EXHAUSTED, "the reader is more than " + std::to_string(SessionOutbox::kMaxRows) +
-                                                        " events behind the room; join again"});
-  }
-  bool take(ByteBuffer& message) override {
-    const MessageParts parts = outbox_.take();
-    if (!parts.empty()) message = buffer_of(parts);
-    return !parts.empty();
-  }
-  void leave() override { host_.leave(*this); }
-
-  RoomHost& host_;
-  const std::uint64_t server_epoch_;
-  ByteBuffer request_;
-  AuthorId author_;           // set before the host knows the stream
-  bool opened_ = false;       // only reactions to reads use it, and these come one by one
-  SessionOutbox outbox_;
-  int queued_ = 0;            // cuts between reading and deciding
-  bool paused_ = false, reading_ended_ = false;
-};
 
 // The case's files, read piece by piece on the host's thread for slow requests.
 class CaseStream final : public OutStream<WriteReactor> {
@@ -465,7 +321,7 @@ class RoomServiceImpl final : public RoomBase {
     std::array<std::uint8_t, 32> secret{};
     system_random()(secret);
     response.set_secret(secret.data(), secret.size());
-    return host_.join(kind, request.name(), digest_of(response.secret()));
+    return host_.join(kind, request.name(), digest_of_secret(response.secret()));
   }
   Result<AuthorId> come_back(const v1::JoinRequest& request) {
     std::optional<JournalHead> kept;
@@ -475,7 +331,7 @@ class RoomServiceImpl final : public RoomBase {
       kept = JournalHead{RoomSeq{request.kept_room_seq()}, *chain};
     }
     const AuthorId author{request.resume_author()};
-    if (Result<void> may = host_.resume(author, digest_of(request.secret()), kept); !may) return tl::unexpected(may.error());
+    if (Result<void> may = host_.resume(author, digest_of_secret(request.secret()), kept); !may) return tl::unexpected(may.error());
     return author;
   }
   static grpc::ServerUnaryReactor* refuse(grpc::ServerUnaryReactor* reactor, Status status) {
@@ -502,28 +358,16 @@ class RoomServiceImpl final : public RoomBase {
   const std::uint64_t server_epoch_;
 };
 
-class CuttingServiceImpl final : public v1::CuttingService::WithRawCallbackMethod_Session<v1::CuttingService::Service> {
- public:
-  CuttingServiceImpl(RoomHost& host, std::uint64_t server_epoch) : host_(host), server_epoch_(server_epoch) {}
-
-  BidiReactor* Session(grpc::CallbackServerContext*) override {
-    SessionStream* stream = SessionStream::launch(std::make_shared<SessionStream>(host_, server_epoch_));
-    stream->start();
-    return stream;
-  }
-
- private:
-  RoomHost& host_;
-  const std::uint64_t server_epoch_;
-};
-
 }  // namespace
+
+Digest digest_of_secret(std::string_view secret) {
+  Hasher hasher;
+  hasher.text(secret);
+  return hasher.finish();
+}
 
 std::unique_ptr<grpc::Service> make_room_service(RoomHost& host, RoomFiles files, std::uint64_t server_epoch) {
   return std::make_unique<RoomServiceImpl>(host, std::move(files), server_epoch);
-}
-std::unique_ptr<grpc::Service> make_cutting_service(RoomHost& host, std::uint64_t server_epoch) {
-  return std::make_unique<CuttingServiceImpl>(host, server_epoch);
 }
 
 }  // namespace osteon

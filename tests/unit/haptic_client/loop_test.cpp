@@ -456,6 +456,36 @@ TEST(Replica, ARejectedCutComesBack) {
   EXPECT_EQ(replica.predicted().hash(), replica.committed().hash());
 }
 
+// After a line broke, a cut may be sent and answered twice: the second answer may come after the cut was taken back.
+TEST(Replica, AnAnswerThatComesAgainBringsNothingBack) {
+  const Case bone = block_case();
+  const Tool tool = *find_tool("drill-3.2");
+  Cut cut;
+  cut.author = AuthorId{1};
+  cut.author_seq = 1;
+  cut.tool = tool.hash();
+  cut.level = tool.cut_level;
+  cut.path = {quantise(pose_along({0, 0, 0}, Vec3::UnitZ())), quantise(pose_along({0, 0, 3}, Vec3::UnitZ()))};
+  CutField field(bone, BodyId{});
+  const Digest uncut = field.hash();
+  std::vector<FieldLeaf> before;
+  for (const Coord origin : field.apply(cut).changed_leaves) before.push_back({BodyId{}, cut.level, origin, {}});
+  for (FieldLeaf& leaf : before) CutField(bone, BodyId{}).read(leaf);
+  Replica replica(bone, BodyId{});
+  replica.add_own(cut);
+  replica.commit(RoomSeq{1}, cut, true);
+  EXPECT_EQ(replica.hash(), field.hash());
+  const BodyId bodies[] = {BodyId{}};
+  replica.change(RoomSeq{2}, bodies, before);
+  replica.settle();
+  EXPECT_EQ(replica.hash(), uncut);
+  replica.commit(RoomSeq{1}, cut, true);
+  replica.settle();
+  EXPECT_EQ(replica.hash(), uncut);
+  EXPECT_EQ(replica.committed().hash(), uncut);
+  EXPECT_EQ(replica.room_seq(), RoomSeq{2});
+}
+
 // Rejections in a row, among cuts of one's own and of others through the same bone: what is left is the committed field
 // and what is still pending, and the pending cuts are made again once, the committed ones not at all.
 TEST(Replica, RejectionsInARowAreSettledOnce) {

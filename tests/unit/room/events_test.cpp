@@ -577,6 +577,63 @@ TEST(RoomReplica, EveryHolderHasTheRoomsHashAfterAnyEvents) {
   }
 }
 
+std::vector<FieldLeaf> leaves_of(const Room& room) {
+  std::vector<FieldLeaf> leaves;
+  for (const BodyId body : room.bodies()) std::ranges::move(room.find_field(body)->leaves(), std::back_inserter(leaves));
+  return leaves;
+}
+
+// Whatever was missed while the line was down, a client that comes back has the room's bone, with its own undecided cuts on
+// top, and nothing changes under the tool where nothing has.
+TEST(RoomReplica, IsRenewedAfterTheLineWasDown) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    Room room(test_block());
+    const AuthorId own = room.join(MemberKind::surgeon), other = room.join(MemberKind::surgeon);
+    const auto cuts = strokes(own, 12, seed), others = strokes(other, 12, 50 + seed);
+    Replica replica(room.bone(), BodyId{0});
+    std::size_t next = 0, next_other = 0;
+    for (int i = 0; i < 4; ++i) {
+      replica.add_own(cuts[next]);
+      replica.commit(commit(room, cuts[next]), cuts[next], true);
+      ++next;
+    }
+    // The line is down: own cuts go on, some of them reach the room, and others work.
+    const std::size_t reached = random() % 5;
+    for (std::size_t i = 0; i < 6; ++i) replica.add_own(cuts[next + i]);
+    for (std::size_t i = 0; i < reached; ++i) commit(room, cuts[next + i]);
+    for (int i = 0; i < 3; ++i) commit(room, others[next_other++]);
+    const bool splits = random() % 2, undoes = random() % 2;
+    if (splits) {
+      ASSERT_TRUE(room.split(BodyId{0}, {half(room.bone(), true)}, room.bone_epoch()));
+    }
+    if (undoes) {
+      ASSERT_TRUE(room.undo_last(other, 2, {}));
+    }
+    const std::vector<FieldLeaf> now = leaves_of(room);
+    replica.renew(room.room_seq(), room.bodies(), now, room.decided(own));
+    replica.lease(room.lease_epoch(own));
+    replica.settle();
+    // What was not decided falls with an undo, and is there without one.
+    const std::size_t pending = undoes ? 0 : 6 - reached;
+    EXPECT_EQ(replica.unconfirmed(), pending);
+    if (pending == 0) {
+      EXPECT_EQ(replica.hash(), room.field_hash());
+    }
+    for (std::size_t i = reached; !undoes && i < 6; ++i) replica.commit(commit(room, cuts[next + i]), cuts[next + i], true);
+    replica.settle();
+    EXPECT_EQ(replica.hash(), room.field_hash());
+    EXPECT_EQ(replica.room_seq(), room.room_seq());
+    // Once more, when nothing has happened meanwhile.
+    (void)replica.take_changes();
+    replica.renew(room.room_seq(), room.bodies(), leaves_of(room), room.decided(own));
+    replica.settle();
+    EXPECT_TRUE(replica.take_changes().empty());
+    EXPECT_EQ(replica.hash(), room.field_hash());
+  }
+}
+
 TEST(RoomResume, GoesOnFromWhatWasSaved) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);

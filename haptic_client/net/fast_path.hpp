@@ -1,0 +1,57 @@
+// The client's end of the fast path on a real socket: a thread that sends and receives sealed datagrams beside the stream.
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "common/core/result.hpp"
+#include "common/link/sealed.hpp"
+#include "common/link/udp_port.hpp"
+#include "common/wire/client_link.hpp"
+#include "haptic_client/net/room_session.hpp"
+
+namespace osteon {
+
+// One for each stream: keys and numbers begin anew with it. Any thread, except from within `row` and `dead`.
+class FastPath {
+ public:
+  // `row`: a row of the session, in order, on this path's thread. `dead`: datagrams do not get through any more, so that what
+  // went only in them has to go over the stream. Error: not_found (the server's name), unavailable (no socket).
+  [[nodiscard]] static Result<std::unique_ptr<FastPath>> open(const std::string& host, std::uint16_t port, const SessionKeys& keys,
+                                                              std::uint64_t first_author_seq,
+                                                              std::function<void(wire::IndexedRow)> row, std::function<void()> dead);
+  ~FastPath();  // stops
+  // Nothing is called any more once it returns; not from within what is called.
+  void stop();
+  FastPath(const FastPath&) = delete;
+  FastPath& operator=(const FastPath&) = delete;
+
+  // Every cut in order, and again where it was not decided. False: it has to go over the stream.
+  [[nodiscard]] bool send(const Cut& cut);
+  [[nodiscard]] bool send(const CuttingState& state);
+  // What came over the stream: a row, and the newest own cut that is decided.
+  void heard(std::uint64_t index);
+  void decided(std::uint64_t author_seq);
+  [[nodiscard]] FastPathHealth health() const;
+
+ private:
+  FastPath(std::unique_ptr<UdpPort> port, const Endpoint& server, const SessionKeys& keys, std::uint64_t first_author_seq,
+           std::function<void(wire::IndexedRow)> row, std::function<void()> dead);
+  void run();
+
+  const std::unique_ptr<UdpPort> port_;
+  const Endpoint server_;
+  const std::function<void(wire::IndexedRow)> row_;
+  const std::function<void()> dead_;
+  mutable std::mutex mutex_;
+  wire::ClientLink link_;
+  std::uint64_t pushed_;  // newest cut that the link was given
+  bool end_ = false;
+  std::thread thread_;
+};
+
+}  // namespace osteon

@@ -1,0 +1,193 @@
+#include "server/net/link_server.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <utility>
+
+namespace osteon {
+namespace {
+
+using Time = std::chrono::nanoseconds;
+using namespace std::chrono_literals;
+
+constexpr int kMostInARow = 256;  // datagrams received before others are sent: there are floods
+constexpr Time kLongestWait = 100ms;
+
+// The clock of all links of this process.
+Time now_of_links() {
+  static const auto start = std::chrono::steady_clock::now();
+  return std::chrono::steady_clock::now() - start;
+}
+
+}  // namespace
+
+SessionLink::SessionLink(const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq, Sink& sink)
+    : keys_(keys), author_(author), sink_(&sink), link_(keys, author, system_random(), first_author_seq) {}
+
+SessionLink::News SessionLink::news() {
+  News news;
+  while (std::optional<Cut> cut = link_.take_cut()) news.cuts.push_back(std::move(*cut));
+  if (std::optional<wire::HeardState> state = link_.take_state()) {
+    state->state.author = author_;
+    news.state = std::move(state->state);
+  }
+  if (link_.acknowledged() > arrived_) news.arrived = arrived_ = link_.acknowledged();
+  return news;
+}
+
+void SessionLink::say(News news) {
+  if (!sink_) return;
+  for (Cut& cut : news.cuts) sink_->take(std::move(cut));
+  if (news.state) sink_->take(std::move(*news.state));
+  if (news.arrived > 0) sink_->arrived(news.arrived);
+}
+
+void SessionLink::offer(const Cut& cut) {
+  const std::lock_guard told(told_mutex_);
+  News next;
+  {
+    const std::lock_guard lock(mutex_);
+    link_.offer(cut);
+    next = news();
+  }
+  say(std::move(next));
+}
+
+void SessionLink::tell(const wire::IndexedRow& row) {
+  {
+    const std::lock_guard lock(mutex_);
+    (void)link_.push(row);  // what does not go in datagrams goes over the stream, as all does
+  }
+  if (server_) server_->wake();
+}
+
+void SessionLink::decided(std::uint64_t author_seq) {
+  const std::lock_guard lock(mutex_);
+  link_.decided(author_seq);
+}
+
+void SessionLink::set_lease_epoch(std::uint64_t epoch) {
+  const std::lock_guard lock(mutex_);
+  link_.set_lease_epoch(epoch);
+}
+
+void SessionLink::close() {
+  const std::lock_guard told(told_mutex_);
+  sink_ = nullptr;
+}
+
+Result<std::unique_ptr<LinkServer>> LinkServer::open(const std::string& address) {
+  Result<std::unique_ptr<UdpPort>> port = UdpPort::open({.address = address});
+  if (!port) return tl::unexpected(port.error());
+  return std::unique_ptr<LinkServer>(new LinkServer(std::move(*port)));
+}
+
+LinkServer::LinkServer(std::unique_ptr<UdpPort> port) : port_(std::move(port)) {
+  thread_ = std::thread([this] { run(); });
+}
+
+LinkServer::~LinkServer() {
+  {
+    const std::lock_guard lock(mutex_);
+    end_ = true;
+  }
+  port_->wake();
+  thread_.join();
+}
+
+std::shared_ptr<SessionLink> LinkServer::add(AuthorId author, std::uint64_t first_author_seq, SessionLink::Sink& sink) {
+  std::shared_ptr<SessionLink> link;
+  {
+    const std::lock_guard lock(mutex_);
+    std::uint32_t session = 0;
+    while (session == 0 || links_.contains(session)) {
+      std::array<std::uint8_t, 4> bytes{};
+      random_(bytes);
+      session = std::uint32_t{bytes[0]} | std::uint32_t{bytes[1]} << 8 | std::uint32_t{bytes[2]} << 16 | std::uint32_t{bytes[3]} << 24;
+    }
+    link = std::make_shared<SessionLink>(make_session_keys(session, random_), author, first_author_seq, sink);
+    link->server_ = this;
+    links_[session] = link;
+  }
+  port_->wake();
+  return link;
+}
+
+void LinkServer::remove(const std::shared_ptr<SessionLink>& link) {
+  {
+    const std::lock_guard lock(mutex_);
+    links_.erase(link->keys().session);
+  }
+  link->close();
+}
+
+std::vector<std::shared_ptr<SessionLink>> LinkServer::links() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::shared_ptr<SessionLink>> all;
+  for (const auto& [session, link] : links_) all.push_back(link);
+  return all;
+}
+
+LinkServerHealth LinkServer::health() const {
+  LinkServerHealth health;
+  health.port = port_->counts();
+  for (const auto& link : links()) {
+    const std::lock_guard lock(link->mutex_);
+    ++health.links;
+    health.alive += link->link_.alive(now_of_links());
+  }
+  const std::lock_guard lock(mutex_);
+  health.strangers = strangers_;
+  return health;
+}
+
+void LinkServer::receive_some(Time now) {
+  DatagramBuffer buffer;
+  for (int i = 0; i < kMostInARow; ++i) {
+    const std::optional<Datagram> datagram = port_->receive(buffer);
+    if (!datagram) return;
+    const std::optional<std::uint32_t> session = session_of(datagram->bytes);
+    std::shared_ptr<SessionLink> link;
+    {
+      const std::lock_guard lock(mutex_);
+      const auto found = session ? links_.find(*session) : links_.end();
+      if (found == links_.end()) ++strangers_;
+      else link = found->second;
+    }
+    if (!link) continue;
+    const std::lock_guard told(link->told_mutex_);
+    SessionLink::News news;
+    {
+      const std::lock_guard lock(link->mutex_);
+      link->link_.receive(datagram->from, datagram->bytes, now);
+      news = link->news();
+    }
+    link->say(std::move(news));
+  }
+}
+
+Time LinkServer::send_due(Time now) {
+  DatagramBuffer buffer;
+  Time next = now + kLongestWait;
+  for (const auto& link : links()) {
+    const std::lock_guard lock(link->mutex_);
+    while (const std::optional<wire::ServerLink::Out> out = link->link_.send(now, buffer)) port_->send(out->to, out->bytes);
+    next = std::min(next, link->link_.next(now));
+  }
+  return next;
+}
+
+void LinkServer::run() {
+  while (true) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (end_) return;
+    }
+    receive_some(now_of_links());
+    const Time now = now_of_links();
+    port_->wait(std::max(send_due(now) - now, Time{0}));
+  }
+}
+
+}  // namespace osteon

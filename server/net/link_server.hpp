@@ -1,0 +1,109 @@
+// The room's end of all fast paths: one UDP socket and one thread for every session. What gets through here is heard sooner;
+// the session's stream says all of it as well.
+#pragma once
+#include <condition_variable>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "common/core/result.hpp"
+#include "common/link/sealed.hpp"
+#include "common/link/udp_port.hpp"
+#include "common/mechanics/cutting_state.hpp"
+#include "common/wire/server_link.hpp"
+
+namespace osteon {
+
+// One session's link as its owner sees it: any thread, except from within the sink. What the sink is told comes on the link
+// server's thread.
+class SessionLink {
+ public:
+  class Sink {
+   public:
+    virtual ~Sink() = default;
+    // Cuts in order of their author_seq, whichever way they came: over the link, or by offer().
+    virtual void take(Cut cut) = 0;
+    virtual void take(CuttingState state) = 0;
+    // The client has rows up to this one.
+    virtual void arrived(std::uint64_t index) = 0;
+  };
+
+  SessionLink(const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq, Sink& sink);
+  [[nodiscard]] const SessionKeys& keys() const { return keys_; }
+
+  // A cut that came over the stream; the sink hears of it in its turn, within this call or later.
+  void offer(const Cut& cut);
+  // Every row of the session in order, also those that go over the stream alone.
+  void tell(const wire::IndexedRow& row);
+  // Own cuts up to this one are decided and kept.
+  void decided(std::uint64_t author_seq);
+  void set_lease_epoch(std::uint64_t epoch);
+  // Nothing is told to the sink any more once this returns.
+  void close();
+
+ private:
+  friend class LinkServer;
+  // What has come for the sink, without the lock.
+  struct News {
+    std::vector<Cut> cuts;
+    std::optional<CuttingState> state;
+    std::uint64_t arrived = 0;
+  };
+  [[nodiscard]] News news();  // under mutex_
+  void say(News news);
+
+  const SessionKeys keys_;
+  const AuthorId author_;
+  // Order: told_mutex_, then mutex_.
+  std::mutex told_mutex_;  // held while the sink is told, so that what it hears keeps its order
+  Sink* sink_;
+  std::mutex mutex_;
+  wire::ServerLink link_;
+  std::uint64_t arrived_ = 0;
+  class LinkServer* server_ = nullptr;  // to be woken
+};
+
+struct LinkServerHealth {
+  std::size_t links = 0, alive = 0;
+  UdpPortCounts port;
+  std::uint64_t strangers = 0;  // datagrams of no session that is open
+};
+
+class LinkServer {
+ public:
+  // `address`: numeric, as UdpPortOptions. Errors of UdpPort::open.
+  [[nodiscard]] static Result<std::unique_ptr<LinkServer>> open(const std::string& address);
+  ~LinkServer();
+  LinkServer(const LinkServer&) = delete;
+  LinkServer& operator=(const LinkServer&) = delete;
+
+  [[nodiscard]] std::uint16_t port() const { return port_->local().port; }
+  // A link with keys of its own, heard of until it is removed.
+  [[nodiscard]] std::shared_ptr<SessionLink> add(AuthorId author, std::uint64_t first_author_seq, SessionLink::Sink& sink);
+  void remove(const std::shared_ptr<SessionLink>& link);
+  void wake() { port_->wake(); }
+  [[nodiscard]] LinkServerHealth health() const;
+
+ private:
+  explicit LinkServer(std::unique_ptr<UdpPort> port);
+  void run();
+  void receive_some(std::chrono::nanoseconds now);
+  // When the next datagram is due.
+  [[nodiscard]] std::chrono::nanoseconds send_due(std::chrono::nanoseconds now);
+  [[nodiscard]] std::vector<std::shared_ptr<SessionLink>> links() const;
+
+  const std::unique_ptr<UdpPort> port_;
+  const FillRandom random_ = system_random();
+  mutable std::mutex mutex_;
+  std::map<std::uint32_t, std::shared_ptr<SessionLink>> links_;
+  std::uint64_t strangers_ = 0;
+  bool end_ = false;
+  std::thread thread_;
+};
+
+}  // namespace osteon

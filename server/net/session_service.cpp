@@ -1,0 +1,243 @@
+// The streams of haptic clients, and the fast path beside each.
+#include <grpcpp/grpcpp.h>
+
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "common/wire/convert.hpp"
+#include "osteon/v1/cutting.grpc.pb.h"
+#include "server/net/link_server.hpp"
+#include "server/net/out_stream.inl"
+#include "server/net/services.hpp"
+
+namespace osteon {
+namespace {
+
+// One haptic client's session. Reading stops while kMaxQueuedCuts of its cuts wait for a tick, so a client that sends
+// faster than the room cuts is slowed down by the network instead of filling memory.
+class SessionStream final : public OutStream<BidiReactor>, public SessionSink, private SessionLink::Sink {
+ public:
+  static constexpr int kMaxQueuedCuts = 256;
+
+  SessionStream(RoomHost& host, std::uint64_t server_epoch, LinkServer* links)
+      : host_(host), server_epoch_(server_epoch), links_(links) {}
+  void start() { StartRead(&request_); }
+
+  AuthorId author() const override { return author_; }
+  void begin(RoomSeq contained, MessageParts before, Bytes complete) override {
+    v1::SessionResponse said;
+    if (links_ && said.ParseFromString(*complete)) {
+      link_ = links_->add(author_, said.complete().decided_author_seq() + 1, *this);
+      before.insert(before.begin(), link_offer());
+    }
+    const std::lock_guard lock(mutex_);
+    outbox_.begin(contained, std::move(before), std::move(complete));
+    pump();
+  }
+  void set_leaves(std::vector<FieldLeaf> leaves) override {
+    const std::lock_guard lock(mutex_);
+    outbox_.set_leaves(std::move(leaves));
+    pump();
+  }
+  void offer(RoomSeq place, const Bytes& row) override {
+    const std::lock_guard lock(mutex_);
+    if (!closing()) send_or_give_up(outbox_.add(place, row));
+  }
+  // [committing thread]
+  void offer(RoomSeq place, const Bytes& row, const wire::SessionRow& fast) override {
+    std::uint64_t index = 0;
+    {
+      const std::lock_guard lock(mutex_);
+      if (closing()) return;
+      const std::uint64_t before = outbox_.index();
+      send_or_give_up(outbox_.add(place, row));
+      if (outbox_.index() > before) index = outbox_.index();
+    }
+    if (!link_) return;
+    const bool committed = fast.kind == wire::SessionRowKind::committed;
+    if (committed && fast.cut.author == author_) link_->decided(fast.cut.author_seq);
+    if (fast.kind == wire::SessionRowKind::rejected) {
+      link_->decided(fast.author_seq);
+      link_->set_lease_epoch(fast.lease_epoch);
+    }
+    if (index == 0) return;
+    const bool fits = !committed || wire::fits_a_packet(fast.cut);
+    link_->tell({index, fits ? fast : wire::SessionRow{.room_seq = place, .kind = wire::SessionRowKind::streamed}});
+  }
+  void answer(const Bytes& row) override {
+    const std::lock_guard lock(mutex_);
+    if (!closing()) send_or_give_up(outbox_.add_answer(row));
+  }
+  void refuse(const Error& why) override { close(invalid(why.message)); }
+  void decided() override {
+    const std::lock_guard lock(mutex_);
+    --queued_;
+    if (closing()) return;
+    if (reading_ended_ && queued_ == 0) {
+      close_locked(Status::OK);
+    } else if (paused_ && queued_ < kMaxQueuedCuts) {
+      paused_ = false;
+      StartRead(&request_);
+    }
+  }
+  // Said by the room, so that nobody tries again as after a line that broke.
+  void end(const std::string& why) override { close({StatusCode::ABORTED, why}); }
+  void replaced(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
+  std::size_t waiting() const override {
+    const std::lock_guard lock(mutex_);
+    return outbox_.waiting();
+  }
+
+  void OnReadDone(bool ok) override {
+    if (!ok) {
+      // The client has no more to say: what it queued is still decided and told.
+      const std::lock_guard lock(mutex_);
+      reading_ended_ = true;
+      if (queued_ == 0) close_locked(Status::OK);
+      return;
+    }
+    auto request = parse<v1::SessionRequest>(request_);
+    if (!request) return close(invalid("a SessionRequest could not be parsed"));
+    if (request->message_case() == v1::SessionRequest::kOpen) return open(request->open());
+    if (!opened_) return close(invalid("the first SessionRequest must be open"));
+    switch (request->message_case()) {
+      case v1::SessionRequest::kCut: return queue(request->cut());
+      case v1::SessionRequest::kState: return show(request->state());
+      default: return close(invalid("SessionRequest.message is not set"));
+    }
+  }
+
+ private:
+  void open(const v1::SessionOpen& request) {
+    if (opened_) return close(invalid("open was sent before"));
+    if (request.server_epoch() != server_epoch_)
+      // It joined a server that was killed meanwhile: this one knows it, if it joins again.
+      return close({StatusCode::UNAVAILABLE, "open.server_epoch is " + std::to_string(request.server_epoch()) + " and the server's " +
+                           std::to_string(server_epoch_) + "; join again"});
+    opened_ = true;
+    author_ = AuthorId{request.author()};
+    const Digest secret = digest_of_secret(request.secret());
+    // Reading goes on after the leaves were taken, so that no cut of this author is among them.
+    host_.run_slowly([this, keep = self(), secret] {
+      const std::shared_ptr<SessionSink> sink(keep, this);
+      if (const Result<void> opened = host_.open_session(sink, secret); !opened) return close(invalid(opened.error().message));
+      // A reader that went away meanwhile has left the host's list before it was on it.
+      if (!read_on()) host_.leave(*this);
+    });
+  }
+
+  void queue(const v1::Cut& message) {
+    Result<Cut> cut = wire::from_wire(message);
+    if (!cut) return close(invalid(cut.error().message));
+    if (cut->author != author_) return close(invalid("cut.author is not the author who opened the session"));
+    // One that was taken before is answered with its first outcome; one ahead of its turn may follow others that come in
+    // datagrams.
+    const bool again = [&] {
+      const std::lock_guard lock(mutex_);
+      return cut->author_seq <= taken_;
+    }();
+    if (link_ && !again)
+      link_->offer(*cut);
+    else
+      take(std::move(*cut));
+    read_on();
+  }
+
+  // In order of their author_seq, over whichever way they came.
+  void take(Cut cut) override {
+    {
+      const std::lock_guard lock(mutex_);
+      if (closing()) return;
+      ++queued_;
+      taken_ = std::max(taken_, cut.author_seq);
+    }
+    host_.queue_cut(std::shared_ptr<SessionSink>(self(), this), std::move(cut), RoomHost::Clock::now());
+  }
+  void take(CuttingState state) override { host_.offer_state(std::move(state)); }
+  void arrived(std::uint64_t index) override {
+    const std::lock_guard lock(mutex_);
+    outbox_.arrived(index);
+  }
+  [[nodiscard]] Bytes link_offer() const {
+    v1::SessionResponse response;
+    v1::LinkOffer& offer = *response.mutable_link();
+    offer.set_session(link_->keys().session);
+    offer.set_key_up(link_->keys().up.bytes.data(), link_->keys().up.bytes.size());
+    offer.set_key_down(link_->keys().down.bytes.data(), link_->keys().down.bytes.size());
+    offer.set_udp_port(links_->port());
+    return serialised(response);
+  }
+
+  void show(const v1::CuttingState& message) {
+    Result<CuttingState> state = wire::from_wire(message);
+    if (!state) return close(invalid(state.error().message));
+    if (state->author != author_) return close(invalid("state.author is not the author who opened the session"));
+    host_.offer_state(std::move(*state));
+    read_on();
+  }
+
+  // Reads the next request, or waits for decided() to do so. False when gRPC has let go of the stream.
+  bool read_on() {
+    const std::lock_guard lock(mutex_);
+    if (done()) return false;
+    paused_ = queued_ >= kMaxQueuedCuts;
+    if (!closing() && !paused_) StartRead(&request_);
+    return true;
+  }
+
+  void send_or_give_up(bool taken) {
+    if (taken)
+      pump();
+    else
+      close_locked({StatusCode::RESOURCE_EXHAUSTED, "the reader is more than " + std::to_string(SessionOutbox::kMaxRows) +
+                                                        " events behind the room; join again"});
+  }
+  bool take(ByteBuffer& message) override {
+    const MessageParts parts = outbox_.take();
+    if (!parts.empty()) message = buffer_of(parts);
+    return !parts.empty();
+  }
+  void leave() override {
+    host_.leave(*this);
+    if (link_) links_->remove(link_);
+  }
+
+  RoomHost& host_;
+  const std::uint64_t server_epoch_;
+  LinkServer* const links_;
+  std::shared_ptr<SessionLink> link_;  // with the link server; set before the host tells of rows
+  ByteBuffer request_;
+  AuthorId author_;           // set before the host knows the stream
+  bool opened_ = false;       // only reactions to reads use it, and these come one by one
+  SessionOutbox outbox_;
+  int queued_ = 0;            // cuts between reading and deciding
+  std::uint64_t taken_ = 0;   // newest author_seq that was queued
+  bool paused_ = false, reading_ended_ = false;
+};
+
+class CuttingServiceImpl final : public v1::CuttingService::WithRawCallbackMethod_Session<v1::CuttingService::Service> {
+ public:
+  CuttingServiceImpl(RoomHost& host, std::uint64_t server_epoch, LinkServer* links)
+      : host_(host), server_epoch_(server_epoch), links_(links) {}
+
+  BidiReactor* Session(grpc::CallbackServerContext*) override {
+    SessionStream* stream = SessionStream::launch(std::make_shared<SessionStream>(host_, server_epoch_, links_));
+    stream->start();
+    return stream;
+  }
+
+ private:
+  RoomHost& host_;
+  const std::uint64_t server_epoch_;
+  LinkServer* const links_;
+};
+
+}  // namespace
+
+std::unique_ptr<grpc::Service> make_cutting_service(RoomHost& host, std::uint64_t server_epoch, LinkServer* links) {
+  return std::make_unique<CuttingServiceImpl>(host, server_epoch, links);
+}
+
+}  // namespace osteon

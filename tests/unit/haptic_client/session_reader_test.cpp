@@ -1,0 +1,147 @@
+// What comes from a room over two ways, in one order, and what is on its way up.
+#include "haptic_client/net/session_reader.hpp"
+
+#include <gtest/gtest.h>
+
+#include "common/field/rejection.hpp"
+#include "common/wire/convert.hpp"
+#include "haptic_client/net/cuts_underway.hpp"
+#include "tests/support/scenes/bones.hpp"
+
+namespace osteon {
+namespace {
+
+Cut cut_of(std::uint64_t author, std::uint64_t author_seq) {
+  Cut cut = test::straight_cut(find_tool("burr-round-5").value(), {0, 0, 0}, {1, 0, 0}, {0, 0, -1}, author_seq);
+  cut.author = AuthorId{author};
+  return cut;
+}
+
+TEST(CutsUnderway, GoOnceOverEachLineUntilTheyAreDecided) {
+  CutsUnderway underway(8);
+  for (std::uint64_t i = 1; i <= 4; ++i) ASSERT_TRUE(underway.push(cut_of(1, i)));
+  underway.push(CuttingState{});
+  EXPECT_FALSE(underway.take_cut()) << "the room has not said yet what it has";
+  EXPECT_FALSE(underway.something_to_send());
+  underway.go_on(1);
+  EXPECT_EQ(underway.take_cut()->author_seq, 2u);
+  EXPECT_EQ(underway.take_cut()->author_seq, 3u);
+  underway.decided(2);
+  EXPECT_EQ(underway.take_cut()->author_seq, 4u);
+  EXPECT_FALSE(underway.take_cut());
+  EXPECT_TRUE(underway.take_state());
+  EXPECT_FALSE(underway.take_state());
+  EXPECT_FALSE(underway.something_to_send());
+  // The line breaks: 3 was decided and its answer lost, 4 was lost itself.
+  underway.stop();
+  ASSERT_TRUE(underway.push(cut_of(1, 5)));
+  EXPECT_FALSE(underway.take_cut());
+  underway.go_on(3);
+  EXPECT_EQ(underway.take_cut()->author_seq, 4u);
+  EXPECT_EQ(underway.take_cut()->author_seq, 5u);
+  EXPECT_EQ(underway.undecided(), 2u);
+}
+
+TEST(CutsUnderway, AreBounded) {
+  CutsUnderway underway(3);
+  underway.go_on(0);
+  for (std::uint64_t i = 1; i <= 3; ++i) {
+    EXPECT_TRUE(underway.push(cut_of(1, i)));
+    EXPECT_TRUE(underway.take_cut());
+  }
+  EXPECT_FALSE(underway.push(cut_of(1, 4))) << "sent is not decided";
+  underway.decided(1);
+  EXPECT_TRUE(underway.push(cut_of(1, 4)));
+}
+
+struct Heard {
+  std::vector<std::string> events;
+  std::vector<std::uint64_t> decided;
+  SessionReader reader{AuthorId{7}, builtin_tool_box(),
+                       {.complete = [this](const RoomAtJoin& room) { events.push_back("complete " + std::to_string(room.contained.value)); },
+                        .committed = [this](RoomSeq place, const Cut& cut) {
+                          events.push_back(std::to_string(place.value) + " of " + std::to_string(cut.author.value));
+                        },
+                        .rejected = [this](RoomSeq place, std::uint64_t seq, std::uint64_t lease, const std::string& why) {
+                          events.push_back(std::to_string(place.value) + " rejects " + std::to_string(seq) + " until " +
+                                           std::to_string(lease) + ": " + why);
+                        },
+                        .scene = [this](RoomSeq place, const std::vector<SceneItem>&) { events.push_back("scene " + std::to_string(place.value)); }},
+                       [this](std::uint64_t seq) { decided.push_back(seq); }, [this](std::uint64_t seq) { decided.push_back(seq); }};
+};
+
+v1::SessionResponse row(std::uint64_t index, std::uint64_t place, std::uint64_t author, std::uint64_t author_seq) {
+  v1::SessionResponse response;
+  response.set_index(index);
+  response.mutable_committed()->set_room_seq(place);
+  *response.mutable_committed()->mutable_cut() = wire::to_wire(cut_of(author, author_seq));
+  return response;
+}
+wire::IndexedRow fast(std::uint64_t index, std::uint64_t place, std::uint64_t author, std::uint64_t author_seq) {
+  return {index, {.room_seq = RoomSeq{place}, .kind = wire::SessionRowKind::committed, .cut = cut_of(author, author_seq)}};
+}
+
+TEST(SessionReader, TakesWhicheverWayIsFirstAndKeepsTheOrder) {
+  Heard heard;
+  heard.reader.begin();
+  v1::SessionResponse complete;
+  complete.mutable_complete()->set_room_seq(3);
+  complete.mutable_complete()->set_decided_author_seq(5);
+  ASSERT_TRUE(heard.reader.take(complete));
+  ASSERT_TRUE(heard.reader.take(fast(2, 11, 7, 6)));  // the first has not come yet
+  EXPECT_EQ(heard.events, std::vector<std::string>{"complete 3"});
+  ASSERT_TRUE(heard.reader.take(row(1, 10, 2, 1)));
+  ASSERT_TRUE(heard.reader.take(row(2, 11, 7, 6)));  // again, over the stream
+  ASSERT_TRUE(heard.reader.take(fast(1, 10, 2, 1)));
+  // A change of the scene comes over the stream alone; what the fast path has after it waits.
+  ASSERT_TRUE(heard.reader.take(wire::IndexedRow{3, {.room_seq = RoomSeq{12}, .kind = wire::SessionRowKind::streamed}}));
+  ASSERT_TRUE(heard.reader.take(wire::IndexedRow{4, {.room_seq = RoomSeq{13}, .kind = wire::SessionRowKind::rejected, .author_seq = 7,
+                                                     .reason = static_cast<std::uint32_t>(Rejection::place), .lease_epoch = 14}}));
+  EXPECT_EQ(heard.reader.taken(), 2u);
+  v1::SessionResponse scene;
+  scene.set_index(3);
+  scene.mutable_scene()->set_room_seq(12);
+  ASSERT_TRUE(heard.reader.take(scene));
+  EXPECT_EQ(heard.events, (std::vector<std::string>{"complete 3", "10 of 2", "11 of 7", "scene 12",
+                                                    "13 rejects 7 until 14: the path leaves the surroundings of the bone"}));
+  EXPECT_EQ(heard.decided, (std::vector<std::uint64_t>{5, 6, 7}));
+  EXPECT_EQ(heard.reader.taken(), 4u);
+}
+
+TEST(SessionReader, BeginsAnewWithEachStream) {
+  Heard heard;
+  heard.reader.begin();
+  ASSERT_TRUE(heard.reader.take(row(1, 10, 2, 1)));
+  ASSERT_TRUE(heard.reader.take(row(3, 12, 2, 3)));  // never to be passed on: the stream breaks
+  heard.reader.begin();
+  ASSERT_TRUE(heard.reader.take(row(1, 13, 2, 4)));
+  EXPECT_EQ(heard.events, (std::vector<std::string>{"10 of 2", "13 of 2"}));
+}
+
+// The first outcome of a cut that was sent again: it was told before, or is in the leaves, where an undo may have come since.
+TEST(SessionReader, AnswersOutsideTheOrderOnlySayWhatIsDecided) {
+  Heard heard;
+  heard.reader.begin();
+  ASSERT_TRUE(heard.reader.take(row(0, 4, 7, 3)));
+  v1::SessionResponse rejected;
+  rejected.mutable_rejected()->set_author_seq(4);
+  ASSERT_TRUE(heard.reader.take(rejected));
+  EXPECT_TRUE(heard.events.empty());
+  EXPECT_EQ(heard.decided, (std::vector<std::uint64_t>{3, 4}));
+}
+
+TEST(SessionReader, RefusesWhatNoCorrectServerSendsAndWaitsForToolsThatItDoesNotKnow) {
+  Heard heard;
+  heard.reader.begin();
+  v1::SessionResponse strange = row(1, 10, 2, 1);
+  strange.mutable_committed()->mutable_cut()->set_tool_hash(std::string(32, 'x'));
+  EXPECT_FALSE(heard.reader.take(strange));
+  EXPECT_FALSE(heard.reader.take(v1::SessionResponse{}));
+  wire::IndexedRow unknown = fast(2, 11, 2, 2);
+  unknown.row.cut.tool.bytes[0] ^= 1;
+  EXPECT_TRUE(heard.reader.take(unknown)) << "the stream brings the tool, and then the row";
+  EXPECT_TRUE(heard.events.empty());
+}
+
+}  // namespace
+}  // namespace osteon
