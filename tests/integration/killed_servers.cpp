@@ -5,8 +5,8 @@
 
 #include "server/journal/journal.hpp"
 #include "server/net/journal_rows.hpp"
+#include "tests/integration/hand.hpp"
 #include "tests/integration/stage.hpp"
-#include "tests/support/scenes/bones.hpp"
 #include "tests/support/scenes/random.hpp"
 #include "tests/unit/room/members.hpp"
 
@@ -16,44 +16,6 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr double kWidth_mm = 12.0;
-
-// Cuts without end, as fast as the session takes them, up to some that wait.
-class Hand {
- public:
-  Hand(const std::string& address, const std::filesystem::path& cache, std::uint64_t seed)
-      : surgeon_(address, cache), random_(seed), burr_(find_tool("burr-round-5").value()), thread_([this] { cut(); }) {}
-  ~Hand() { rest(); }
-  void rest() {
-    over_ = true;
-    if (thread_.joinable()) thread_.join();
-  }
-  Surgeon& surgeon() { return surgeon_; }
-  [[nodiscard]] std::uint64_t sent() const { return sent_; }
-
- private:
-  void cut() {
-    constexpr std::uint64_t kMostWaiting = 40;
-    while (!over_) {
-      if (sent_ >= surgeon_.own() + kMostWaiting) {
-        std::this_thread::sleep_for(1ms);
-        continue;
-      }
-      // Dimples of a bur in the upper face: of these no crumb comes off.
-      const Vec3 at{random_.between(-5, 5), random_.between(-5, 5), random_.between(-0.5, 0.5)};
-      Cut cut = straight_cut(burr_, at, at, {0, 0, -1}, sent_ + 1);
-      cut.author = surgeon_.author();
-      if (surgeon_.session().send(cut)) ++sent_;
-      std::this_thread::sleep_for(500us);
-    }
-  }
-
-  Surgeon surgeon_;
-  Random random_;
-  const Tool burr_;
-  std::atomic<bool> over_{false};
-  std::atomic<std::uint64_t> sent_{0};
-  std::thread thread_;
-};
 
 // What the journal has of each author: the places of his cuts, by their numbers.
 std::map<AuthorId, std::map<std::uint64_t, RoomSeq>> read_places(const std::filesystem::path& file, KilledServers& report) {

@@ -42,8 +42,8 @@ inline v1::GetStatusResponse status_of(const wire::JoinedRoom& room) {
 // A haptic client that keeps a replica, as osteon-haptic does.
 class Surgeon {
  public:
-  Surgeon(const std::string& address, const std::filesystem::path& cache) {
-    auto joined = RoomSession::join({.address = address, .cache = cache}, {});
+  Surgeon(const std::string& address, const std::filesystem::path& cache, const std::string& fast_path = {}) {
+    auto joined = RoomSession::join({.address = address, .cache = cache, .fast_path = fast_path}, {});
     EXPECT_TRUE(joined.has_value()) << joined.error().message;
     session_.emplace(std::move(*joined));
     replica_.emplace(session_->bone(), BodyId{0}, session_->tools());
@@ -63,6 +63,7 @@ class Surgeon {
                         [this](RoomSeq seq, const Cut& cut) {
                           on([&] {
                             EXPECT_TRUE(complete_);
+                            if (heard_) heard_(cut);
                             EXPECT_GT(seq, seq_) << "committed cuts come in order";
                             replica_->commit(seq, cut, false);
                             seq_ = seq;
@@ -97,6 +98,10 @@ class Surgeon {
   bool complete() { return read(complete_); }
   RoomSeq seq() { return read(seq_); }
   std::uint64_t own() { return read(own_); }
+  // Called for every cut that comes, with a lock held.
+  void on_cut(std::function<void(const Cut&)> heard) {
+    on([&] { heard_ = std::move(heard); });
+  }
   // Of own cuts: their places in the order, as the room said them.
   std::map<std::uint64_t, RoomSeq> acknowledged() { return read(acknowledged_); }
   bool stands() { return read(complete_) && !read(interrupted_); }
@@ -130,6 +135,7 @@ class Surgeon {
   int interruptions_ = 0;
   std::vector<FieldLeaf> renewed_;
   std::map<std::uint64_t, RoomSeq> acknowledged_;
+  std::function<void(const Cut&)> heard_;
   RoomSeq seq_;
   std::uint64_t own_ = 0, lease_ = 0;
   std::vector<BodyId> bodies_;

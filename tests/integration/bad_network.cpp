@@ -1,0 +1,85 @@
+#include "tests/integration/bad_network.hpp"
+
+#include <mutex>
+#include <thread>
+
+#include "tests/integration/hand.hpp"
+#include "tests/integration/stage.hpp"
+#include "tests/support/relay/impair_process.hpp"
+
+namespace osteon::test {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+// The UDP port that a server has said in its log.
+std::string udp_port_of(Process& server) {
+  const std::string log = server.err();
+  const std::size_t at = log.find("udp_port=");
+  return at == std::string::npos ? "" : std::to_string(std::strtoul(log.c_str() + at + 9, nullptr, 10));
+}
+
+}  // namespace
+
+BadNetworkRun run_on(const BadNetwork& network, std::uint64_t seed) {
+  BadNetworkRun run;
+  TempDir folder;
+  Stage stage(12.0, {"--journal", (folder / "room.journal").string()});
+  std::optional<ImpairProcess> relay;
+  std::string address = stage.address(), fast_path = network.fast_path;
+  if (!network.impairment.empty()) {
+    std::vector<std::string> arguments{"--tcp", stage.address(), "--udp", "127.0.0.1:" + udp_port_of(stage.server()),
+                                       "--seed", std::to_string(seed)};
+    relay.emplace(arguments);
+    address = relay->tcp();
+    if (fast_path.empty()) fast_path = relay->udp();
+  }
+  // Joined on a good network, as one joins before the operation.
+  std::vector<std::unique_ptr<Hand>> hands;
+  std::mutex felt_mutex;
+  for (std::uint64_t i = 0; i < 2; ++i)
+    hands.push_back(std::make_unique<Hand>(address, folder / "cache", seed * 2 + i, 8ms, fast_path));
+  const auto both = [&](auto holds) { return std::ranges::all_of(hands, [&](const auto& hand) { return holds(*hand); }); };
+  if (!wait_until([&] { return both([](Hand& hand) { return hand.surgeon().stands(); }); }, 30s)) run.fault = "a hand did not join";
+  if (relay) {
+    for (const std::string& command : network.impairment) (void)relay->command(command);
+    std::this_thread::sleep_for(300ms);
+  }
+  for (std::size_t i = 0; i < 2; ++i)
+    hands[i]->surgeon().on_cut([&, i](const Cut& cut) {
+      const Hand& other = *hands[1 - i];
+      if (cut.author != hands[1 - i]->surgeon().session().room().author) return;
+      const std::lock_guard lock(felt_mutex);
+      run.felt.record(Clock::now() - other.sent_at(cut.author_seq));
+    });
+  const std::size_t parts = network.meanwhile.size() + 1;
+  for (std::size_t part = 0; part < parts; ++part) {
+    std::this_thread::sleep_for(network.work / parts);
+    if (relay && part < network.meanwhile.size()) (void)relay->command(network.meanwhile[part]);
+  }
+  run.fast_path_alive = both([](Hand& hand) { return hand.surgeon().session().fast_path().alive; });
+
+  for (const auto& hand : hands) hand->rest();
+  if (relay) (void)relay->command("good");
+  const auto quiet = Clock::now();
+  std::string hash;
+  const auto converged = [&] {
+    if (!both([](Hand& hand) { return hand.surgeon().stands() && hand.surgeon().own() >= hand.sent(); })) return false;
+    hash = wire::to_wire(hands[0]->surgeon().hash());
+    return wire::to_wire(hands[1]->surgeon().hash()) == hash;
+  };
+  if (!wait_until(converged, 30s)) run.fault = "the hands do not hold one bone";
+  run.converged_s = std::chrono::duration<double>(Clock::now() - quiet).count();
+  // The server's own word, over its own address.
+  const wire::JoinedRoom watcher = join(stage.address(), wire::ClientKind::viewer);
+  if (status_of(watcher).field_hash() != hash && run.fault.empty()) run.fault = "the server holds another bone";
+  for (const auto& hand : hands) {
+    run.sent += hand->sent();
+    run.kept += hand->surgeon().own();
+    hand->surgeon().on_cut({});
+  }
+  return run;
+}
+
+}  // namespace osteon::test

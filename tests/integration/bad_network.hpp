@@ -1,0 +1,30 @@
+// Real processes and real sockets, with osteon-impair between a server and two hands: do all of them end with one bone, and how
+// soon does one feel what the other cuts?
+#pragma once
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/runtime/tick_stats.hpp"
+
+namespace osteon::test {
+
+struct BadNetworkRun {
+  std::uint64_t sent = 0, kept = 0;      // cuts of both hands; kept: decided by the server
+  double converged_s = 0;                // from quiet (hands rest, the network is good) until all hold one bone
+  DurationHistogram felt;                // from one hand's sending of a cut until it is in the other's replica
+  bool fast_path_alive = false;          // of both, before quiet
+  std::string fault;                     // empty: none
+};
+
+struct BadNetwork {
+  std::vector<std::string> impairment;   // arguments of osteon-impair; none: no relay at all
+  std::chrono::milliseconds work{1500};
+  std::vector<std::string> meanwhile;    // commands for osteon-impair, in equal times during the work
+  std::string fast_path;                 // "off": over the streams alone
+};
+
+[[nodiscard]] BadNetworkRun run_on(const BadNetwork& network, std::uint64_t seed);
+
+}  // namespace osteon::test
