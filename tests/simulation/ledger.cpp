@@ -1,0 +1,154 @@
+#include "tests/simulation/ledger.hpp"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+namespace osteon::test {
+namespace {
+
+std::string number(RoomSeq place) { return std::to_string(place.value); }
+
+std::string whose(AuthorId author, std::uint64_t author_seq) {
+  return "cut " + std::to_string(author_seq) + " of author " + std::to_string(author.value);
+}
+
+std::optional<EventKind> kind_of(const RoomRow& row) {
+  struct Kind {
+    EventKind operator()(const JoinRow&) const { return EventKind::join; }
+    EventKind operator()(const CutRow&) const { return EventKind::cut; }
+    EventKind operator()(const RejectionRow&) const { return EventKind::cut; }
+    EventKind operator()(const SplitRow&) const { return EventKind::split; }
+    EventKind operator()(const UndoRow&) const { return EventKind::undo; }
+    EventKind operator()(const RedoRow&) const { return EventKind::redo; }
+    EventKind operator()(const RemoveBodyRow&) const { return EventKind::remove_body; }
+    EventKind operator()(const ItemRow&) const { return EventKind::scene; }
+    EventKind operator()(const ToolRow&) const { return EventKind::tool; }
+    EventKind operator()(const MarkRow&) const { return EventKind::mark; }
+  };
+  return std::visit(Kind{}, row.what);
+}
+
+}  // namespace
+
+std::string_view name(Invariant invariant) {
+  switch (invariant) {
+    case Invariant::one_bone: return "one bone";
+    case Invariant::set_of_cuts: return "set of cuts";
+    case Invariant::acknowledged: return "acknowledged is kept";
+    case Invariant::replay: return "replay is live";
+    case Invariant::lease: return "lease";
+    case Invariant::bounds: return "bounds";
+    case Invariant::author_order: return "author order";
+    case Invariant::decided: return "decided";
+    case Invariant::served: return "served";
+  }
+  return "unknown";
+}
+
+void Ledger::fault(Invariant invariant, std::string sentence) {
+  constexpr std::size_t kEnough = 20;
+  if (faults_.size() < kEnough) faults_.push_back({invariant, std::move(sentence)});
+}
+
+void Ledger::made(const Cut& cut) { made_[cut.author].push_back(cut); }
+
+void Ledger::told(RoomSeq place, const Told& what) {
+  told_up_to(place);
+  const auto [at, first] = told_.emplace(place, what);
+  check(first || at->second == what, Invariant::acknowledged, "place " + number(place) + " was told twice, as different events");
+}
+
+void Ledger::told_committed(RoomSeq place, const Cut& cut) {
+  told(place, {EventKind::cut, false, cut.author, cut.author_seq, cut_digest(cut)});
+}
+void Ledger::told_rejected(RoomSeq place, AuthorId author, std::uint64_t author_seq) {
+  told(place, {EventKind::cut, true, author, author_seq, {}});
+}
+void Ledger::told_event(RoomSeq place, EventKind kind) { told(place, {kind, false, {}, 0, {}}); }
+void Ledger::told_up_to(RoomSeq place) { furthest_ = std::max(furthest_, place); }
+void Ledger::told_decided(AuthorId author, std::uint64_t author_seq) {
+  std::uint64_t& newest = decided_[author];
+  newest = std::max(newest, author_seq);
+}
+
+void Ledger::check_author(const RoomRow& row, AuthorId author, std::uint64_t author_seq, const Digest& bytes,
+                          std::map<AuthorId, std::uint64_t>& newest) {
+  const std::uint64_t next = ++newest[author];
+  check(author_seq == next, Invariant::author_order,
+        "row " + number(row.place) + " is " + whose(author, author_seq) + ", where " + std::to_string(next) + " comes next");
+  const std::vector<Cut>& own = made_[author];
+  if (author_seq == 0 || author_seq > own.size())
+    return fault(Invariant::author_order, "row " + number(row.place) + " is " + whose(author, author_seq) + ", who never made it");
+  check(cut_digest(own[author_seq - 1]) == bytes, Invariant::author_order,
+        "row " + number(row.place) + " is " + whose(author, author_seq) + ", with other bytes than he made");
+}
+
+void Ledger::check_rows(std::span<const RoomRow> rows) {
+  if (furthest_.value > rows.size())
+    fault(Invariant::acknowledged, "the room was said to stand at " + number(furthest_) + ", and " + std::to_string(rows.size()) + " rows are kept");
+  std::map<AuthorId, std::uint64_t> newest, lease;  // of the leases that are not 1
+  std::map<RoomSeq, bool> of_bone;                  // places of events that can be undone: whether bone comes back with them
+  const auto lease_of = [&](AuthorId author) {
+    const auto found = lease.find(author);
+    return found == lease.end() ? std::uint64_t{1} : found->second;
+  };
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const RoomRow& row = rows[i];
+    check(row.place.value == i + 1, Invariant::replay, "row " + std::to_string(i + 1) + " has the place " + number(row.place));
+    Told kept{*kind_of(row), false, {}, 0, {}};
+    bool bone_back = false;
+    if (const auto* cut = std::get_if<CutRow>(&row.what)) {
+      const Digest bytes = cut_digest(cut->cut);
+      kept = {EventKind::cut, false, cut->cut.author, cut->cut.author_seq, bytes};
+      check_author(row, cut->cut.author, cut->cut.author_seq, bytes, newest);
+      check(cut->cut.lease_epoch == lease_of(cut->cut.author), Invariant::lease,
+            "row " + number(row.place) + ", " + whose(cut->cut.author, cut->cut.author_seq) + ", is of lease " +
+                std::to_string(cut->cut.lease_epoch) + " where " + std::to_string(lease_of(cut->cut.author)) + " holds");
+      of_bone[row.place] = true;
+    } else if (const auto* rejection = std::get_if<RejectionRow>(&row.what)) {
+      kept = {EventKind::cut, true, rejection->author, rejection->author_seq, {}};
+      check_author(row, rejection->author, rejection->author_seq, rejection->bytes, newest);
+      if (rejection->reason == Rejection::lease) {
+        const std::vector<Cut>& own = made_[rejection->author];
+        check(rejection->author_seq <= own.size() && own[rejection->author_seq - 1].lease_epoch != lease_of(rejection->author),
+              Invariant::lease, "row " + number(row.place) + " rejects a cut of the lease that holds");
+      } else {
+        lease[rejection->author] = row.place.value + 1;
+      }
+    } else if (const auto* join = std::get_if<JoinRow>(&row.what)) {
+      lease[join->author] = 1;
+    } else if (const auto* undo = std::get_if<UndoRow>(&row.what)) {
+      bone_back = std::ranges::any_of(undo->places, [&](RoomSeq place) { return of_bone[place]; });
+    } else if (const auto* redo = std::get_if<RedoRow>(&row.what)) {
+      bone_back = std::ranges::any_of(redo->places, [&](RoomSeq place) { return of_bone[place]; });
+    } else if (std::holds_alternative<SplitRow>(row.what) || std::holds_alternative<RemoveBodyRow>(row.what)) {
+      of_bone[row.place] = true;
+    }
+    if (bone_back)
+      for (auto& [author, epoch] : lease) epoch = row.place.value + 1;
+    const auto told = told_.find(row.place);
+    check(told == told_.end() || told->second == kept, Invariant::acknowledged,
+          "row " + number(row.place) + " is another event than was told");
+  }
+  for (const auto& [author, author_seq] : decided_)
+    check(newest[author] >= author_seq, Invariant::acknowledged, whose(author, author_seq) + " was said to be decided, and is not kept");
+}
+
+std::optional<std::vector<Cut>> Ledger::standing(std::span<const RoomRow> rows) {
+  std::map<RoomSeq, const Cut*> cuts;
+  std::set<RoomSeq> fallen;
+  for (const RoomRow& row : rows) {
+    if (std::holds_alternative<SplitRow>(row.what)) return std::nullopt;
+    if (const auto* cut = std::get_if<CutRow>(&row.what)) cuts[row.place] = &cut->cut;
+    if (const auto* undo = std::get_if<UndoRow>(&row.what)) fallen.insert(undo->places.begin(), undo->places.end());
+    if (const auto* redo = std::get_if<RedoRow>(&row.what))
+      for (const RoomSeq place : redo->places) fallen.erase(place);
+  }
+  std::vector<Cut> all;
+  for (const auto& [place, cut] : cuts)
+    if (!fallen.contains(place)) all.push_back(*cut);
+  return all;
+}
+
+}  // namespace osteon::test

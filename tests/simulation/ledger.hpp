@@ -1,0 +1,77 @@
+// What a simulated room has promised, noted where it was heard, and what is wrong with its journal in the light of that.
+#pragma once
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "server/room/room.hpp"
+
+namespace osteon::test {
+
+// Which promise was broken.
+enum class Invariant {
+  one_bone,        // after quiet all hold the same
+  set_of_cuts,     // any order and repetition of the standing cuts gives that bone
+  acknowledged,    // what anyone was told is in the journal, after every crash
+  replay,          // replay = live = checkpoint and tail
+  lease,           // nothing of a stale lease is committed
+  bounds,          // queues stay within them
+  author_order,    // no gap, duplicate or foreign cut of an author
+  decided,         // every cut of a client that is there is decided
+  served,          // nobody is turned away, and what must work works
+};
+[[nodiscard]] std::string_view name(Invariant invariant);
+
+struct Fault {
+  Invariant invariant;
+  std::string sentence;
+};
+
+class Ledger {
+ public:
+  void fault(Invariant invariant, std::string sentence);
+  void check(bool holds, Invariant invariant, const std::string& sentence) {
+    if (!holds) fault(invariant, sentence);
+  }
+
+  // An author's cuts as he made them; numbered from 1.
+  void made(const Cut& cut);
+  // What a client heard, or was answered.
+  void told_committed(RoomSeq place, const Cut& cut);
+  void told_rejected(RoomSeq place, AuthorId author, std::uint64_t author_seq);
+  void told_event(RoomSeq place, EventKind kind);
+  void told_up_to(RoomSeq place);                                    // the room was said to stand there
+  void told_decided(AuthorId author, std::uint64_t author_seq);      // up to this one
+
+  // Everything that the rows of a journal can be held against.
+  void check_rows(std::span<const RoomRow> rows);
+  // Cuts that no undo has taken back; nothing when pieces came apart.
+  [[nodiscard]] static std::optional<std::vector<Cut>> standing(std::span<const RoomRow> rows);
+
+  [[nodiscard]] const std::vector<Fault>& faults() const { return faults_; }
+  [[nodiscard]] std::uint64_t acknowledged() const { return told_.size(); }  // rows
+
+ private:
+  struct Told {
+    EventKind kind = EventKind::cut;
+    bool rejected = false;
+    AuthorId author;               // of a cut
+    std::uint64_t author_seq = 0;
+    Digest bytes;                  // of a committed cut
+    friend bool operator==(const Told&, const Told&) = default;
+  };
+  void told(RoomSeq place, const Told& what);
+  void check_author(const RoomRow& row, AuthorId author, std::uint64_t author_seq, const Digest& bytes,
+                    std::map<AuthorId, std::uint64_t>& newest);
+
+  std::map<AuthorId, std::vector<Cut>> made_;
+  std::map<RoomSeq, Told> told_;
+  std::map<AuthorId, std::uint64_t> decided_;
+  RoomSeq furthest_;
+  std::vector<Fault> faults_;
+};
+
+}  // namespace osteon::test

@@ -1,0 +1,36 @@
+// Seeds as a test runs them.
+#pragma once
+#include <gtest/gtest.h>
+
+#include <cstdint>
+
+#include "common/runtime/log.hpp"
+#include "tests/simulation/simulate.hpp"
+
+namespace osteon::test {
+
+// What a room or a journal logs of the trouble that it is given is no news.
+inline SimulationReport simulate_quietly(std::uint64_t seed, const SimulationOptions& options = {}) {
+  static const bool open = (log::open("simulation"), true);
+  (void)open;
+  testing::internal::CaptureStderr();
+  SimulationReport report = simulate(seed, options);
+  (void)testing::internal::GetCapturedStderr();
+  return report;
+}
+
+inline void expect_no_faults(const SimulationReport& report, const char* option) {
+  for (const Fault& fault : report.faults)
+    ADD_FAILURE() << "seed " << report.seed << ": " << name(fault.invariant) << ": " << fault.sentence
+                  << "\nagain: osteon-simulate --verbose --seeds " << report.seed << option;
+}
+
+// In how many of the first seeds something so broken is found.
+inline std::uint64_t found(Breakage breakage, std::uint64_t seeds) {
+  std::uint64_t failing = 0;
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed)
+    failing += simulate_quietly(seed, {.full = false, .breakage = breakage}).faults.empty() ? 0 : 1;
+  return failing;
+}
+
+}  // namespace osteon::test

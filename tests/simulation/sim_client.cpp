@@ -1,0 +1,371 @@
+#include "tests/simulation/sim_client.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "common/wire/convert.hpp"
+#include "osteon/v1/cutting.pb.h"
+#include "tests/support/scenes/bones.hpp"
+
+namespace osteon::test {
+
+using namespace std::chrono_literals;
+
+namespace {
+
+constexpr auto kCutTime = 8ms;
+constexpr auto kFirstAnswer = 5s, kLaterAnswers = 1s;  // common/wire/room_client.cpp
+constexpr std::size_t kWindowBytes = 64 * 1024;        // of HTTP/2
+
+// What a program may be told that ends it without a fault: its user begins again.
+bool may_be_told(const std::string& why) {
+  return why.starts_with("the server stops") || why.starts_with("the room takes no more cuts") ||
+         why.find("takes no more rows") != std::string::npos;  // of the journal
+}
+
+}  // namespace
+
+SimClient::SimClient(VirtualTime& time, Ledger& ledger, SimServer& server, std::uint64_t seed, const Case& bone,
+                     const HandPlan& hand, Breakage breakage)
+    : time_(time), ledger_(ledger), server_(server), random_(seed), path_(time, seed + 1, {}), bone_(bone), hand_(hand),
+      breakage_(breakage), cuts_left_(hand.cuts) {}
+
+template <class Call>
+void SimClient::later(Time in, Call call) {
+  time_.post_in(in, [this, life = life_, call = std::move(call)]() mutable {
+    if (life == life_) call();
+  });
+}
+
+// One request and its answer. Error unavailable: none came, and any other: the server's own.
+template <class Answer>
+void SimClient::ask(std::function<void(std::function<void(const Result<Answer>&)>)> request, Time patience,
+                    std::function<void(const Result<Answer>&)> heard) {
+  const auto over = std::make_shared<bool>(false);  // shared by what may come first
+  const auto finish = [this, over, life = life_, heard = std::move(heard)](const Result<Answer>& answer) {
+    if (!std::exchange(*over, true) && life == life_) heard(answer);
+  };
+  time_.post_in(patience, [finish] { finish(failure(ErrorCode::unavailable, "no answer")); });
+  const std::optional<Time> there = path_.arrival();
+  if (!there) return;
+  time_.post(*there, [this, finish, request = std::move(request)] {
+    const auto back = [this, finish](const Result<Answer>& answer) {
+      if (const std::optional<Time> here = path_.arrival()) time_.post(*here, [finish, answer] { finish(answer); });
+    };
+    if (!server_.up()) return back(failure(ErrorCode::unavailable, "nobody answers"));
+    request([back](const Result<Answer>& answer) {
+      if (answer || answer.error().code != ErrorCode::unavailable) return back(answer);
+      back(failure(ErrorCode::unsupported, answer.error().message));  // FAILED_PRECONDITION, the server's own word
+    });
+  });
+}
+
+void SimClient::start() {
+  ++programs_;
+  room_.reset();
+  stream_.reset();
+  underway_.emplace(kMostUnderway);
+  backoff_.emplace(random_.index(1 << 30), BackoffBounds{.least = 20ms, .most = 2s});
+  tools_ = builtin_tool_box();
+  replica_.emplace(bone_, BodyId{0}, tools_);
+  watch_ = {};
+  health_ = haptic::RoomHealth::follows;
+  from_room_.clear();
+  renewed_.clear();
+  own_.clear();
+  work_planned_ = bone_is_here_ = interrupted_ = heard_ = false;
+  join();
+}
+
+void SimClient::start_anew() {
+  if (stream_) stream_->leave(SimStream::client);
+  ++life_;
+  later(drawn(random_, 300ms, 2s), [this] { start(); });
+}
+
+void SimClient::lost(const std::string& why) {
+  ledger_.check(may_be_told(why), Invariant::served, "a client was turned away: " + why);
+  start_anew();
+}
+
+void SimClient::leave() {
+  if (stream_) stream_->leave(SimStream::client);
+  stream_.reset();
+  gone_ = true;
+  ++life_;
+}
+
+void SimClient::join() {
+  const std::string user = random_.unit() < 0.3 ? "user " + std::to_string(random_.index(3)) : "";
+  ask<SimServer::Joined>([this, user](auto answer) { server_.join({.name = user, .resume = {}, .secret = {}, .kept = {}}, answer); },
+                         kFirstAnswer, [this](const Result<SimServer::Joined>& room) {
+                           if (room) return joined(*room);
+                           if (room.error().code != ErrorCode::unavailable) return lost(room.error().message);
+                           later(drawn(random_, 100ms, 1s), [this] { join(); });
+                         });
+}
+
+void SimClient::joined(const SimServer::Joined& room) {
+  room_ = room;
+  lease_epoch_ = room.lease_epoch;
+  reader_.emplace(
+      room.author, tools_, events(), [this](std::uint64_t author_seq) { underway_->decided(author_seq); },
+      [this](std::uint64_t author_seq) {
+        ledger_.told_decided(room_->author, author_seq);
+        underway_->go_on(author_seq);
+        send();
+      });
+  open_line();
+  later(drawn(random_, 0ns, 100ms), [this] { move_hand(); });
+}
+
+void SimClient::open_line() {
+  stream_ = std::make_shared<SimStream>(path_, random_.unit() < 0.2 ? 2048 : kWindowBytes);
+  underway_->stop();
+  reader_->begin();
+  const auto on_line = [this, life = life_, line = stream_.get()](auto call) {
+    if (life == life_ && stream_.get() == line) call();
+  };
+  stream_->listen(SimStream::client, {.message = [this, on_line](std::string bytes) { on_line([&] { hear(bytes); }); },
+                                      .writable = [this, on_line] { on_line([&] { send(); }); },
+                                      .ended = [this, on_line](const Ending& ending) { on_line([&] { line_ended(ending); }); }});
+  stream_->stop_reading(SimStream::server);
+  v1::SessionRequest request;
+  request.mutable_open()->set_author(room_->author.value);
+  request.mutable_open()->set_server_epoch(room_->server_epoch);
+  request.mutable_open()->set_secret(room_->secret);
+  stream_->write(SimStream::client, request.SerializeAsString());
+  const std::optional<Time> there = path_.arrival();
+  if (!there) return stream_->break_off("the server cannot be reached");
+  time_.post(*there, [this, line = stream_] {
+    server_.accept(line);
+    line->read_on(SimStream::server);
+  });
+}
+
+void SimClient::line_ended(const Ending& ending) {
+  if (ending.stands) return lost(ending.why);
+  pass(Interrupted{});
+  come_again();
+}
+
+void SimClient::come_again() {
+  later(backoff_->next(), [this] {
+    SimServer::JoinRequest request{.name = {}, .resume = room_->author, .secret = room_->secret, .kept = {}};
+    if (const auto& kept = reader_->kept()) request.kept = JournalHead{kept->room_seq, kept->chain};
+    ask<SimServer::Joined>([this, request](auto answer) { server_.join(request, answer); }, kLaterAnswers,
+                           [this](const Result<SimServer::Joined>& again) {
+                             if (!again && again.error().code == ErrorCode::unavailable) return come_again();
+                             if (!again) return lost(again.error().message);
+                             backoff_->reset();
+                             room_ = *again;
+                             ++resumed_;
+                             open_line();
+                           });
+  });
+}
+
+void SimClient::send() {
+  if (!stream_) return;
+  while (stream_->writable(SimStream::client)) {
+    const std::optional<Cut> cut = underway_->take_cut();
+    if (!cut) return;
+    v1::SessionRequest request;
+    *request.mutable_cut() = wire::to_wire(*cut);
+    stream_->write(SimStream::client, request.SerializeAsString());
+  }
+}
+
+void SimClient::hear(const std::string& bytes) {
+  v1::SessionResponse response;
+  ledger_.check(response.ParseFromString(bytes), Invariant::served, "a message cannot be parsed");
+  if (const Result<void> taken = reader_->take(std::move(response)); !taken)
+    lost("it sent what no correct server sends: " + taken.error().message);
+}
+
+RoomEvents SimClient::events() {
+  RoomEvents events;
+  events.leaf = [this](const FieldLeaf& leaf) { pass(leaf); };
+  events.complete = [this](const RoomAtJoin& room) {
+    ledger_.told_up_to(room.contained);
+    pass(room);
+  };
+  events.committed = [this](RoomSeq place, const Cut& cut) {
+    ledger_.told_committed(place, cut);
+    if (cut.author == room_->author) ledger_.told_decided(cut.author, cut.author_seq);
+    pass(Committed{place, cut});
+  };
+  events.rejected = [this](RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string&) {
+    ledger_.told_rejected(place, room_->author, author_seq);
+    ledger_.told_decided(room_->author, author_seq);
+    pass(Rejected{place, author_seq, lease_epoch});
+  };
+  events.change = [this](BonePart&& part) {
+    ledger_.told_up_to(part.place);
+    pass(std::move(part));
+  };
+  events.scene = [this](RoomSeq place, const std::vector<SceneItem>&) { pass(Noted{place}); };
+  events.tool = [this](RoomSeq place) { pass(Noted{place}); };
+  return events;
+}
+
+void SimClient::pass(FromRoom event) {
+  from_room_.push_back(std::move(event));
+  if (!std::exchange(work_planned_, true)) later(drawn(random_, 0ns, 4ms), [this] { work(); });
+}
+
+void SimClient::work() {
+  work_planned_ = false;
+  heard_ = !from_room_.empty();
+  while (!from_room_.empty()) {
+    const FromRoom event = std::move(from_room_.front());
+    from_room_.pop_front();
+    std::visit([this](const auto& one) { take(one); }, event);
+  }
+  replica_->settle();
+  (void)replica_->take_changes();
+  watch();
+}
+
+void SimClient::take(const FieldLeaf& leaf) {
+  if (interrupted_)
+    renewed_.push_back(leaf);
+  else
+    replica_->restore(leaf);
+}
+
+void SimClient::take(const Interrupted&) {
+  interrupted_ = bone_is_here_;
+  renewed_.clear();
+  if (!bone_is_here_) replica_.emplace(bone_, BodyId{0}, tools_);
+}
+
+void SimClient::take(const RoomAtJoin& room) {
+  if (interrupted_ && breakage_ != Breakage::replica) {
+    replica_->renew(room.contained, room.bodies, renewed_, room.decided_author_seq);
+    follow_lease(room.lease_epoch);
+  } else {
+    for (const FieldLeaf& leaf : renewed_) replica_->restore(leaf);
+    replica_->change(room.contained, room.bodies, {});
+    replica_->joined(room.contained);
+    lease_epoch_ = room.lease_epoch;
+  }
+  interrupted_ = false;
+  renewed_.clear();
+  bone_is_here_ = true;
+}
+
+void SimClient::take(const Committed& committed) {
+  replica_->commit(committed.place, committed.cut, committed.cut.author == room_->author);
+}
+
+void SimClient::take(const Rejected& rejected) {
+  replica_->reject(rejected.place, rejected.author_seq);
+  follow_lease(rejected.lease_epoch);
+}
+
+void SimClient::take(const BonePart& part) {
+  replica_->change(part.place, part.bodies, part.leaves);
+  follow_lease(part.lease_epoch);
+}
+
+void SimClient::follow_lease(std::uint64_t epoch) {
+  if (epoch <= lease_epoch_) return;
+  lease_epoch_ = epoch;
+  replica_->lease(epoch);
+}
+
+void SimClient::watch() {
+  const bool silent = interrupted_ && replica_->unconfirmed() == 0;
+  const double now_s = std::chrono::duration<double>(time_.now()).count();
+  health_ = watch_.update(now_s, std::exchange(heard_, false) && !interrupted_, silent ? 1 : replica_->unconfirmed());
+  if (health_ == haptic::RoomHealth::lost) lost("the server stops answering");
+}
+
+bool SimClient::settled() const {
+  return room_ && stream_ && stream_->at_rest() && bone_is_here_ && !interrupted_ && from_room_.empty() && underway_->undecided() == 0 && replica_->unconfirmed() == 0;
+}
+
+std::string SimClient::standing() const {
+  if (gone_) return "gone";
+  if (!room_) return "not joined";
+  return "author " + std::to_string(room_->author.value) + ", " + (bone_is_here_ ? "" : "without its bone, ") +
+         (interrupted_ ? "interrupted, " : "") + std::to_string(underway_->undecided()) + " cuts undecided, " +
+         std::to_string(replica_->unconfirmed()) + " unconfirmed, at place " + std::to_string(replica_->room_seq().value);
+}
+
+// The hand's loop: a run of cuts, a pause, perhaps something else.
+void SimClient::move_hand() {
+  watch();
+  if (resting_ || cuts_left_ <= 0) return later(250ms, [this] { move_hand(); });
+  if (!bone_is_here_ || health_ != haptic::RoomHealth::follows) return later(50ms, [this] { move_hand(); });
+  const auto at = [&] { return random_.between(-hand_.reach_mm, hand_.reach_mm); };
+  at_ = quantise(pose_along({at(), at(), random_.between(-1.0, 0.0)}, {0, 0, -1}));
+  cut(1 + static_cast<int>(random_.index(static_cast<std::size_t>(hand_.run))));
+}
+
+void SimClient::cut(int left) {
+  watch();
+  if (left == 0 || resting_ || cuts_left_ <= 0 || health_ != haptic::RoomHealth::follows || underway_->undecided() >= kMostUnderway) {
+    if (!resting_) do_something_else();
+    return later(drawn(random_, 10ms, hand_.pause_most), [this] { move_hand(); });
+  }
+  --cuts_left_;
+  ++cuts_made_;
+  const Pose from = dequantise(at_);
+  const Vec3 to = from.position_mm + Vec3{random_.between(-0.4, 0.4), random_.between(-0.4, 0.4), random_.between(-0.2, 0.1)};
+  Cut one = straight_cut(hand_.tools[random_.index(hand_.tools.size())], from.position_mm, to, {0, 0, -1}, own_.size() + 1);
+  one.author = room_->author;
+  one.lease_epoch = lease_epoch_;
+  one.level = std::min(one.level, hand_.level);
+  one.path_us = 8000;
+  if (random_.unit() < hand_.beyond / 4) {
+    // One that no room takes.
+    if (random_.unit() < 0.5) one.path.back().position[0] += 1 << 20;
+    else one.spindle_rpm = 200'000;
+  }
+  at_ = quantise(pose_along(to, {0, 0, -1}));
+  own_.push_back(one);
+  ledger_.made(one);
+  const bool pushed = underway_->push(one);
+  ledger_.check(pushed && underway_->undecided() <= kMostUnderway, Invariant::bounds, "cuts under way are beyond their bound");
+  send();
+  replica_->add_own(one);
+  ledger_.check(replica_->unconfirmed() <= haptic::RoomWatch::kMostUnconfirmed + 1, Invariant::bounds, "a replica holds too much unconfirmed");
+  later(kCutTime, [this, left] { cut(left - 1); });
+}
+
+void SimClient::do_something_else() {
+  double which = random_.unit();
+  const auto chance = [&](double share) {
+    which -= share;
+    return which < 0;
+  };
+  const std::size_t count = 1 + random_.index(3);
+  if (chance(hand_.undo)) {
+    const bool own = random_.unit() < 0.5;
+    return change([count, own](Room& room, AuthorId by) { return room.undo_last(by, count, own ? by : AuthorId{}); });
+  }
+  if (chance(hand_.redo)) return change([count](Room& room, AuthorId by) { return room.redo_last(by, count); });
+  if (chance(hand_.mark)) return change([](Room& room, AuthorId by) { return room.mark(by, "here"); });
+  if (chance(hand_.again) && stream_ && underway_->may_go() && stream_->writable(SimStream::client)) {
+    // Sent again although it is decided: the answer was lost, for all the server knows.
+    const std::size_t sent = own_.size() - underway_->undecided();
+    if (sent == 0) return;
+    v1::SessionRequest request;
+    *request.mutable_cut() = wire::to_wire(own_[random_.index(sent)]);
+    stream_->write(SimStream::client, request.SerializeAsString());
+  }
+}
+
+void SimClient::change(std::function<Result<RoomEvent>(Room&, AuthorId)> change) {
+  ask<RoomEvent>(
+      [this, change = std::move(change), by = room_->author](auto answer) {
+        server_.change([change, by](Room& room) { return change(room, by); }, answer);
+      },
+      5s, [this](const Result<RoomEvent>& event) {
+        if (event && event->room_seq) ledger_.told_event(event->room_seq, event->kind);
+      });
+}
+
+}  // namespace osteon::test

@@ -1,0 +1,138 @@
+// A haptic client on virtual time: joins, cuts with a seeded hand, keeps a replica, comes back when its line breaks. Between
+// SimStream and the replica are the parts that osteon-haptic has there.
+#pragma once
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/link/backoff.hpp"
+#include "haptic_client/control/replica.hpp"
+#include "haptic_client/control/room_watch.hpp"
+#include "haptic_client/net/cuts_underway.hpp"
+#include "haptic_client/net/session_reader.hpp"
+#include "tests/simulation/ledger.hpp"
+#include "tests/simulation/sim_server.hpp"
+#include "tests/simulation/sim_stream.hpp"
+
+namespace osteon::test {
+
+struct HandPlan {
+  std::vector<Tool> tools;
+  int level = 0;                 // of every cut, at most
+  double reach_mm = 3.0;         // from the middle of the block's upper face
+  int cuts = 30;                 // in all
+  int run = 8;                   // cuts behind each other, at most
+  std::chrono::nanoseconds pause_most = std::chrono::milliseconds(800);  // between two runs
+  // Between two runs, with these chances:
+  double undo = 0.12, redo = 0.06, mark = 0.05, again = 0.15, beyond = 0.08;
+};
+
+class SimClient {
+ public:
+  using Time = VirtualTime::Time;
+  static constexpr std::size_t kMostUnderway = 1024;  // RoomSession::kMaxWaitingCuts
+
+  SimClient(VirtualTime& time, Ledger& ledger, SimServer& server, std::uint64_t seed, const Case& bone, const HandPlan& hand,
+            Breakage breakage);
+  void start();                  // the program; its hand begins when the bone is there
+  void rest() { resting_ = true; }
+  void leave();                  // for good
+  void break_line(const std::string& why) {
+    if (stream_) stream_->break_off(why);
+  }
+  [[nodiscard]] SimPath& path() { return path_; }
+
+  [[nodiscard]] bool here() const { return !gone_; }
+  [[nodiscard]] bool settled() const;
+  [[nodiscard]] std::string standing() const;        // for messages
+  [[nodiscard]] Digest hash() const { return replica_->hash(); }
+  [[nodiscard]] RoomSeq room_seq() const { return replica_->room_seq(); }
+  [[nodiscard]] std::uint64_t cuts() const { return cuts_made_; }
+  [[nodiscard]] std::uint64_t resumed() const { return resumed_; }
+  [[nodiscard]] std::uint64_t programs() const { return programs_; }
+
+ private:
+  struct Committed {
+    RoomSeq place;
+    Cut cut;
+  };
+  struct Rejected {
+    RoomSeq place;
+    std::uint64_t author_seq, lease_epoch;
+  };
+  struct Noted {
+    RoomSeq place;
+  };
+  struct Interrupted {};
+  using FromRoom = std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, Noted, Interrupted>;
+
+  template <class Answer>
+  void ask(std::function<void(std::function<void(const Result<Answer>&)>)> request, Time patience,
+           std::function<void(const Result<Answer>&)> heard);
+  template <class Call>
+  void later(Time in, Call call);                    // unless the program has ended by then
+  void join();
+  void joined(const SimServer::Joined& room);
+  void open_line();
+  void line_ended(const Ending& ending);
+  void come_again();
+  void lost(const std::string& why);
+  void start_anew();
+  void send();
+  void hear(const std::string& bytes);
+  [[nodiscard]] RoomEvents events();
+
+  void pass(FromRoom event);
+  void work();                                       // the replica's thread wakes up
+  void take(const FieldLeaf& leaf);
+  void take(const RoomAtJoin& room);
+  void take(const Committed& committed);
+  void take(const Rejected& rejected);
+  void take(const BonePart& part);
+  void take(const Noted& noted) { replica_->note(noted.place); }
+  void take(const Interrupted&);
+  void follow_lease(std::uint64_t epoch);
+  void watch();
+
+  void move_hand();
+  void cut(int left);
+  void do_something_else();
+  void change(std::function<Result<RoomEvent>(Room&, AuthorId)> change);
+
+  VirtualTime& time_;
+  Ledger& ledger_;
+  SimServer& server_;
+  Random random_;
+  SimPath path_;
+  const Case& bone_;
+  const HandPlan hand_;
+  const Breakage breakage_;
+  std::uint64_t life_ = 0, programs_ = 0;
+  bool gone_ = false, resting_ = false;
+  int cuts_left_;
+  std::uint64_t cuts_made_ = 0, resumed_ = 0;
+
+  // Of the running program.
+  std::optional<SimServer::Joined> room_;
+  std::shared_ptr<SimStream> stream_;                // shared with what is under way on it
+  std::optional<CutsUnderway> underway_;
+  std::optional<SessionReader> reader_;
+  std::optional<Backoff> backoff_;
+  std::shared_ptr<ToolBox> tools_;                   // shared with the replica's fields
+  std::optional<haptic::Replica> replica_;
+  haptic::RoomWatch watch_;
+  haptic::RoomHealth health_{};
+  std::deque<FromRoom> from_room_;
+  std::vector<FieldLeaf> renewed_;
+  std::vector<Cut> own_;
+  bool work_planned_ = false, bone_is_here_ = false, interrupted_ = false, heard_ = false;
+  std::uint64_t lease_epoch_ = 0;
+  QuantisedPose at_;
+};
+
+}  // namespace osteon::test

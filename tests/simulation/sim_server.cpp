@@ -1,0 +1,435 @@
+#include "tests/simulation/sim_server.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "common/wire/convert.hpp"
+#include "osteon/v1/cutting.pb.h"
+#include "server/journal/upkeep.hpp"
+
+namespace osteon::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kTick = std::chrono::nanoseconds(1'000'000'000 / 120);
+
+// As server/net/services.cpp makes it.
+Digest digest_of(std::string_view secret) {
+  Hasher hasher;
+  hasher.text(secret);
+  return hasher.finish();
+}
+
+std::string joined(const MessageParts& parts) {
+  std::string message;
+  for (const Bytes& part : parts) message += *part;
+  return message;
+}
+
+}  // namespace
+
+// What SessionStream of server/net/services.cpp does between gRPC and the host.
+class SimServer::Session final : public SessionSink, public std::enable_shared_from_this<Session> {
+ public:
+  static constexpr int kMaxQueuedCuts = 256;
+
+  Session(SimServer& server, std::shared_ptr<SimStream> stream) : server_(server), stream_(std::move(stream)) {}
+
+  void start() {
+    const auto self = weak_from_this();
+    const auto with = [self](auto call) {
+      if (const auto session = self.lock()) call(*session);
+    };
+    stream_->listen(SimStream::server, {.message = [with](std::string bytes) { with([&](Session& s) { s.take(bytes); }); },
+                                        .writable = [with] { with([](Session& s) { s.pump(); }); },
+                                        .ended = [with](const Ending&) { with([](Session& s) { s.gone(); }); }});
+  }
+  // The server's process is gone.
+  void die() {
+    done_ = true;
+    stream_->leave(SimStream::server);
+  }
+  [[nodiscard]] bool done() const { return done_ && queued_ == 0; }
+
+  AuthorId author() const override { return author_; }
+  void begin(RoomSeq contained, MessageParts before, Bytes complete) override {
+    outbox_.begin(contained, std::move(before), std::move(complete));
+    pump();
+  }
+  void set_leaves(std::vector<FieldLeaf> leaves) override {
+    outbox_.set_leaves(std::move(leaves));
+    pump();
+  }
+  void offer(RoomSeq place, const Bytes& row) override {
+    const auto chance = [&] { return outbox_.takes(place) && server_.random_.index(8) == 0; };
+    if (server_.condition_.breakage == Breakage::skipping && chance()) return;
+    if (server_.condition_.breakage == Breakage::ordering) {
+      if (!held_back_ && chance()) {
+        held_back_.emplace(place, row);
+        return;
+      }
+      add(outbox_.add(place, row));
+      if (held_back_) add(outbox_.add(held_back_->first, held_back_->second));
+      held_back_.reset();
+      return;
+    }
+    add(outbox_.add(place, row));
+  }
+  void answer(const Bytes& row) override { add(outbox_.add_answer(row)); }
+  void refuse(const Error& why) override { close({true, why.message}); }
+  void decided() override {
+    --queued_;
+    if (closing_ || done_ || !paused_ || queued_ >= kMaxQueuedCuts) return;
+    paused_ = false;
+    stream_->read_on(SimStream::server);
+  }
+  void end(const std::string& why) override { close({true, why}); }
+  void replaced(const std::string& why) override { close({false, why}); }
+  std::size_t waiting() const override { return outbox_.waiting(); }
+
+ private:
+  void take(const std::string& bytes) {
+    if (closing_ || done_ || server_.power_is_out()) return;
+    v1::SessionRequest request;
+    if (!request.ParseFromString(bytes)) return close({true, "a SessionRequest could not be parsed"});
+    switch (request.message_case()) {
+      case v1::SessionRequest::kOpen: return open(request.open());
+      case v1::SessionRequest::kCut: return queue(request.cut());
+      default: return close({true, "SessionRequest.message is not set"});
+    }
+  }
+
+  void open(const v1::SessionOpen& request) {
+    if (request.server_epoch() != server_.keeper_->server_epoch())
+      return close({false, "open.server_epoch is another one; join again"});
+    author_ = AuthorId{request.author()};
+    if (const Result<void> opened = server_.host_->open_session(shared_from_this(), digest_of(request.secret())); !opened)
+      close({true, opened.error().message});
+  }
+
+  void queue(const v1::Cut& message) {
+    Result<Cut> cut = wire::from_wire(message);
+    if (!cut) return close({true, cut.error().message});
+    if (cut->author != author_) return close({true, "cut.author is not the author who opened the session"});
+    if (server_.condition_.breakage == Breakage::dedup) {
+      const auto taken_again = [cut = *cut](Room& room) mutable -> Result<RoomEvent> {
+        if (cut.author_seq <= room.decided(cut.author)) {
+          cut.author_seq = room.decided(cut.author) + 1;
+          (void)room.submit(cut);
+        }
+        return failure(ErrorCode::cancelled, "nobody hears of it");
+      };
+      server_.host_->queue_event(taken_again, [](const Result<RoomEvent>&) {});
+    }
+    ++queued_;
+    server_.ledger_.check(queued_ <= kMaxQueuedCuts, Invariant::bounds, "a session has more cuts queued than it may");
+    server_.host_->queue_cut(shared_from_this(), std::move(*cut), {});
+    paused_ = queued_ >= kMaxQueuedCuts;
+    if (paused_) stream_->stop_reading(SimStream::server);
+  }
+
+  void add(bool taken) {
+    if (closing_ || done_) return;
+    server_.most_behind_ = std::max(server_.most_behind_, outbox_.waiting());
+    server_.ledger_.check(outbox_.waiting() <= SessionOutbox::kMaxRows, Invariant::bounds, "an outbox holds too many rows");
+    if (taken)
+      pump();
+    else
+      close({false, "the reader is too far behind; join again"});
+  }
+  void close(const Ending& ending) {
+    if (!closing_) closing_ = ending;
+    pump();
+  }
+  // A server without power sends nothing.
+  void pump() {
+    if (done_ || server_.power_is_out()) return;
+    while (!closing_ && stream_->writable(SimStream::server)) {
+      const MessageParts parts = outbox_.take();
+      if (parts.empty()) return;
+      stream_->write(SimStream::server, joined(parts));
+    }
+    if (!closing_) return;
+    stream_->finish(*closing_);
+    gone();
+  }
+  // The host is told from outside of its calls, as gRPC does.
+  void gone() {
+    if (std::exchange(done_, true)) return;
+    server_.time_.post_in(0ns, [self = shared_from_this(), life = server_.life_] {
+      if (self->server_.life_ == life) self->server_.host_->leave(*self);
+    });
+  }
+
+  SimServer& server_;
+  std::shared_ptr<SimStream> stream_;
+  AuthorId author_;
+  SessionOutbox outbox_;
+  std::optional<std::pair<RoomSeq, Bytes>> held_back_;
+  std::optional<Ending> closing_;
+  int queued_ = 0;
+  bool paused_ = false, done_ = false;
+};
+
+SimServer::SimServer(VirtualTime& time, Ledger& ledger, std::uint64_t seed, const Case& bone, const ServerCondition& condition)
+    : time_(time), ledger_(ledger), random_(seed), bone_(bone), condition_(condition), disk_(seed, condition.sector_bytes) {}
+
+SimServer::~SimServer() {
+  host_.reset();
+  keeper_.reset();
+}
+
+RoomKeeper::Options SimServer::options() {
+  RoomKeeper::Options options;
+  options.limits = condition_.limits;
+  options.journal.disk = &disk_;
+  options.journal.page_bytes = static_cast<int>(std::max<std::size_t>(1024, condition_.sector_bytes));
+  options.journal.durable = condition_.breakage != Breakage::forgetful;
+  return options;
+}
+
+void SimServer::boot() {
+  if (host_) return;
+  ++life_;
+  Result<KeptRoom> kept = RoomKeeper::open(file_, bone_, options());
+  if (kept && kept->keeper->server_epoch() == 0) {
+    // Closed to rows: that is for the operator.
+    ledger_.check(disk_has_failed_, Invariant::served, "a journal on a sound disk takes no rows");
+    kept = failure(ErrorCode::unavailable, "closed");
+    disk_.mend();
+    recover();
+    kept = RoomKeeper::open(file_, bone_, options());
+  }
+  if (!kept) {
+    ledger_.check(disk_.has_failed(), Invariant::served, "the journal cannot be opened: " + kept.error().message);
+    if (power_is_out()) disk_.power_returns();
+    power_fails_ = false;
+    disk_.mend();
+    return boot_later();
+  }
+  ledger_.check(!kept->made || !made_, Invariant::acknowledged, "the journal is gone");
+  made_ = true;
+  const Digest opened = kept->room.room_hash();
+  keeper_ = std::move(kept->keeper);
+  began_ = kept->room.time();
+  booted_ = time_.now();
+  jumped_ = {};
+  host_ = std::make_unique<RoomHost>(std::move(kept->room), HostRates{.tick = 0ns}, std::function<void(double)>{}, Detail::automatic, keeper_.get());
+  disk_has_failed_ = false;
+  ledger_.check(opened == replayed(), Invariant::replay, "the room that was opened is not the one of its rows");
+  plan_tick();
+}
+
+std::vector<RoomRow> SimServer::rows() {
+  // Of a copy: the journal itself is in use.
+  MemoryDisk copy(1, condition_.sector_bytes);
+  copy.load(disk_.image());
+  JournalOptions journal = options().journal;
+  journal.disk = &copy;
+  std::vector<RoomRow> rows;
+  Result<Journal> opened = Journal::open(file_, journal);
+  ledger_.check(opened.has_value(), Invariant::replay, opened ? "" : "a copy of the journal cannot be opened: " + opened.error().message);
+  if (!opened) return rows;
+  const Result<void> read = opened->read(RoomSeq{1}, [&](const JournalRow& one) {
+    Result<RoomRow> row = row_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
+    ledger_.check(row.has_value(), Invariant::replay, row ? "" : row.error().message);
+    if (row) rows.push_back(std::move(*row));
+    return row.has_value();
+  });
+  ledger_.check(read.has_value(), Invariant::replay, read ? "" : read.error().message);
+  return rows;
+}
+
+Digest SimServer::replayed() {
+  const std::vector<RoomRow> kept = rows();
+  ledger_.check_rows(kept);
+  Result<Room> room = begin_room(bone_, keeper_->genesis(), condition_.limits);
+  ledger_.check(room.has_value(), Invariant::replay, room ? "" : room.error().message);
+  if (!room) return {};
+  for (const RoomRow& row : kept)
+    if (const Result<void> replayed = room->replay(row); !replayed) {
+      ledger_.fault(Invariant::replay, replayed.error().message);
+      return {};
+    }
+  return room->room_hash();
+}
+
+Digest SimServer::live() {
+  Digest hash;
+  host_->queue_event(
+      [&](Room& room) -> Result<RoomEvent> {
+        hash = room.room_hash();
+        return RoomEvent{};
+      },
+      [](const Result<RoomEvent>&) {});
+  host_->tick(now());
+  return hash;
+}
+
+Digest SimServer::reopened(bool with_checkpoint) {
+  for (const auto& session : sessions_) session->die();
+  sessions_.clear();
+  ++life_;
+  host_->stop();
+  if (with_checkpoint) checkpoint();
+  host_.reset();
+  if (with_checkpoint) {
+    const Result<void> closed = keeper_->close();
+    ledger_.check(closed.has_value(), Invariant::served, closed ? "" : "the journal cannot be closed: " + closed.error().message);
+  }
+  keeper_.reset();
+  Result<KeptRoom> kept = RoomKeeper::open(file_, bone_, options());
+  ledger_.check(kept.has_value(), Invariant::replay, kept ? "" : kept.error().message);
+  if (!kept) return {};
+  if (with_checkpoint)
+    ledger_.check(kept->keeper->evaluated() == 0, Invariant::replay, "a checkpoint of the end was not used");
+  const Digest hash = kept->room.room_hash();
+  keeper_ = std::move(kept->keeper);
+  host_ = std::make_unique<RoomHost>(std::move(kept->room), HostRates{.tick = 0ns}, std::function<void(double)>{}, Detail::automatic, keeper_.get());
+  return hash;
+}
+
+void SimServer::boot_later() {
+  time_.post_in(drawn(random_, 50ms, 2s), [this, life = life_] {
+    if (life == life_) boot();
+  });
+}
+
+void SimServer::down() {
+  ++life_;
+  disk_has_failed_ = disk_has_failed_ || (disk_fails_ && disk_.has_failed());
+  for (const auto& session : sessions_) session->die();
+  host_.reset();
+  keeper_.reset();
+  sessions_.clear();
+}
+
+void SimServer::crash(bool power) {
+  if (!host_) return;
+  if (!power_fails_ && !disk_fails_) {
+    const Digest alive = live();
+    ledger_.check(replayed() == alive, Invariant::replay, "the journal's rows make another room than the one that crashes");
+  }
+  ++crashes_;
+  down();
+  if (power) disk_.power_returns();
+  power_fails_ = disk_fails_ = operator_comes_ = false;
+  disk_.mend();
+  boot_later();
+}
+
+void SimServer::restart() {
+  if (!host_ || disk_.has_failed()) return;
+  host_->end_streams("the server stops");
+  host_->stop();
+  checkpoint();
+  host_.reset();
+  if (!power_is_out()) {
+    const Result<void> closed = keeper_->close();
+    ledger_.check(closed || disk_.has_failed(), Invariant::served, closed ? "" : "the journal cannot be closed: " + closed.error().message);
+  }
+  down();
+  if (power_is_out()) disk_.power_returns();
+  power_fails_ = disk_fails_ = operator_comes_ = false;
+  disk_.mend();
+  boot_later();
+}
+
+void SimServer::lose_power_at(std::uint64_t nth) {
+  if (!host_ || power_fails_ || disk_fails_) return;
+  power_fails_ = true;
+  disk_.fail_power_at(nth);
+}
+
+void SimServer::fail_disk_at(std::uint64_t nth, int error, MemoryDisk::Lasting lasting) {
+  if (!host_ || power_fails_ || disk_fails_) return;
+  disk_fails_ = true;
+  disk_.fail_at(nth, error, lasting);
+}
+
+void SimServer::checkpoint() {
+  const Result<void> kept = keeper_->checkpoint(host_->room_seq(), host_->all_leaves());
+  ledger_.check(kept || disk_.has_failed(), Invariant::served, kept ? "" : "no checkpoint: " + kept.error().message);
+  after_tick();
+}
+
+void SimServer::rest() {
+  resting_ = true;
+  if (power_fails_ || disk_fails_) crash(power_fails_);
+}
+
+void SimServer::recover() {
+  const std::filesystem::path to = "/room/journal" + std::to_string(++recoveries_);
+  const Result<RecoverReport> report = recover_journal(file_, to, &disk_);
+  if (!report) return ledger_.fault(Invariant::served, "the journal cannot be recovered: " + report.error().message);
+  file_ = to;
+}
+
+void SimServer::plan_tick() {
+  const bool paused = !resting_ && random_.unit() < condition_.pauses;
+  const Time late = paused ? drawn(random_, 100ms, 3s) : drawn(random_, 0ns, condition_.late_most);
+  time_.post_in(kTick + late, [this, life = life_] {
+    if (life == life_ && host_) tick();
+  });
+}
+
+void SimServer::tick() {
+  host_->tick(now());
+  std::erase_if(sessions_, [](const auto& session) { return session->done(); });
+  plan_tick();
+  after_tick();
+}
+
+void SimServer::after_tick() {
+  if (!disk_.has_failed()) return;
+  if (power_fails_) {
+    time_.post_in(0ns, [this, life = life_] {
+      if (life == life_) crash(true);
+    });
+  } else if (disk_fails_ && !std::exchange(operator_comes_, true)) {
+    ++disk_failures_;
+    disk_has_failed_ = true;
+    // Nothing is kept any more, so nothing may be decided any more.
+    time_.post_in(drawn(random_, 300ms, 2s), [this, life = life_] {
+      if (life == life_) crash(random_.unit() < 0.5);
+    });
+  }
+}
+
+void SimServer::join(const JoinRequest& request, std::function<void(const Result<Joined>&)> answer) {
+  if (!host_ || power_is_out()) return;
+  std::string secret = request.secret;
+  if (!request.resume) {
+    secret.resize(32);
+    for (char& byte : secret) byte = static_cast<char>(random_.index(256));
+  }
+  const auto reply = [this, secret, answer = std::move(answer)](const Result<AuthorId>& author) {
+    if (power_is_out()) return;
+    if (!author) return answer(tl::unexpected(author.error()));
+    answer(Joined{*author, keeper_->server_epoch(), host_->lease_epoch(*author), secret});
+  };
+  if (!request.resume) {
+    host_->join(MemberKind::surgeon, request.name, digest_of(secret), reply);
+  } else if (const Result<void> may = host_->resume(request.resume, digest_of(secret), request.kept); !may) {
+    reply(tl::unexpected(may.error()));
+  } else {
+    reply(request.resume);
+  }
+  after_tick();
+}
+
+void SimServer::change(std::function<Result<RoomEvent>(Room&)> change, std::function<void(const Result<RoomEvent>&)> answer) {
+  if (!host_ || power_is_out()) return;
+  host_->queue_event(std::move(change), [this, answer = std::move(answer)](const Result<RoomEvent>& event) {
+    if (!power_is_out()) answer(event);
+  });
+}
+
+void SimServer::accept(const std::shared_ptr<SimStream>& stream) {
+  if (!host_ || power_is_out()) return stream->leave(SimStream::server);
+  sessions_.push_back(std::make_shared<Session>(*this, stream));
+  sessions_.back()->start();
+}
+
+}  // namespace osteon::test

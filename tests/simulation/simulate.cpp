@@ -1,0 +1,238 @@
+#include "tests/simulation/simulate.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <ctime>
+#include <memory>
+#include <variant>
+
+#include "tests/simulation/sim_client.hpp"
+#include "tests/support/scenes/bones.hpp"
+#include "tests/unit/room/parts.hpp"
+
+namespace osteon::test {
+namespace {
+
+using namespace std::chrono_literals;
+using Time = VirtualTime::Time;
+
+constexpr Time kSettling = 60s;   // at most, after all trouble
+constexpr Time kQuiet = 2s;       // then, before all must hold the same
+
+double cpu_ms() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
+
+const Case& small_block() {
+  static const Case block = plain_block(8.0, 4.0, 0.5);
+  return block;
+}
+const Case& large_block() {
+  static const Case block = plain_block(20.0, 10.0, 0.5);
+  return block;
+}
+
+class Simulation {
+ public:
+  Simulation(std::uint64_t seed, const SimulationOptions& options)
+      : options_(options), random_(seed), bone_(options.full ? large_block() : small_block()),
+        server_(time_, ledger_, random_.index(1u << 30), bone_, server_condition()) {
+    const std::size_t clients = 2 + random_.index(2);
+    for (std::size_t i = 0; i <= clients; ++i)  // and one that comes late
+      clients_.push_back(std::make_unique<SimClient>(time_, ledger_, server_, random_.index(1u << 30), bone_, hand(i == clients),
+                                                     options.breakage));
+  }
+
+  void run() {
+    plan();
+    time_.run_until(trouble_ends_);
+    end_trouble();
+    const Time began = time_.now();
+    while (!settled() && time_.now() - began < kSettling) time_.run_until(time_.now() + 50ms);
+    settled_s_ = std::chrono::duration<double>(time_.now() - began).count();
+    for (const auto& client : clients_)
+      if (client->here()) ledger_.check(client->settled(), Invariant::decided, "a client is not settled: " + client->standing());
+    time_.run_until(time_.now() + kQuiet);
+    if (server_.up())
+      check();
+    else
+      ledger_.fault(Invariant::served, "the server has not come back");
+  }
+
+  void report(SimulationReport& report) {
+    report.faults = ledger_.faults();
+    report.acknowledged = ledger_.acknowledged();
+    report.crashes = server_.crashes();
+    report.disk_failures = server_.disk_failures();
+    report.virtual_s = std::chrono::duration<double>(time_.now()).count();
+    report.settled_s = settled_s_;
+    for (const auto& client : clients_) {
+      report.cuts += client->cuts();
+      report.resumed += client->resumed();
+      report.programs += client->programs();
+    }
+    report.rows = rows_.size();
+    for (const RoomRow& row : rows_) {
+      report.committed += std::holds_alternative<CutRow>(row.what);
+      report.rejected += std::holds_alternative<RejectionRow>(row.what);
+      report.undone += std::holds_alternative<UndoRow>(row.what);
+      report.splits += std::holds_alternative<SplitRow>(row.what);
+    }
+  }
+
+ private:
+  ServerCondition server_condition() {
+    ServerCondition condition;
+    // Half of them with the bounds over time that osteon-server sets.
+    if (random_.unit() < 0.5) condition.limits = {.time_slack = 1s, .swept_voxels_per_s = 5e8};
+    condition.sector_bytes = random_.unit() < 0.5 ? 512 : 4096;
+    condition.late_most = drawn(random_, 0ms, 10ms);
+    condition.breakage = options_.breakage;
+    return condition;
+  }
+
+  HandPlan hand(bool late) {
+    HandPlan plan;
+    plan.tools = {find_tool("burr-round-3.2").value()};
+    plan.cuts = late ? 4 : 8 + static_cast<int>(random_.index(10));
+    plan.level = random_.unit() < 0.3 ? 1 : 0;
+    if (!options_.full) return plan;
+    plan.tools.push_back(find_tool("drill-3.2").value());
+    plan.cuts = late ? 20 : 60 + static_cast<int>(random_.index(60));
+    plan.level = 1;
+    plan.reach_mm = 9.0;
+    plan.run = 30;
+    return plan;
+  }
+
+  Time some_time() { return drawn(random_, 300ms, trouble_ends_); }
+  // At so many times at most, evenly drawn.
+  template <class Call>
+  void now_and_then(std::size_t most, Call call) {
+    for (std::size_t n = random_.index(most + 1); n > 0; --n) time_.post(some_time(), call);
+  }
+
+  void plan() {
+    server_.boot();
+    trouble_ends_ = options_.full ? drawn(random_, 8s, 14s) : drawn(random_, 4s, 9s);
+    for (std::size_t i = 0; i < clients_.size(); ++i) {
+      SimClient& client = *clients_[i];
+      const bool late = i + 1 == clients_.size();
+      constexpr double kLoss[] = {0, 0, 0.02, 0.1, 0.3};
+      const bool bad = options_.full || random_.unit() < 0.3;
+      client.path().set({.delay = bad ? drawn(random_, 20ms, 110ms) : drawn(random_, 0ms, 5ms),
+                         .jitter = bad ? drawn(random_, 0ms, 10ms) : 0ms,
+                         .loss = kLoss[random_.index(5)]});
+      time_.post(late ? some_time() : drawn(random_, 0ms, 800ms), [&client] { client.start(); });
+      for (std::size_t n = random_.index(3); n > 0; --n) {
+        const Time from = some_time();
+        client.path().partition(from, from + drawn(random_, 50ms, random_.unit() < 0.2 ? 8s : 1500ms));
+      }
+      now_and_then(2, [&client] { client.break_line("the connection was reset"); });
+    }
+    if (random_.unit() < 0.5) time_.post(some_time(), [this] { clients_[1]->leave(); });
+
+    now_and_then(2, [this] { server_.crash(random_.unit() < 0.5); });
+    now_and_then(2, [this] { server_.lose_power_at(1 + random_.index(60)); });
+    now_and_then(2, [this] { server_.jump_clock(drawn(random_, 100ms, 20s)); });
+    now_and_then(2, [this] {
+      if (server_.up()) server_.checkpoint();
+    });
+    if (random_.unit() < 0.15) time_.post(some_time(), [this] { server_.restart(); });
+    if (random_.unit() < 0.15)
+      time_.post(some_time(), [this] {
+        const bool full = random_.unit() < 0.5;
+        server_.fail_disk_at(1 + random_.index(40), full ? ENOSPC : EIO,
+                             random_.unit() < 0.5 ? MemoryDisk::Lasting::once : MemoryDisk::Lasting::from_then_on);
+      });
+    if (!options_.full) return;
+    now_and_then(2, [this] { part_the_bone(); });
+    now_and_then(1, [this] {
+      server_.change([](Room& room) { return room.remove_body(AuthorId{1}, room.bodies().back()); }, [](const Result<RoomEvent>&) {});
+    });
+  }
+
+  // As a saw would.
+  void part_the_bone() {
+    const int at = static_cast<int>(random_.index(16)) - 8;
+    const bool debris = random_.unit() < 0.2;
+    server_.change(
+        [this, at, debris](Room& room) {
+          return room.split(room.bodies().front(), {part(bone_, [at](int x) { return x >= at; }, debris ? 0.5 : 1000.0)}, room.bone_epoch());
+        },
+        [this](const Result<RoomEvent>& event) {
+          if (event) ledger_.told_event(event->room_seq, event->kind);
+        });
+  }
+
+  void end_trouble() {
+    server_.rest();
+    for (const auto& client : clients_) {
+      client->rest();
+      client->path().set({});
+      client->path().heal();
+    }
+  }
+
+  bool settled() {
+    return server_.up() && std::ranges::all_of(clients_, [](const auto& client) { return !client->here() || client->settled(); });
+  }
+
+  // After quiet.
+  void check() {
+    const BoneStatus status = server_.host().bone_status();
+    for (const auto& client : clients_) {
+      if (!client->here() || !client->settled()) continue;
+      ledger_.check(client->hash() == status.field_hash && client->room_seq() <= status.room_seq, Invariant::one_bone,
+                    "a client holds another bone than the room at " + std::to_string(status.room_seq.value) + ": " + client->standing());
+    }
+    const Digest live = server_.live();
+    rows_ = server_.rows();
+    ledger_.check(rows_.size() == status.room_seq.value, Invariant::replay, "the journal ends elsewhere than the room");
+    ledger_.check(server_.replayed() == live, Invariant::replay, "the journal's rows make another room");
+    if (const auto standing = Ledger::standing(rows_)) check_set(*standing, status.field_hash);
+    ledger_.check(server_.reopened(false) == live, Invariant::replay, "the room is another one after it was opened again");
+    ledger_.check(server_.reopened(true) == live, Invariant::replay, "a checkpoint makes another room");
+  }
+
+  void check_set(std::vector<Cut> cuts, const Digest& expected) {
+    for (std::size_t again = cuts.size() / 3; again > 0; --again) cuts.push_back(cuts[random_.index(cuts.size())]);
+    for (std::size_t i = cuts.size(); i > 1; --i) std::swap(cuts[i - 1], cuts[random_.index(i)]);
+    CutField field(bone_, BodyId{0});
+    for (const Cut& cut : cuts) field.apply(cut);
+    ledger_.check(field.hash() == expected, Invariant::set_of_cuts, "the standing cuts in another order make another bone");
+  }
+
+  const SimulationOptions options_;
+  Random random_;
+  const Case& bone_;
+  VirtualTime time_;
+  Ledger ledger_;
+  SimServer server_;
+  std::vector<std::unique_ptr<SimClient>> clients_;
+  std::vector<RoomRow> rows_;
+  Time trouble_ends_{};
+  double settled_s_ = 0;
+};
+
+}  // namespace
+
+SimulationReport simulate(std::uint64_t seed, const SimulationOptions& options) {
+  (void)(options.full ? large_block() : small_block());
+  SimulationReport report;
+  report.seed = seed;
+  const double began_ms = cpu_ms();
+  const std::uint64_t broken = SimStream::broken();
+  {
+    Simulation simulation(seed, options);
+    simulation.run();
+    simulation.report(report);
+  }
+  report.breaks = SimStream::broken() - broken;
+  report.cpu_ms = cpu_ms() - began_ms;
+  return report;
+}
+
+}  // namespace osteon::test

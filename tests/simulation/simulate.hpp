@@ -1,0 +1,31 @@
+// A room that is simulated: a server, its clients and all that happens to them, from one seed.
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tests/simulation/ledger.hpp"
+#include "tests/simulation/sim_server.hpp"
+
+namespace osteon::test {
+
+struct SimulationOptions {
+  bool full = false;   // a larger bone with pieces that come apart and the worst networks, instead of many small runs
+  Breakage breakage = Breakage::none;
+};
+
+struct SimulationReport {
+  std::uint64_t seed = 0;
+  std::vector<Fault> faults;
+  std::uint64_t cuts = 0;            // made
+  std::uint64_t rows = 0, committed = 0, rejected = 0, undone = 0, splits = 0;  // in the journal
+  std::uint64_t acknowledged = 0;    // rows that someone was told of
+  std::uint64_t crashes = 0, disk_failures = 0, breaks = 0, resumed = 0, programs = 0;
+  double virtual_s = 0, settled_s = 0;  // altogether; from the end of all trouble until every cut was decided and told
+  double cpu_ms = 0;
+};
+
+// The same for the same seed and options, on every machine.
+[[nodiscard]] SimulationReport simulate(std::uint64_t seed, const SimulationOptions& options = {});
+
+}  // namespace osteon::test
