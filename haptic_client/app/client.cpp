@@ -324,6 +324,8 @@ class Client {
     if (joined_ && !interrupted_) log::warn("the line to the server is interrupted", {{"reason", interrupted.why}});
     interrupted_ = joined_;
     renewed_.clear();
+    // Before that, what has come may be bone that is there again by now: it begins anew.
+    if (!joined_) replica_ = Replica(room_.bone(), BodyId{}, room_.tools());
   }
   void renew(const RoomAtJoin& room) {
     replica_.renew(room.contained, room.bodies, renewed_, room.decided_author_seq);
