@@ -164,7 +164,7 @@ class Client {
     events.complete = [pass](const RoomAtJoin& room) { pass(room); };
     events.change = [pass](BonePart&& part) { pass(std::move(part)); };
     events.scene = [pass](RoomSeq place, const std::vector<SceneItem>& items) { pass(SceneSet{place, items}); };
-    events.tool = [pass](RoomSeq place) { pass(Noted{place}); };
+    events.noted = [pass](RoomSeq place) { pass(Noted{place}); };
     events.committed = [pass](RoomSeq place, const Cut& cut) { pass(Committed{place, cut}); };
     events.rejected = [pass](RoomSeq place, std::uint64_t seq, std::uint64_t lease, const std::string& why) {
       pass(Rejected{place, seq, lease, why});

@@ -82,6 +82,11 @@ void FastPath::decided(std::uint64_t author_seq) {
   link_.acknowledge(author_seq);
 }
 
+void FastPath::know_tool(std::uint32_t number, const Digest& tool) {
+  const std::lock_guard lock(mutex_);
+  link_.tools().add(number, tool);
+}
+
 FastPathHealth FastPath::health() const {
   const std::lock_guard lock(mutex_);
   const Time now = now_of_links();

@@ -36,6 +36,7 @@ class FastPath {
   // What came over the stream: a row, and the newest own cut that is decided.
   void heard(std::uint64_t index);
   void decided(std::uint64_t author_seq);
+  void know_tool(std::uint32_t number, const Digest& tool);
   [[nodiscard]] FastPathHealth health() const;
 
  private:

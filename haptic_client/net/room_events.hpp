@@ -42,7 +42,7 @@ struct RoomEvents {
   std::function<void(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason)> rejected;
   std::function<void(BonePart&& part)> change;
   std::function<void(RoomSeq place, const std::vector<SceneItem>& items)> scene;  // all that stand from now on
-  std::function<void(RoomSeq place)> tool;  // one was added
+  std::function<void(RoomSeq place)> noted;  // a tool was added, somebody came, a mark was set
   std::function<void(const Error& why)> interrupted;
   std::function<void(const Error& why)> lost;  // for good: the room is over, or knows this client no more
 };

@@ -199,6 +199,7 @@ struct RoomSession::Impl {
   // Of that thread.
   wire::JoinedRoom joined;                    // newest
   std::optional<v1::LinkOffer> offer;         // of the present stream
+  std::vector<std::pair<std::uint32_t, Digest>> numbered_tools;
 
   // Order: read_mutex, then mutex, then fast_mutex.
   std::mutex read_mutex;                      // what comes is passed on by one thread at a time
@@ -243,6 +244,11 @@ void RoomSession::Impl::write(Line& open) {
 
 void RoomSession::Impl::follow(const v1::SessionResponse& response) {
   if (response.has_link()) offer = response.link();
+  if (response.has_tool() && response.tool().tool_number() != 0)
+    if (const Result<Digest> tool = wire::digest_from_wire(response.tool().tool().tool_hash())) {
+      numbered_tools.emplace_back(response.tool().tool_number(), *tool);
+      if (const std::shared_ptr<FastPath> path = fast_path()) path->know_tool(response.tool().tool_number(), *tool);
+    }
   if (response.has_complete()) open_fast_path(response.complete().decided_author_seq());
   const std::shared_ptr<FastPath> path = fast_path();
   if (path && response.index() != 0) path->heard(response.index());
@@ -270,6 +276,7 @@ void RoomSession::Impl::open_fast_path(std::uint64_t decided) {
         wake.notify_all();
       });
   if (!opened) return;
+  for (const auto& [number, tool] : numbered_tools) (*opened)->know_tool(number, tool);
   const std::lock_guard lock(fast_mutex);
   fast = std::move(*opened);
 }
@@ -297,6 +304,7 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
     reader->begin();
   }
   offer.reset();
+  numbered_tools.clear();
   std::thread writer([&] { write(open); });
   v1::SessionResponse response;
   while (!broken && open.stream->Read(&response)) {

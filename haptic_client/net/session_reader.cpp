@@ -90,7 +90,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       const Result<Tool> tool = wire::from_wire(response.tool().tool());
       if (!tool) return tl::unexpected(tool.error());
       tools_->add(*tool);
-      if (events_.tool && response.tool().room_seq() != 0) events_.tool(RoomSeq{response.tool().room_seq()});
+      if (events_.noted && response.tool().room_seq() != 0) events_.noted(RoomSeq{response.tool().room_seq()});
       return {};
     }
     case v1::SessionResponse::kChange: {
@@ -135,6 +135,9 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       kept_ = {RoomSeq{response.kept().room_seq()}, *chain};
       return {};
     }
+    case v1::SessionResponse::kNoted:
+      if (events_.noted) events_.noted(RoomSeq{response.noted().room_seq()});
+      return {};
     case v1::SessionResponse::kLink: return {};  // the session's own
     default: return failure(ErrorCode::unsupported, "SessionResponse.message is not known to this client");
   }

@@ -26,8 +26,8 @@ using namespace osteon;
 constexpr const char* kProgram = "osteon-server";
 constexpr std::chrono::seconds kHealthEvery{10};
 
-// What is asked of a hand over a network. A swept voxel takes about a nanosecond of a core; a cup reamer asks for 2e8.
-constexpr CutLimits kServedLimits{.time_slack = std::chrono::milliseconds(1000), .swept_voxels_per_s = 5e8};
+// What is asked of a hand over a network. No surgical motor gives more than 500 W [A]. A swept voxel takes about a nanosecond of a core; a cup reamer asks for 2e8.
+constexpr CutLimits kServedLimits{.time_slack = std::chrono::milliseconds(1000), .swept_voxels_per_s = 5e8, .power_w = 500.0};
 
 struct Options {
   std::filesystem::path case_folder;

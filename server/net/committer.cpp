@@ -22,7 +22,7 @@ Committer::~Committer() {
 
 void Committer::commit(std::vector<RoomRow> rows, std::vector<Tell> tells) {
   if (rows.empty() && tells.empty()) return;
-  if (!thread_.joinable()) return keep(rows, tells);
+  if (!write_) return keep(rows, tells);
   const std::lock_guard lock(mutex_);
   std::ranges::move(rows, std::back_inserter(rows_));
   std::ranges::move(tells, std::back_inserter(tells_));
@@ -30,7 +30,7 @@ void Committer::commit(std::vector<RoomRow> rows, std::vector<Tell> tells) {
 }
 
 void Committer::drain() {
-  if (!thread_.joinable()) return;
+  if (!thread_.joinable()) return keep(std::exchange(rows_, {}), std::exchange(tells_, {}));
   std::unique_lock lock(mutex_);
   wake_.wait(lock, [&] { return !busy_ && rows_.empty() && tells_.empty(); });
 }

@@ -24,15 +24,15 @@ class Committer {
   using Tell = std::function<void(const Result<void>& durable)>;
 
   // Without a `write` nothing is kept, and all is told at once on the caller's thread. `failed`: called once, on the
-  // committing thread, before anyone is told of the error. `apart` false: no thread; commit() itself writes and tells.
+  // committing thread, before anyone is told of the error. `apart` false: no thread; drain() writes and tells.
   explicit Committer(Write write, std::function<void(const Error&)> failed = {}, bool apart = true);
-  ~Committer();  // commits what was handed over
+  ~Committer();  // commits what was handed over; without a thread it is lost, as when a process is killed
   Committer(const Committer&) = delete;
   Committer& operator=(const Committer&) = delete;
 
   // [tick] In the order of the calls: the rows, then what tells of them. Either may be empty.
   void commit(std::vector<RoomRow> rows, std::vector<Tell> tells);
-  // Waits until all that was handed over is durable and told.
+  // Returns when all that was handed over is durable and told.
   void drain();
 
   [[nodiscard]] std::size_t waiting() const;             // rows

@@ -72,6 +72,11 @@ void SessionLink::set_lease_epoch(std::uint64_t epoch) {
   link_.set_lease_epoch(epoch);
 }
 
+void SessionLink::know_tool(std::uint32_t number, const Digest& tool) {
+  const std::lock_guard lock(mutex_);
+  link_.tools().add(number, tool);
+}
+
 void SessionLink::close() {
   const std::lock_guard told(told_mutex_);
   sink_ = nullptr;

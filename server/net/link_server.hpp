@@ -43,6 +43,7 @@ class SessionLink {
   // Own cuts up to this one are decided and kept.
   void decided(std::uint64_t author_seq);
   void set_lease_epoch(std::uint64_t epoch);
+  void know_tool(std::uint32_t number, const Digest& tool);
   // Nothing is told to the sink any more once this returns.
   void close();
 

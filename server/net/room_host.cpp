@@ -57,7 +57,8 @@ struct RoomHost::Impl {
   void decide(QueuedCut& queued);
   void decide(QueuedEvent& queued);
   void later(Committer::Tell tell) { tells.push_back(std::move(tell)); }  // [tick] when what was decided is durable
-  [[nodiscard]] MessageParts rows_of(const RoomEvent& event) const;
+  [[nodiscard]] MessageParts rows_of(const RoomEvent& event);
+  [[nodiscard]] std::uint32_t number_of(const Digest& tool);
   void tell_kept(std::chrono::nanoseconds now);
   void note_changed(Clock::time_point arrived) {
     if (!driven()) mesh.changed(arrived);
@@ -86,6 +87,9 @@ struct RoomHost::Impl {
   const Clock::time_point room_began;     // the room's time 0, as if it had never been closed
   std::atomic<std::uint64_t> room_seq{0}, authors{0};
   std::atomic<bool> stopping{false};
+
+  std::mutex numbers_mutex;  // never held with another that is taken within
+  std::map<Digest, std::uint32_t> tool_numbers;
 
   std::mutex queue_mutex;
   std::vector<Queued> queue;
@@ -227,6 +231,10 @@ void RoomHost::Impl::decide(QueuedEvent& queued) {
     if (!durable) return answer(tl::unexpected(durable.error()));
     {
       const std::lock_guard lock(sessions_mutex);
+      if (event && event->tool && event->room_seq) {
+        const std::uint32_t number = number_of(event->tool->hash);
+        sessions.each([&](SessionSink& sink) { sink.know_tool(number, event->tool->hash); });
+      }
       for (const Bytes& row : rows)
         sessions.each([&](SessionSink& sink) {
           sink.offer(event->room_seq, row, {.room_seq = event->room_seq, .kind = wire::SessionRowKind::streamed});
@@ -249,11 +257,18 @@ void RoomHost::Impl::tell_kept(std::chrono::nanoseconds now) {
 }
 
 // [tick] What every session hears of an event that is not a cut. Only this thread changes the room.
-MessageParts RoomHost::Impl::rows_of(const RoomEvent& event) const {
+// Tools are numbered as they come to be told, the same for all sessions.
+std::uint32_t RoomHost::Impl::number_of(const Digest& tool) {
+  const std::lock_guard lock(numbers_mutex);
+  return tool_numbers.emplace(tool, static_cast<std::uint32_t>(tool_numbers.size() + 1)).first->second;
+}
+
+MessageParts RoomHost::Impl::rows_of(const RoomEvent& event) {
   MessageParts rows;
-  if (event.tool) rows.push_back(tool_row(event.room_seq, event.tool->tool));
+  if (event.tool) rows.push_back(tool_row(event.room_seq, event.tool->tool, number_of(event.tool->hash)));
   if (event.bone) rows = change_rows(event);
   if (event.scene) rows.push_back(scene_row(event.room_seq, room.items()));
+  if (event.kind == EventKind::join || event.kind == EventKind::mark) rows.push_back(noted_row(event.room_seq, event.mark));
   return rows;
 }
 
@@ -353,9 +368,10 @@ HostHealth RoomHost::health() const {
   return health;
 }
 
-void RoomHost::tick(std::chrono::nanoseconds now) {
+void RoomHost::tick(std::chrono::nanoseconds now, bool keep) {
   OSTEON_CHECK(impl_->driven());
   impl_->tick(now, false);
+  if (keep) impl_->committer.drain();
   (void)impl_->room.take_changes();
   (void)impl_->room.take_stale_blocks();
 }
@@ -573,8 +589,8 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, co
                                                    " has not joined this room as a haptic client; call Join first");
     for (const BodyId body : impl_->room.bodies())
       std::ranges::move(impl_->room.find_field(body)->leaf_places(), std::back_inserter(leaves));
-    for (const ToolBox::Entry* entry : impl_->room.tools()->entries())
-      before.push_back(tool_row(RoomSeq{}, entry->tool));
+    const std::vector<const ToolBox::Entry*> tools = impl_->room.tools()->entries();
+    for (const ToolBox::Entry* entry : tools) before.push_back(tool_row(RoomSeq{}, entry->tool, impl_->number_of(entry->hash)));
     before.push_back(scene_row(impl_->room.room_seq(), impl_->room.items()));
     v1::SessionResponse complete;
     complete.mutable_complete()->set_room_seq(impl_->room.room_seq().value);
@@ -593,6 +609,7 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, co
     open = sink.get();
     impl_->sessions.add(*sink);
     sink->begin(impl_->room.room_seq(), std::move(before), serialised(complete));
+    for (const ToolBox::Entry* entry : tools) sink->know_tool(impl_->number_of(entry->hash), entry->hash);
     if (impl_->ended) sink->end(*impl_->ended);
   }
   impl_->read_leaves(leaves);

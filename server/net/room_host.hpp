@@ -35,6 +35,8 @@ class SessionSink : public StreamSink {
   virtual void offer(RoomSeq place, const Bytes& row) = 0;  // a whole SessionResponse
   // The same, with what goes in few bytes of it.
   virtual void offer(RoomSeq place, const Bytes& row, const wire::SessionRow& /*fast*/) { offer(place, row); }
+  // A tool's number in few bytes: after begin() for those of the room, and before the row that adds another.
+  virtual void know_tool(std::uint32_t /*number*/, const Digest& /*tool*/) {}
   virtual void answer(const Bytes& row) = 0;                // the same, outside the room's order
   virtual void refuse(const Error& why) = 0;                // a breach of the protocol: the stream ends
   // Another stream of its author was opened. That may be one that was given up and came late, so the author may come again.
@@ -94,8 +96,9 @@ class RoomHost {
   [[nodiscard]] HostHealth health() const;
   [[nodiscard]] Digest surface_hash() const;  // of the newest blocks
 
-  // [owner of a driven host] Decides what is queued, keeps it, and tells of it. `now`: since any start, never falls.
-  void tick(std::chrono::nanoseconds now);
+  // [owner of a driven host] Decides what is queued, keeps it, and tells of it. `now`: since any start, never falls. `keep`
+  // false: that is left to a later tick, as by a slow disk.
+  void tick(std::chrono::nanoseconds now, bool keep = true);
 
   // Runs `job` on the thread for slow requests, in order; it may call the functions below.
   void run_slowly(std::function<void()> job);

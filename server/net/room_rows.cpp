@@ -56,10 +56,11 @@ Bytes kept_row(const JournalHead& head) {
   return serialised(response);
 }
 
-Bytes tool_row(RoomSeq place, const Tool& tool) {
+Bytes tool_row(RoomSeq place, const Tool& tool, std::uint32_t number) {
   v1::SessionResponse response;
   response.mutable_tool()->set_room_seq(place.value);
   *response.mutable_tool()->mutable_tool() = wire::to_wire(tool);
+  response.mutable_tool()->set_tool_number(number);
   return serialised(response);
 }
 
@@ -67,6 +68,13 @@ Bytes scene_row(RoomSeq place, const std::vector<SceneItem>& items) {
   v1::SessionResponse response;
   response.mutable_scene()->set_room_seq(place.value);
   for (const SceneItem& item : items) *response.mutable_scene()->add_items() = wire::to_wire(item);
+  return serialised(response);
+}
+
+Bytes noted_row(RoomSeq place, const std::string& mark) {
+  v1::SessionResponse response;
+  response.mutable_noted()->set_room_seq(place.value);
+  response.mutable_noted()->set_mark(mark);
   return serialised(response);
 }
 

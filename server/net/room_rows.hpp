@@ -15,8 +15,9 @@ namespace osteon {
 [[nodiscard]] Bytes cut_row(RoomSeq place, const Cut& cut);
 [[nodiscard]] Bytes rejection_row(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, Rejection reason);
 [[nodiscard]] Bytes kept_row(const JournalHead& head);
-[[nodiscard]] Bytes tool_row(RoomSeq place, const Tool& tool);
+[[nodiscard]] Bytes tool_row(RoomSeq place, const Tool& tool, std::uint32_t number);
 [[nodiscard]] Bytes scene_row(RoomSeq place, const std::vector<SceneItem>& items);
+[[nodiscard]] Bytes noted_row(RoomSeq place, const std::string& mark);
 [[nodiscard]] MessageParts change_rows(const RoomEvent& event);  // at least one; each of a bounded size
 
 }  // namespace osteon

@@ -66,6 +66,9 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     const bool fits = !committed || wire::fits_a_packet(fast.cut);
     link_->tell({index, fits ? fast : wire::SessionRow{.room_seq = place, .kind = wire::SessionRowKind::streamed}});
   }
+  void know_tool(std::uint32_t number, const Digest& tool) override {
+    if (link_) link_->know_tool(number, tool);
+  }
   void answer(const Bytes& row) override {
     const std::lock_guard lock(mutex_);
     if (!closing()) send_or_give_up(outbox_.add_answer(row));

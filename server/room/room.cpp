@@ -130,7 +130,7 @@ void Room::note_decided(AuthorId author, const Digest& bytes, RoomSeq place, Rej
   surgeons_.at(author).decided.push_back({bytes, place, rejection});
 }
 
-Rejection Room::judge(const Cut& cut) const {
+Rejection Room::judge(const Cut& cut) {
   if (!exists(cut.body)) return Rejection::body;
   const Surgeon& surgeon = surgeons_.at(cut.author);
   if (cut.lease_epoch != surgeon.epoch) return Rejection::lease;
@@ -141,7 +141,16 @@ Rejection Room::judge(const Cut& cut) const {
   if (limits_.swept_voxels_per_s > 0 &&
       voxels_spent(surgeon) + swept_voxels(cut) > kBurst_s * limits_.swept_voxels_per_s)
     return Rejection::rate;
-  return Rejection::none;
+  return beyond_power(cut) ? Rejection::power : Rejection::none;
+}
+
+bool Room::beyond_power(const Cut& cut) {
+  if (limits_.power_w <= 0) return false;
+  std::vector<const CutField*> fields;
+  for (const auto& [id, body] : bodies_)
+    if (body.present) fields.push_back(&body.field);
+  const double given_j = limits_.blow_j + limits_.power_w * 1e-6 * cut.path_us;
+  return energy_.least_j(cut, *tools_->find(cut.tool), fields) > given_j;
 }
 
 // What of a cut depends on no other.

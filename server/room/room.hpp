@@ -23,6 +23,7 @@
 #include "common/volume/field_file.hpp"
 #include "common/volume/fragments.hpp"
 #include "server/room/block_store.hpp"
+#include "server/room/cut_energy.hpp"
 #include "server/room/room_row.hpp"
 
 namespace osteon {
@@ -36,6 +37,8 @@ struct CutLimits {
   // Bounds over time, of one author; none where zero. Time is what set_time() says.
   std::chrono::nanoseconds time_slack{};   // tool time that may be claimed beyond what passed since joining
   double swept_voxels_per_s = 0;           // of the cut's level: what the kernel is asked to look at
+  double power_w = 0;                      // that a motor gives: bounds the energy of a cut beside that of a blow
+  double blow_j = 20.0;
 };
 
 // A decided cut: its place in the room's order and whether it was applied there.
@@ -65,6 +68,7 @@ struct RoomEvent {
   std::optional<Placed> set;              // as it stands now, where it was set
   std::vector<RoomSeq> places;            // undo, redo: of the events taken back or done again, oldest first
   CutReport cut;                          // of all bodies together
+  std::string mark;                       // its label
 };
 
 // What has come apart from a body. `fields`: for each piece that is no debris, in order, the field that it will have, made
@@ -228,7 +232,8 @@ class Room {
     std::optional<SceneItem> item;
   };
 
-  [[nodiscard]] Rejection judge(const Cut& cut) const;
+  [[nodiscard]] Rejection judge(const Cut& cut);
+  [[nodiscard]] bool beyond_power(const Cut& cut);
   [[nodiscard]] Rejection judge_form(const Cut& cut) const;
   [[nodiscard]] double swept_mm(const Cut& cut, const ToolBox::Entry& tool) const;
   [[nodiscard]] double swept_voxels(const Cut& cut) const;
@@ -288,6 +293,7 @@ class Room {
   Digest genesis_;
   std::vector<RoomRow> rows_;   // decided since take_rows()
   Fields fields_ = Fields::evaluate;
+  CutEnergy energy_;
   std::vector<CutField> ready_;  // while a split is applied: fields that were made for its pieces
 };
 

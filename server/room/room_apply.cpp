@@ -306,6 +306,7 @@ void Room::apply(const RoomRow& row, const ToolRow& tool, RoomEvent& event) {
 void Room::apply(const RoomRow& row, const MarkRow& mark, RoomEvent& event) {
   event.kind = EventKind::mark;
   add_event(row, EventKind::mark).label = mark.label;
+  event.mark = mark.label;
 }
 
 void Room::note_changed(BodyId id, const std::vector<LevelLeaves>& changed, RoomEvent* event) {

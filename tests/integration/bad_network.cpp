@@ -15,8 +15,11 @@ using Clock = std::chrono::steady_clock;
 
 // The UDP port that a server has said in its log.
 std::string udp_port_of(Process& server) {
-  const std::string log = server.err();
-  const std::size_t at = log.find("udp_port=");
+  std::string log;
+  std::size_t at = std::string::npos;
+  // What a process has written reaches us a moment later.
+  (void)wait_until([&] { return log = server.err(), (at = log.find("udp_port=")) != std::string::npos && log.find('\n', at) != std::string::npos; },
+                   10s);
   return at == std::string::npos ? "" : std::to_string(std::strtoul(log.c_str() + at + 9, nullptr, 10));
 }
 
@@ -32,6 +35,7 @@ BadNetworkRun run_on(const BadNetwork& network, std::uint64_t seed) {
     std::vector<std::string> arguments{"--tcp", stage.address(), "--udp", "127.0.0.1:" + udp_port_of(stage.server()),
                                        "--seed", std::to_string(seed)};
     relay.emplace(arguments);
+    if (relay->tcp().empty()) return run.fault = "osteon-impair did not start: " + relay->process().err(), run;
     address = relay->tcp();
     if (fast_path.empty()) fast_path = relay->udp();
   }

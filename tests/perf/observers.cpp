@@ -83,7 +83,7 @@ class Author {
     events.rejected = [](auto&&...) { OSTEON_CHECK(!"the server rejects what a hand cuts"); };
     events.change = [](BonePart&&) {};
     events.scene = [](RoomSeq, const std::vector<SceneItem>&) {};
-    events.tool = [](RoomSeq) {};
+    events.noted = [](RoomSeq) {};
     events.lost = [](const Error& why) { std::cerr << "osteon-observers: the author lost the room: " << why.message << "\n"; };
     session_->open(std::move(events));
     OSTEON_CHECK(wait_until([&] { return complete_.load(); }, 20s));

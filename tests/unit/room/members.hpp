@@ -84,7 +84,7 @@ class Surgeon {
                         [this](RoomSeq seq, const std::vector<SceneItem>& items) {
                           on([&] { items_ = items, seq_ = std::max(seq_, seq); });
                         },
-                    .tool = [this](RoomSeq seq) { on([&] { seq_ = seq; }); },
+                    .noted = [this](RoomSeq seq) { on([&] { seq_ = std::max(seq_, seq); }); },
                     .interrupted =
                         [this](const Error&) {
                           on([&] { interrupted_ = complete_, ++interruptions_; });

@@ -273,6 +273,46 @@ TEST(RoomLimits, BoundWhatIsSweptOverTime) {
   EXPECT_NEAR(static_cast<double>(more), 2.0 * static_cast<double>(few), 2.0);
 }
 
+// A block of 1.9 g/cm3 has an ultimate stress of 130 N/mm2: a bur of 5 mm, wholly in it, needs at least 130 N/mm2 * pi/6 * 125
+// mm3 = 8.5 J, and half of that where half of it is in air.
+TEST(RoomLimits, BoundTheEnergyOfACutByTheMotor) {
+  const auto rejection_of = [](const std::string& tool, const Vec3& at, double power_w, double blow_j, std::uint32_t path_us) {
+    Room room(test_block(), {.power_w = power_w, .blow_j = blow_j});
+    Cut cut = test::straight_cut(tool_named(tool), at, at, {0, 0, -1});
+    cut.author = room.join(MemberKind::surgeon);
+    cut.path_us = path_us;
+    return room.submit(cut)->rejection;
+  };
+  const Vec3 deep{0, 0, -8};
+  EXPECT_EQ(rejection_of("burr-round-5", deep, 1e-9, 9.5, 8000), Rejection::none);
+  EXPECT_EQ(rejection_of("burr-round-5", deep, 1e-9, 7.5, 8000), Rejection::power);
+  EXPECT_EQ(rejection_of("burr-round-5", {0, 0, -2.5}, 1e-9, 5.0, 8000), Rejection::none) << "half of it is in air";
+  EXPECT_EQ(rejection_of("burr-round-5", {0, 0, -2.5}, 1e-9, 3.5, 8000), Rejection::power);
+  EXPECT_EQ(rejection_of("burr-round-5", {0, 0, 6}, 1e-9, 0.0, 8000), Rejection::none) << "in air";
+  // 8.5 J in 20 ms are 425 W.
+  EXPECT_EQ(rejection_of("burr-round-5", deep, 500.0, 0.0, 20'000), Rejection::none);
+  EXPECT_EQ(rejection_of("burr-round-5", deep, 350.0, 0.0, 20'000), Rejection::power);
+  EXPECT_EQ(rejection_of("burr-round-5", deep, 0.0, 0.0, 0), Rejection::none) << "without the bound";
+}
+
+// What is gone already takes no energy.
+TEST(RoomLimits, ATurnInItsOwnHoleTakesNoEnergy) {
+  Room room(test_block(), {.power_w = 1e-9, .blow_j = 9.5});
+  const AuthorId hand = room.join(MemberKind::surgeon);
+  for (std::uint64_t i = 1; i <= 5; ++i) {
+    Cut cut = test::straight_cut(tool_named("burr-round-5"), {0, 0, -8}, {0, 0, -8}, {0, 0, -1}, i);
+    cut.author = hand;
+    EXPECT_TRUE(room.submit(cut)->committed()) << i;
+  }
+  Tool larger = tool_named("burr-round-5");
+  larger.name = "burr-of-the-test";
+  larger.diameter_mm = larger.cutting_length_mm = 9;
+  ASSERT_TRUE(room.add_tool(hand, larger));
+  Cut wider = test::straight_cut(larger, {0, 0, -10}, {0, 0, -10}, {0, 0, -1}, 6);
+  wider.author = hand;
+  EXPECT_EQ(room.submit(wider)->rejection, Rejection::power) << "130 N/mm2 * pi/6 * (729 - 125) mm3 = 41 J";
+}
+
 TEST(RoomMark, IsFoundAgainAndUndoneTo) {
   Room room(test_block());
   const AuthorId hand = room.join(MemberKind::surgeon);
