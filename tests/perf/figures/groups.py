@@ -13,6 +13,7 @@ import haptics
 import kernels
 import laws
 import registry
+import rooms
 
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "deploy/session"))
@@ -70,6 +71,11 @@ class Run:
         if result.returncode != 0:
             raise Failure(f"{program} ended with {result.returncode}: {(result.stderr or '').strip()[-400:]}")
         return result.stdout
+
+    def outcome(self, program, *arguments):
+        """What a program prints and its exit code, where another than 0 says something too."""
+        result = subprocess.run([self.programs / program, *map(str, arguments)], capture_output=True, text=True, check=False)
+        return result.stdout, result.returncode
 
     def phantom(self):
         case = self.folder / "phantom"
@@ -226,4 +232,5 @@ def novice(run):
 
 
 # In the order in which they run: agreement is counted after every session.
-GROUPS = {**kernels.GROUPS, **devices.GROUPS, **feel.GROUPS, **haptics.GROUPS, **laws.GROUPS, "expert": expert, "novice": novice, "rig": rig}
+GROUPS = {**kernels.GROUPS, **devices.GROUPS, **feel.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, "expert": expert,
+          "novice": novice, "rig": rig}
