@@ -613,7 +613,15 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, co
     if (impl_->ended) sink->end(*impl_->ended);
   }
   impl_->read_leaves(leaves);
-  sink->set_leaves(std::move(leaves));
+  if (!impl_->keeper) {
+    sink->set_leaves(std::move(leaves));
+    return {};
+  }
+  // They hold what may not be kept yet, and `complete` says that it is decided: nobody hears of it before it is kept.
+  queue_event([](Room&) { return RoomEvent{}; },
+              [sink, leaves = std::move(leaves)](const Result<RoomEvent>& kept) mutable {
+                if (kept) sink->set_leaves(std::move(leaves));
+              });
   return {};
 }
 
