@@ -66,13 +66,14 @@ void SimClient::start() {
   stream_.reset();
   underway_.emplace(kMostUnderway);
   backoff_.emplace(random_.index(1 << 30), BackoffBounds{.least = 20ms, .most = 2s});
-  tools_ = builtin_tool_box();
+  tools_ = std::make_shared<ToolBox>();  // the room says which it has
   replica_.emplace(bone_, BodyId{0}, tools_);
   watch_ = {};
   health_ = haptic::RoomHealth::follows;
   from_room_.clear();
   renewed_.clear();
   own_.clear();
+  felt_.clear();
   work_planned_ = bone_is_here_ = interrupted_ = heard_ = false;
   join();
 }
@@ -205,7 +206,7 @@ RoomEvents SimClient::events() {
     pass(std::move(part));
   };
   events.scene = [this](RoomSeq place, const std::vector<SceneItem>&) { pass(Noted{place}); };
-  events.tool = [this](RoomSeq place) { pass(Noted{place}); };
+  events.noted = [this](RoomSeq place) { pass(Noted{place}); };
   return events;
 }
 
@@ -224,6 +225,9 @@ void SimClient::work() {
   }
   replica_->settle();
   (void)replica_->take_changes();
+  ledger_.check(replica_->unconfirmed() == felt_.size(), Invariant::bounds,
+                "the hand feels " + std::to_string(replica_->unconfirmed()) + " undecided cuts of its own where there are " +
+                    std::to_string(felt_.size()));
   watch();
 }
 
@@ -237,10 +241,12 @@ void SimClient::take(const FieldLeaf& leaf) {
 void SimClient::take(const Interrupted&) {
   interrupted_ = bone_is_here_;
   renewed_.clear();
+  // What has come may be bone that is there again by now.
   if (!bone_is_here_) replica_.emplace(bone_, BodyId{0}, tools_);
 }
 
 void SimClient::take(const RoomAtJoin& room) {
+  std::erase_if(felt_, [&](const auto& cut) { return cut.first <= room.decided_author_seq; });
   if (interrupted_ && breakage_ != Breakage::replica) {
     replica_->renew(room.contained, room.bodies, renewed_, room.decided_author_seq);
     follow_lease(room.lease_epoch);
@@ -256,10 +262,12 @@ void SimClient::take(const RoomAtJoin& room) {
 }
 
 void SimClient::take(const Committed& committed) {
+  if (committed.cut.author == room_->author) felt_.erase(committed.cut.author_seq);
   replica_->commit(committed.place, committed.cut, committed.cut.author == room_->author);
 }
 
 void SimClient::take(const Rejected& rejected) {
+  felt_.erase(rejected.author_seq);
   replica_->reject(rejected.place, rejected.author_seq);
   follow_lease(rejected.lease_epoch);
 }
@@ -273,6 +281,7 @@ void SimClient::follow_lease(std::uint64_t epoch) {
   if (epoch <= lease_epoch_) return;
   lease_epoch_ = epoch;
   replica_->lease(epoch);
+  std::erase_if(felt_, [&](const auto& cut) { return cut.second < epoch; });
 }
 
 void SimClient::watch() {
@@ -331,6 +340,7 @@ void SimClient::cut(int left) {
   ledger_.check(pushed && underway_->undecided() <= kMostUnderway, Invariant::bounds, "cuts under way are beyond their bound");
   send();
   replica_->add_own(one);
+  felt_[one.author_seq] = one.lease_epoch;
   ledger_.check(replica_->unconfirmed() <= haptic::RoomWatch::kMostUnconfirmed + 1, Invariant::bounds, "a replica holds too much unconfirmed");
   later(kCutTime, [this, left] { cut(left - 1); });
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -132,6 +133,7 @@ class SimClient {
   std::vector<Cut> own_;
   bool work_planned_ = false, bone_is_here_ = false, interrupted_ = false, heard_ = false;
   std::uint64_t lease_epoch_ = 0;
+  std::map<std::uint64_t, std::uint64_t> felt_;      // own cuts that must be predicted: their leases
   QuantisedPose at_;
 };
 

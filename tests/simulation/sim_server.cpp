@@ -6,6 +6,7 @@
 #include "common/wire/convert.hpp"
 #include "osteon/v1/cutting.pb.h"
 #include "server/journal/upkeep.hpp"
+#include "server/net/services.hpp"
 
 namespace osteon::test {
 namespace {
@@ -13,13 +14,6 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kTick = std::chrono::nanoseconds(1'000'000'000 / 120);
-
-// As server/net/services.cpp makes it.
-Digest digest_of(std::string_view secret) {
-  Hasher hasher;
-  hasher.text(secret);
-  return hasher.finish();
-}
 
 std::string joined(const MessageParts& parts) {
   std::string message;
@@ -29,7 +23,14 @@ std::string joined(const MessageParts& parts) {
 
 }  // namespace
 
-// What SessionStream of server/net/services.cpp does between gRPC and the host.
+std::shared_ptr<ToolBox> few_tools() {
+  static const std::vector<Tool> tools{find_tool("burr-round-3.2").value(), find_tool("drill-3.2").value()};
+  auto box = std::make_shared<ToolBox>();
+  for (const Tool& tool : tools) box->add(tool);
+  return box;
+}
+
+// What SessionStream of server/net/session_service.cpp does between gRPC and the host.
 class SimServer::Session final : public SessionSink, public std::enable_shared_from_this<Session> {
  public:
   static constexpr int kMaxQueuedCuts = 256;
@@ -104,7 +105,7 @@ class SimServer::Session final : public SessionSink, public std::enable_shared_f
     if (request.server_epoch() != server_.keeper_->server_epoch())
       return close({false, "open.server_epoch is another one; join again"});
     author_ = AuthorId{request.author()};
-    if (const Result<void> opened = server_.host_->open_session(shared_from_this(), digest_of(request.secret())); !opened)
+    if (const Result<void> opened = server_.host_->open_session(shared_from_this(), digest_of_secret(request.secret())); !opened)
       close({true, opened.error().message});
   }
 
@@ -183,6 +184,7 @@ SimServer::~SimServer() {
 RoomKeeper::Options SimServer::options() {
   RoomKeeper::Options options;
   options.limits = condition_.limits;
+  options.tools = few_tools();
   options.journal.disk = &disk_;
   options.journal.page_bytes = static_cast<int>(std::max<std::size_t>(1024, condition_.sector_bytes));
   options.journal.durable = condition_.breakage != Breakage::forgetful;
@@ -268,6 +270,7 @@ Digest SimServer::live() {
 }
 
 Digest SimServer::reopened(bool with_checkpoint) {
+  if (!host_) return {};
   for (const auto& session : sessions_) session->die();
   sessions_.clear();
   ++life_;
@@ -307,7 +310,7 @@ void SimServer::down() {
 
 void SimServer::crash(bool power) {
   if (!host_) return;
-  if (!power_fails_ && !disk_fails_) {
+  if (!power_fails_ && !disk_fails_ && random_.unit() < 0.3) {
     const Digest alive = live();
     ledger_.check(replayed() == alive, Invariant::replay, "the journal's rows make another room than the one that crashes");
   }
@@ -322,6 +325,7 @@ void SimServer::crash(bool power) {
 void SimServer::restart() {
   if (!host_ || disk_.has_failed()) return;
   host_->end_streams("the server stops");
+  host_->tick(now());
   host_->stop();
   checkpoint();
   host_.reset();
@@ -356,6 +360,7 @@ void SimServer::checkpoint() {
 
 void SimServer::rest() {
   resting_ = true;
+  writes_until_ = {};
   if (power_fails_ || disk_fails_) crash(power_fails_);
 }
 
@@ -375,7 +380,8 @@ void SimServer::plan_tick() {
 }
 
 void SimServer::tick() {
-  host_->tick(now());
+  if (!resting_ && random_.unit() < condition_.slow_writes) writes_until_ = time_.now() + drawn(random_, 5ms, 400ms);
+  host_->tick(now(), time_.now() >= writes_until_);
   std::erase_if(sessions_, [](const auto& session) { return session->done(); });
   plan_tick();
   after_tick();
@@ -410,8 +416,8 @@ void SimServer::join(const JoinRequest& request, std::function<void(const Result
     answer(Joined{*author, keeper_->server_epoch(), host_->lease_epoch(*author), secret});
   };
   if (!request.resume) {
-    host_->join(MemberKind::surgeon, request.name, digest_of(secret), reply);
-  } else if (const Result<void> may = host_->resume(request.resume, digest_of(secret), request.kept); !may) {
+    host_->join(MemberKind::surgeon, request.name, digest_of_secret(secret), reply);
+  } else if (const Result<void> may = host_->resume(request.resume, digest_of_secret(secret), request.kept); !may) {
     reply(tl::unexpected(may.error()));
   } else {
     reply(request.resume);

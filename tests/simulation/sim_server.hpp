@@ -27,10 +27,14 @@ enum class Breakage {
   forgetful,    // the journal waits for no disk
 };
 
+// Those that a simulated room begins with: few, because everyone who opens or joins it makes them anew.
+[[nodiscard]] std::shared_ptr<ToolBox> few_tools();
+
 struct ServerCondition {
   CutLimits limits;
   std::size_t sector_bytes = 4096;
   std::chrono::nanoseconds late_most = std::chrono::milliseconds(1);  // of a tick
+  double slow_writes = 0.03;                                          // share of ticks whose rows take up to 0.4 s to be kept
   double pauses = 0.0005;                                             // share of ticks that come 0.1 to 3 s late
   Breakage breakage = Breakage::none;
 };
@@ -110,6 +114,7 @@ class SimServer {
   std::vector<std::shared_ptr<Session>> sessions_;  // with streams and queued cuts
   std::uint64_t life_ = 0;               // rises with every boot and crash
   Time began_{}, booted_{}, jumped_{};   // the room's time at its boot
+  Time writes_until_{};                  // the disk is busy
   bool power_fails_ = false, disk_fails_ = false, operator_comes_ = false, disk_has_failed_ = false, resting_ = false;
   std::uint64_t crashes_ = 0, disk_failures_ = 0;
   std::size_t most_behind_ = 0;

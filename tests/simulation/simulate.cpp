@@ -200,7 +200,7 @@ class Simulation {
   void check_set(std::vector<Cut> cuts, const Digest& expected) {
     for (std::size_t again = cuts.size() / 3; again > 0; --again) cuts.push_back(cuts[random_.index(cuts.size())]);
     for (std::size_t i = cuts.size(); i > 1; --i) std::swap(cuts[i - 1], cuts[random_.index(i)]);
-    CutField field(bone_, BodyId{0});
+    CutField field(bone_, BodyId{0}, few_tools());
     for (const Cut& cut : cuts) field.apply(cut);
     ledger_.check(field.hash() == expected, Invariant::set_of_cuts, "the standing cuts in another order make another bone");
   }
