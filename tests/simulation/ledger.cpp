@@ -40,6 +40,7 @@ std::string_view name(Invariant invariant) {
     case Invariant::lease: return "lease";
     case Invariant::bounds: return "bounds";
     case Invariant::author_order: return "author order";
+    case Invariant::felt: return "felt";
     case Invariant::decided: return "decided";
     case Invariant::served: return "served";
   }
@@ -79,14 +80,16 @@ void Ledger::check_author(const RoomRow& row, AuthorId author, std::uint64_t aut
         "row " + number(row.place) + " is " + whose(author, author_seq) + ", where " + std::to_string(next) + " comes next");
   const std::vector<Cut>& own = made_[author];
   if (author_seq == 0 || author_seq > own.size())
-    return fault(Invariant::author_order, "row " + number(row.place) + " is " + whose(author, author_seq) + ", who never made it");
+    return fault(Invariant::author_order,
+                 "row " + number(row.place) + " is " + whose(author, author_seq) + ", who never made it");
   check(cut_digest(own[author_seq - 1]) == bytes, Invariant::author_order,
         "row " + number(row.place) + " is " + whose(author, author_seq) + ", with other bytes than he made");
 }
 
 void Ledger::check_rows(std::span<const RoomRow> rows) {
   if (furthest_.value > rows.size())
-    fault(Invariant::acknowledged, "the room was said to stand at " + number(furthest_) + ", and " + std::to_string(rows.size()) + " rows are kept");
+    fault(Invariant::acknowledged,
+          "the room was said to stand at " + number(furthest_) + ", and " + std::to_string(rows.size()) + " rows are kept");
   std::map<AuthorId, std::uint64_t> newest, lease;  // of the leases that are not 1
   std::map<RoomSeq, bool> of_bone;                  // places of events that can be undone: whether bone comes back with them
   const auto lease_of = [&](AuthorId author) {
@@ -132,7 +135,8 @@ void Ledger::check_rows(std::span<const RoomRow> rows) {
           "row " + number(row.place) + " is another event than was told");
   }
   for (const auto& [author, author_seq] : decided_)
-    check(newest[author] >= author_seq, Invariant::acknowledged, whose(author, author_seq) + " was said to be decided, and is not kept");
+    check(newest[author] >= author_seq, Invariant::acknowledged,
+          whose(author, author_seq) + " was said to be decided, and is not kept");
 }
 
 std::optional<std::vector<Cut>> Ledger::standing(std::span<const RoomRow> rows) {

@@ -20,6 +20,7 @@ enum class Invariant {
   lease,           // nothing of a stale lease is committed
   bounds,          // queues stay within them
   author_order,    // no gap, duplicate or foreign cut of an author
+  felt,            // a hand feels those of its cuts that may still be taken, and no others
   decided,         // every cut of a client that is there is decided
   served,          // nobody is turned away, and what must work works
 };

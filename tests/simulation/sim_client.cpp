@@ -98,8 +98,9 @@ void SimClient::leave() {
 
 void SimClient::join() {
   const std::string user = random_.unit() < 0.3 ? "user " + std::to_string(random_.index(3)) : "";
-  ask<SimServer::Joined>([this, user](auto answer) { server_.join({.name = user, .resume = {}, .secret = {}, .kept = {}}, answer); },
-                         kFirstAnswer, [this](const Result<SimServer::Joined>& room) {
+  const SimServer::JoinRequest request{.name = user, .resume = {}, .secret = {}, .kept = {}};
+  ask<SimServer::Joined>([this, request](auto answer) { server_.join(request, answer); }, kFirstAnswer,
+                         [this](const Result<SimServer::Joined>& room) {
                            if (room) return joined(*room);
                            if (room.error().code != ErrorCode::unavailable) return lost(room.error().message);
                            later(drawn(random_, 100ms, 1s), [this] { join(); });
@@ -225,7 +226,7 @@ void SimClient::work() {
   }
   replica_->settle();
   (void)replica_->take_changes();
-  ledger_.check(replica_->unconfirmed() == felt_.size(), Invariant::bounds,
+  ledger_.check(replica_->unconfirmed() == felt_.size(), Invariant::felt,
                 "the hand feels " + std::to_string(replica_->unconfirmed()) + " undecided cuts of its own where there are " +
                     std::to_string(felt_.size()));
   watch();
@@ -292,7 +293,8 @@ void SimClient::watch() {
 }
 
 bool SimClient::settled() const {
-  return room_ && stream_ && stream_->at_rest() && bone_is_here_ && !interrupted_ && from_room_.empty() && underway_->undecided() == 0 && replica_->unconfirmed() == 0;
+  return room_ && stream_ && stream_->at_rest() && bone_is_here_ && !interrupted_ && from_room_.empty() &&
+         underway_->undecided() == 0 && replica_->unconfirmed() == 0;
 }
 
 std::string SimClient::standing() const {
@@ -315,7 +317,8 @@ void SimClient::move_hand() {
 
 void SimClient::cut(int left) {
   watch();
-  if (left == 0 || resting_ || cuts_left_ <= 0 || health_ != haptic::RoomHealth::follows || underway_->undecided() >= kMostUnderway) {
+  const bool may = health_ == haptic::RoomHealth::follows && underway_->undecided() < kMostUnderway;
+  if (left == 0 || resting_ || cuts_left_ <= 0 || !may) {
     if (!resting_) do_something_else();
     return later(drawn(random_, 10ms, hand_.pause_most), [this] { move_hand(); });
   }
@@ -341,7 +344,8 @@ void SimClient::cut(int left) {
   send();
   replica_->add_own(one);
   felt_[one.author_seq] = one.lease_epoch;
-  ledger_.check(replica_->unconfirmed() <= haptic::RoomWatch::kMostUnconfirmed + 1, Invariant::bounds, "a replica holds too much unconfirmed");
+  ledger_.check(replica_->unconfirmed() <= haptic::RoomWatch::kMostUnconfirmed + 1, Invariant::bounds,
+                "a replica holds too much unconfirmed");
   later(kCutTime, [this, left] { cut(left - 1); });
 }
 

@@ -15,6 +15,10 @@ using namespace std::chrono_literals;
 
 constexpr auto kTick = std::chrono::nanoseconds(1'000'000'000 / 120);
 
+std::unique_ptr<RoomHost> driven_host(Room room, RoomKeeper& keeper) {
+  return std::make_unique<RoomHost>(std::move(room), HostRates{.tick = 0ns}, nullptr, Detail::automatic, &keeper);
+}
+
 std::string joined(const MessageParts& parts) {
   std::string message;
   for (const Bytes& part : parts) message += *part;
@@ -217,7 +221,7 @@ void SimServer::boot() {
   began_ = kept->room.time();
   booted_ = time_.now();
   jumped_ = {};
-  host_ = std::make_unique<RoomHost>(std::move(kept->room), HostRates{.tick = 0ns}, std::function<void(double)>{}, Detail::automatic, keeper_.get());
+  host_ = driven_host(std::move(kept->room), *keeper_);
   disk_has_failed_ = false;
   ledger_.check(opened == replayed(), Invariant::replay, "the room that was opened is not the one of its rows");
   plan_tick();
@@ -231,8 +235,10 @@ std::vector<RoomRow> SimServer::rows() {
   journal.disk = &copy;
   std::vector<RoomRow> rows;
   Result<Journal> opened = Journal::open(file_, journal);
-  ledger_.check(opened.has_value(), Invariant::replay, opened ? "" : "a copy of the journal cannot be opened: " + opened.error().message);
-  if (!opened) return rows;
+  if (!opened) {
+    ledger_.fault(Invariant::replay, "a copy of the journal cannot be opened: " + opened.error().message);
+    return rows;
+  }
   const Result<void> read = opened->read(RoomSeq{1}, [&](const JournalRow& one) {
     Result<RoomRow> row = row_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
     ledger_.check(row.has_value(), Invariant::replay, row ? "" : row.error().message);
@@ -289,7 +295,7 @@ Digest SimServer::reopened(bool with_checkpoint) {
     ledger_.check(kept->keeper->evaluated() == 0, Invariant::replay, "a checkpoint of the end was not used");
   const Digest hash = kept->room.room_hash();
   keeper_ = std::move(kept->keeper);
-  host_ = std::make_unique<RoomHost>(std::move(kept->room), HostRates{.tick = 0ns}, std::function<void(double)>{}, Detail::automatic, keeper_.get());
+  host_ = driven_host(std::move(kept->room), *keeper_);
   return hash;
 }
 
