@@ -20,7 +20,8 @@ namespace {
 using osteon::test::Breakage;
 
 constexpr const char* kUsage =
-    "usage: osteon-simulate [--seeds FIRST..LAST] [--full] [--soak] [--verbose] [--break dedup|ordering|skipping|replica|forgetful]\n";
+    "usage: osteon-simulate [--seeds FIRST..LAST] [--full] [--soak] [--verbose]\n"
+    "                       [--break dedup|ordering|skipping|replica|forgetful]\n";
 
 bool parse(std::string_view text, std::uint64_t& first, std::uint64_t& last) {
   const std::size_t dots = text.find("..");
@@ -94,11 +95,13 @@ int main(int argc, char** argv) {
         std::fprintf(out, "  %s: %s\n", std::string(name(fault.invariant)).c_str(), fault.sentence.c_str());
   }
   const nlohmann::ordered_json summary{
-      {"seeds", last - first + 1}, {"failures", failed}, {"broken_invariants", invariants}, {"cuts", sum.cuts}, {"rows", sum.rows},
+      {"seeds", last - first + 1}, {"failures", failed}, {"broken_invariants", invariants}, {"cuts", sum.cuts},
+      {"rows", sum.rows},
       {"commits", sum.committed}, {"rejections", sum.rejected}, {"undos", sum.undone}, {"splits", sum.splits},
       {"acknowledged", sum.acknowledged}, {"crashes", sum.crashes}, {"disk_failures", sum.disk_failures}, {"breaks", sum.breaks},
       {"resumed", sum.resumed}, {"programs", sum.programs}, {"virtual_s", sum.virtual_s},
-      {"settled_s", {{"p50", percentile(settled_s, 0.5)}, {"p99", percentile(settled_s, 0.99)}, {"max", percentile(settled_s, 1)}}},
+      {"settled_s", {{"p50", percentile(settled_s, 0.5)}, {"p99", percentile(settled_s, 0.99)},
+                     {"max", percentile(settled_s, 1)}}},
       {"cpu_ms", {{"p50", percentile(cpu_ms, 0.5)}, {"p99", percentile(cpu_ms, 0.99)}, {"max", percentile(cpu_ms, 1)}}}};
   std::printf("%s\n", summary.dump(2).c_str());
   return failed == 0 ? 0 : 1;

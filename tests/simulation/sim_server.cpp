@@ -337,7 +337,8 @@ void SimServer::restart() {
   host_.reset();
   if (!power_is_out()) {
     const Result<void> closed = keeper_->close();
-    ledger_.check(closed || disk_.has_failed(), Invariant::served, closed ? "" : "the journal cannot be closed: " + closed.error().message);
+    ledger_.check(closed || disk_.has_failed(), Invariant::served,
+                  closed ? "" : "the journal cannot be closed: " + closed.error().message);
   }
   down();
   if (power_is_out()) disk_.power_returns();

@@ -19,8 +19,8 @@ std::optional<VirtualTime::Time> SimPath::arrival() {
   Time sent = now;
   for (Time again = 200ms; sent - now <= kPatience; sent += again, again *= 2) {
     const bool lost = random_.unit() < condition_.loss;
-    const Time delay = std::max(Time{}, drawn(random_, condition_.delay - condition_.jitter, condition_.delay + condition_.jitter));
-    if (!lost && !cut_off(sent)) return sent + delay;
+    const Time delay = drawn(random_, condition_.delay - condition_.jitter, condition_.delay + condition_.jitter);
+    if (!lost && !cut_off(sent)) return sent + std::max(Time{}, delay);
   }
   return std::nullopt;
 }
@@ -99,7 +99,8 @@ void SimStream::leave(End end) {
   Random& random = path_.random();
   const Time now = path_.time().now();
   // A killed process' system closes its connections at once; one whose power failed says nothing.
-  tell_ended(other(end), now + (random.unit() < 0.5 ? path_.delay() : drawn(random, 0ns, 2s)), {false, "the connection was closed"});
+  const Time heard = random.unit() < 0.5 ? path_.delay() : drawn(random, 0ns, 2s);
+  tell_ended(other(end), now + heard, {false, "the connection was closed"});
   if (random.unit() < 0.5) ends_[other(end)].lost_from = now + drawn(random, 0ns, 100ms);
 }
 
@@ -116,7 +117,8 @@ void SimStream::lose(const std::string& why) {
   for (const End end : {client, server}) {
     // What was under way may come through after the other end has given up.
     if (random.unit() < 0.7) ends_[end].lost_from = now + drawn(random, 0ns, 50ms);
-    tell_ended(end, now + (random.unit() < 0.5 ? drawn(random, 0ns, 50ms) : drawn(random, 0ns, end == client ? 3s : 12s)), {false, why});
+    const Time most = random.unit() < 0.5 ? Time{50ms} : end == client ? Time{3s} : Time{12s};
+    tell_ended(end, now + drawn(random, 0ns, most), {false, why});
   }
 }
 

@@ -150,7 +150,8 @@ class Simulation {
     if (!options_.full) return;
     now_and_then(2, [this] { part_the_bone(); });
     now_and_then(1, [this] {
-      server_.change([](Room& room) { return room.remove_body(AuthorId{1}, room.bodies().back()); }, [](const Result<RoomEvent>&) {});
+      server_.change([](Room& room) { return room.remove_body(AuthorId{1}, room.bodies().back()); },
+                     [](const Result<RoomEvent>&) {});
     });
   }
 
@@ -160,7 +161,8 @@ class Simulation {
     const bool debris = random_.unit() < 0.2;
     server_.change(
         [this, at, debris](Room& room) {
-          return room.split(room.bodies().front(), {part(bone_, [at](int x) { return x >= at; }, debris ? 0.5 : 1000.0)}, room.bone_epoch());
+          const Fragment piece = part(bone_, [at](int x) { return x >= at; }, debris ? 0.5 : 1000.0);
+          return room.split(room.bodies().front(), {piece}, room.bone_epoch());
         },
         [this](const Result<RoomEvent>& event) {
           if (event) ledger_.told_event(event->room_seq, event->kind);
@@ -185,8 +187,9 @@ class Simulation {
     const BoneStatus status = server_.host().bone_status();
     for (const auto& client : clients_) {
       if (!client->here() || !client->settled()) continue;
+      const std::string place = std::to_string(status.room_seq.value);
       ledger_.check(client->hash() == status.field_hash && client->room_seq() <= status.room_seq, Invariant::one_bone,
-                    "a client holds another bone than the room at " + std::to_string(status.room_seq.value) + ": " + client->standing());
+                    "a client holds another bone than the room at " + place + ": " + client->standing());
     }
     const Digest live = server_.live();
     rows_ = server_.rows();
