@@ -111,7 +111,11 @@ void SimClient::joined(const SimServer::Joined& room) {
   room_ = room;
   lease_epoch_ = room.lease_epoch;
   reader_.emplace(
-      room.author, tools_, events(), [this](std::uint64_t author_seq) { underway_->decided(author_seq); },
+      room.author, tools_, events(),
+      [this](std::uint64_t author_seq) {
+        ledger_.told_decided(room_->author, author_seq);
+        underway_->decided(author_seq);
+      },
       [this](std::uint64_t author_seq) {
         ledger_.told_decided(room_->author, author_seq);
         underway_->go_on(author_seq);
@@ -194,12 +198,10 @@ RoomEvents SimClient::events() {
   };
   events.committed = [this](RoomSeq place, const Cut& cut) {
     ledger_.told_committed(place, cut);
-    if (cut.author == room_->author) ledger_.told_decided(cut.author, cut.author_seq);
     pass(Committed{place, cut});
   };
   events.rejected = [this](RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string&) {
     ledger_.told_rejected(place, room_->author, author_seq);
-    ledger_.told_decided(room_->author, author_seq);
     pass(Rejected{place, author_seq, lease_epoch});
   };
   events.change = [this](BonePart&& part) {
