@@ -404,7 +404,7 @@ class Client {
     if (health == RoomHealth::follows) log::info("the server follows again");
     else log::warn("the spindle is held", {{"because", name(health)}, {"unconfirmed_cuts", replica_.unconfirmed()}});
     if (health == RoomHealth::lost && link_ok_)
-      give_up({ErrorCode::unavailable, interrupted_ ? "the line to the server has not come back; see whether it runs and can be reached"
+      give_up({ErrorCode::unavailable, interrupted_ ? "the line to the server has not come back; see whether osteon-server still runs and can be reached"
                                                     : "the server has not answered " + std::to_string(replica_.unconfirmed()) +
                                                           " cuts; see whether it runs and can be reached"});
   }

@@ -9,7 +9,7 @@
 namespace osteon {
 namespace {
 
-constexpr int kSamples = 64;      // in the body, about
+constexpr int kSamples = 64, kMostTried = 20'000;
 constexpr std::size_t kPoses = 3; // of the path, besides its last
 constexpr double kJ_per_N_mm = 1e-3;
 
@@ -24,18 +24,26 @@ const CutEnergy::Samples& CutEnergy::samples(const ToolBox::Entry& tool) {
     low[axis] = tool.body.lowest[static_cast<std::size_t>(axis)] * kQuantum_mm;
     high[axis] = tool.body.highest[static_cast<std::size_t>(axis)] * kQuantum_mm;
   }
-  // The middles of cubes, made smaller until enough of them are inside: a blade is a small part of its box.
+  // Halton's points: no two lie in one plane, so that a tool that goes forward meets them one by one. As many as it takes: a
+  // blade is a small part of its box.
+  const auto halton = [](int index, int base) {
+    double value = 0, part = 1;
+    for (; index > 0; index /= base) value += (part /= base) * (index % base);
+    return value;
+  };
   Samples made;
-  double edge_mm = std::cbrt((high - low).prod() / kSamples);
-  for (int attempt = 0; attempt < 4 && made.at_mm.size() < kSamples / 2; ++attempt, edge_mm /= 1.6) {
-    made.at_mm.clear();
-    made.volume_mm3 = edge_mm * edge_mm * edge_mm;
-    for (double x = low.x() + edge_mm / 2; x < high.x(); x += edge_mm)
-      for (double y = low.y() + edge_mm / 2; y < high.y(); y += edge_mm)
-        for (double z = low.z() + edge_mm / 2; z < high.z(); z += edge_mm)
-          if (const Vec3 p{x, y, z}; body(p) < 0.0) made.at_mm.push_back(p);
+  int tried = 0;
+  while (static_cast<int>(made.at_mm.size()) < kSamples && tried < kMostTried) {
+    ++tried;
+    const Vec3 p = low + Vec3(halton(tried, 2), halton(tried, 3), halton(tried, 5)).cwiseProduct(high - low);
+    if (body(p) < 0.0) made.at_mm.push_back(p);
   }
+  made.volume_mm3 = (high - low).prod() / tried;
   return samples_.emplace(tool.hash, std::move(made)).first->second;
+}
+
+double CutEnergy::resolution_j(const ToolBox::Entry& tool) {
+  return kJ_per_N_mm * ultimate_stress_mpa(kCorticalDensity) * samples(tool).volume_mm3;
 }
 
 double CutEnergy::least_j(const Cut& cut, const ToolBox::Entry& tool, std::span<const CutField* const> fields) {

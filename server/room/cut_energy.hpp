@@ -14,9 +14,11 @@ namespace osteon {
 class CutEnergy {
  public:
   // Bone that is inside the cutting body at one pose of the path is gone after the cut, so that the energy to take it, of the
-  // pose where that is most, is a lower bound: it refuses nothing that is possible. ∫ u(ρ) dV with u the ultimate stress
-  // (force-laws, [A]), by samples in the body. `fields`: of all bodies that the room has. J.
+  // pose where that is most, is a lower bound. ∫ u(ρ) dV with u the ultimate stress (force-laws, [A]), by samples in the body,
+  // so exact only over many cuts: see resolution_j(). `fields`: of all bodies that the room has. J.
   [[nodiscard]] double least_j(const Cut& cut, const ToolBox::Entry& tool, std::span<const CutField* const> fields);
+  // What one sample stands for in cortical bone, J.
+  [[nodiscard]] double resolution_j(const ToolBox::Entry& tool);
 
  private:
   // Points of the cutting body in the tool's frame; each stands for as much of its volume.

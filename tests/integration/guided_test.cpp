@@ -168,10 +168,17 @@ TEST(Scene, IsArrangedFromAViewersScript) {
     const auto entries = hand.session().tools()->entries();
     const auto reamer = std::ranges::find(entries, "reamer-36", [](const ToolBox::Entry* entry) { return entry->tool.name; });
     ASSERT_NE(reamer, entries.end());
-    Cut cut = straight_cut((*reamer)->tool, {-14, -13, -8}, {-14, -13, -18}, into);
-    cut.author = hand.author();
-    ASSERT_TRUE(hand.session().send(cut));
-    ASSERT_TRUE(wait_until([&] { return hand.own() == 1; }, kPatience)) << hand.rejected();
+    // As a motor of 500 W could, 0.2 mm in 60 ms: more bone at once would be refused.
+    constexpr std::uint64_t kCuts = 95;
+    for (std::uint64_t i = 1; i <= kCuts; ++i) {
+      const double from_mm = 1.0 - 0.2 * static_cast<double>(i - 1);
+      Cut cut = straight_cut((*reamer)->tool, {-14, -13, from_mm}, {-14, -13, from_mm - 0.2}, into, i);
+      cut.author = hand.author();
+      cut.path_us = 60'000;
+      ASSERT_TRUE(hand.session().send(cut));
+      std::this_thread::sleep_for(std::chrono::milliseconds(52));
+    }
+    ASSERT_TRUE(wait_until([&] { return hand.own() == kCuts; }, kPatience)) << hand.rejected();
   }
   const Answer cup = standing_of(viewer.ask("place cup-36 at -14 -13 1 along 0 0 -1"));
   const std::string cup_number = std::to_string(cup.item);

@@ -325,6 +325,7 @@ void RoomWatch::Impl::read_cutting() {
       of_join = joins;
       channel = joined.channel;
       request.set_author(joined.author.value);
+      request.set_most_hz(60);  // of what can be drawn
     }
     if (interrupted) continue;
     grpc::ClientContext context;
