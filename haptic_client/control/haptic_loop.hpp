@@ -75,6 +75,7 @@ enum LoopEvent : std::uint32_t {
   kRamping = 2048,       // after connecting, or as the room is over
   kRoomHeld = 4096,      // the room takes no cuts: the spindle stands
 };
+// Bits up to the last of them.
 inline constexpr std::size_t kLoopEvents = std::bit_width(std::uint32_t{kRoomHeld});
 
 struct LoopReport {

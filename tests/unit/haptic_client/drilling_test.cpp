@@ -12,10 +12,7 @@
 namespace osteon::haptic::test {
 namespace {
 
-PlanStep drill_step(HandKind hand) {
-  PlanStep step = straight_down("drill-3.2", hand);
-  return step;
-}
+PlanStep drill_step(HandKind hand) { return straight_down("drill-3.2", hand); }
 
 struct Mean {
   double sum = 0;

@@ -146,10 +146,7 @@ TEST(SwungShank, StopsAtAWall) {
   EXPECT_EQ(stage.allocations_, 0);
 }
 
-// ---- holes
-
-// A flat end meets the rim of a hole that is narrower, wherever it is led and however it wiggles.
-// Nor through a thin one that it would be beyond within a tick, while its tip stays where it is.
+// The wall is so thin that the shank would be beyond it within a tick, while its tip stays where it is.
 TEST(SwungShank, IsNeverTakenThroughAThinWall) {
   const Case plate = osteon::test::make_bone({Vec3(-8, -8, -30), Vec3(12, 8, 4)}, 0.25,
                                              [](const Vec3& p) { return std::abs(p.x() - 3.0) - 0.25; }, dense);
@@ -165,6 +162,9 @@ TEST(SwungShank, IsNeverTakenThroughAThinWall) {
   }
 }
 
+// ---- holes
+
+// A flat end meets the rim of a hole that is narrower, wherever it is led and however it wiggles.
 TEST(PegInHole, ANarrowerOneCannotBeEntered) {
   for (const double diameter : {9.0, 7.0}) {
     Stage stage(hole(diameter, 15.0), "end-drill");  // 9.5 mm

@@ -335,9 +335,16 @@ TEST(Recording, NamesItsEvents) {
   const std::vector<std::string> names = event_names();
   const auto named = [&](unsigned bit) { return names.at(static_cast<std::size_t>(std::countr_zero(bit))); };
   EXPECT_EQ(named(kUncovered), "uncovered");
+  EXPECT_EQ(named(kForceLimited), "force limited");
+  EXPECT_EQ(named(kSlewLimited), "slew limited");
+  EXPECT_EQ(named(kCutsWaiting), "cuts waiting");
+  EXPECT_EQ(named(kMissedTicks), "missed ticks");
+  EXPECT_EQ(named(kHeelContact), "heel contact");
+  EXPECT_EQ(named(kGuided), "guided");
   EXPECT_EQ(named(kStalled), "stalled");
   EXPECT_EQ(named(kBreakthrough), "breakthrough");
   EXPECT_EQ(named(kPushedAway), "pushed away");
+  EXPECT_EQ(named(kEnergyLimited), "energy limited");
   EXPECT_EQ(named(kRamping), "ramping");
   EXPECT_EQ(named(kRoomHeld), "room held");
   EXPECT_EQ(names.size(), kLoopEvents);

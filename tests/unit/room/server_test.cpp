@@ -101,6 +101,7 @@ TEST_F(RoomServerTest, AKilledClientDisturbsNobody) {
     ASSERT_TRUE(wait_until([&] { return gone.own() == 5; }, kPatience));
   }
   send(*survivor, strokes(survivor->author(), 20, 7));
+  // The strokes leave a crumb, which is found a moment after the last of them.
   ASSERT_TRUE(wait_until([&] { return survivor->own() == 20 && settled({survivor.get()}); }, kPatience));
   EXPECT_TRUE(watcher.read_to(survivor->seq()));
   EXPECT_EQ(wire::to_wire(survivor->hash()), status_of(survivor->session().room()).field_hash());
