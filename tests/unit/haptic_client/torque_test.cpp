@@ -294,8 +294,10 @@ class Sigma : public WithArm {
     } while (device_->read().sample <= sample_ && std::chrono::steady_clock::now() - began < kPatience);
     sample_ = device_->read().sample;
   }
-  // The hand takes the handle back to where it began; nobody presses.
+  // The hand takes the handle back to where it began; nobody presses, and nothing pushes: these cycles may take less time than
+  // the device holds the force that was last written.
   bool let_go() {
+    device_->write({});
     arm().hand(0.0, 0.0, 0.0);
     arm()->until = arm()->cycles + 2000;
     const bool there = wait_until([] { return arm()->cycles == arm()->until; }, kPatience);
