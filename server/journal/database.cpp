@@ -110,9 +110,10 @@ Result<Database> Database::open(const std::filesystem::path& file, const Disk& d
   Connection& connection = *made.connection_;
   connection.file = file.string();
   const std::string vfs = disk.vfs();
-  const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE;
-  const int code = sqlite3_open_v2(uri_of(file).c_str(), &connection.handle, flags | (options.create ? SQLITE_OPEN_CREATE : 0),
-                                   vfs.empty() ? nullptr : vfs.c_str());
+  const std::string uri = uri_of(file) + (options.peek ? "&immutable=1" : "");
+  const int flags = (options.peek ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE) | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX |
+                    SQLITE_OPEN_EXRESCODE | (options.create ? SQLITE_OPEN_CREATE : 0);
+  const int code = sqlite3_open_v2(uri.c_str(), &connection.handle, flags, vfs.empty() ? nullptr : vfs.c_str());
   if (code != SQLITE_OK) return tl::unexpected(error_of(connection.handle, connection.file));
   sqlite3_db_config(connection.handle, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   sqlite3_db_config(connection.handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);

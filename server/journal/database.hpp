@@ -43,6 +43,7 @@ struct DatabaseOptions {
   bool create = false;
   bool durable = true;  // false: SQLite waits for no write; for tests that must see rows lost
   int page_bytes = 4096;
+  bool peek = false;    // reads the file as it lies there, without its log and beside whoever has it open
 };
 
 // Not synchronised; one thread at a time.

@@ -12,6 +12,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kCheckpointsKept = 2;
+constexpr std::size_t kSliceBytes = std::size_t{1} << 20;
 constexpr std::uint64_t kTidyBytes = std::uint64_t{1} << 20;
 
 fs::path with(const fs::path& file, std::string_view end) { return file.string() + std::string(end); }
@@ -216,6 +217,27 @@ Result<void> Journal::read(RoomSeq from, const std::function<bool(const JournalR
                                       [&](const JournalRow& row, const JournalHead&) { return take(row); });
   if (walked.stopped) return tl::unexpected(*walked.stopped);
   return {};
+}
+
+Result<JournalHead> Journal::head_at(RoomSeq place) {
+  const auto chain = state_->file.chain_at(place);
+  if (!chain) return tl::unexpected(chain.error());
+  if (*chain) return JournalHead{place, **chain};
+  return failure(ErrorCode::invalid_input, state_->path.string() + " has no row " + std::to_string(place.value) +
+                                               ", its last is " + std::to_string(state_->head.place.value));
+}
+
+JournalSlice Journal::read_slice(const JournalHead& after, RoomSeq last, std::size_t most_rows) {
+  JournalSlice slice;
+  std::size_t bytes = 0;
+  Walk walked = state_->file.walk(after, std::min(last, state_->head.place), [&](const JournalRow& row, const JournalHead&) {
+    slice.rows.push_back(row);
+    bytes += row.bytes.size();
+    return slice.rows.size() < most_rows && bytes < kSliceBytes;
+  });
+  slice.head = walked.head;
+  slice.stopped = std::move(walked.stopped);
+  return slice;
 }
 
 Result<void> Journal::check_witness(const JournalHead& witness) {

@@ -32,6 +32,13 @@ class CheckpointFile {
   bool finished_ = false;
 };
 
+// Rows that follow one another, of a journal that is read bit by bit.
+struct JournalSlice {
+  std::vector<JournalRow> rows;
+  JournalHead head;              // of the last of them
+  std::optional<Error> stopped;  // why the row after it does not fit
+};
+
 // One file, NAME, with SQLite's log NAME-wal, a lock NAME.lock and checkpoints beside it. Not synchronised: one thread at a
 // time, the room's journal thread. What takes rows no more (closed_because) can still be read, backed up and recovered.
 class Journal {
@@ -60,6 +67,11 @@ class Journal {
   // Rows from this place on up to the head, held against the chain again, until `take` returns false. Error: the sentence of
   // the first that does not fit.
   [[nodiscard]] Result<void> read(RoomSeq from, const std::function<bool(const JournalRow&)>& take);
+
+  // What the journal says up to a place, not beyond head(): as stored. Error invalid_input: the row is missing.
+  [[nodiscard]] Result<JournalHead> head_at(RoomSeq place);
+  // The next rows after `after` up to `last`, each held against the chain: so many at most, and of little more than 1 MiB.
+  [[nodiscard]] JournalSlice read_slice(const JournalHead& after, RoomSeq last, std::size_t most_rows);
 
   // What somebody was told was safe, a client's last acknowledged row, say. Error unavailable: the journal is behind it, and
   // from now on closed to rows, unless it was recovered with losses (see recovered_to). Error invalid_input: the witness

@@ -123,6 +123,15 @@ bool is_partial_of(const fs::path& journal, std::string_view name) {
          parse_checkpoint_file(journal, name);
 }
 
+bool belongs_to(const fs::path& journal, std::string_view name) {
+  const std::string own = journal.filename().string();
+  if (!name.starts_with(own)) return false;
+  // The last two: of SQLite's, where somebody else looked into it.
+  for (const std::string_view end : {"", "-wal", ".failed", ".lock", "-shm", "-journal"})
+    if (name == own + std::string(end)) return true;
+  return is_partial_of(journal, name) || parse_checkpoint_file(journal, name);
+}
+
 std::string_view as_text(const Digest& digest) {
   return {reinterpret_cast<const char*>(digest.bytes.data()), digest.bytes.size()};
 }
@@ -178,6 +187,21 @@ Result<JournalFile> JournalFile::open(const fs::path& file, Disk& disk, const Da
     return failure(ErrorCode::invalid_input, file.string() + " has lost its register genesis, so no row of it can be confirmed");
   opened.genesis_ = **genesis;
   return opened;
+}
+
+Result<std::string> JournalFile::peek_genesis(const fs::path& file, Disk& disk) {
+  if (Result<void> something = check_not_empty(file, disk); !something) return tl::unexpected(something.error());
+  auto database = Database::open(file, disk, {.peek = true});
+  if (!database) return tl::unexpected(database.error());
+  const Result<std::int64_t> application = database->integer("PRAGMA application_id");
+  if (!application) return tl::unexpected(application.error());
+  if (*application != kApplication) return failure(ErrorCode::invalid_input, file.string() + " is no journal");
+  // Whoever has it open may be writing to it; but what is read wrongly does not fit its seal.
+  JournalFile peeked(file, disk, std::move(*database));
+  auto genesis = peeked.find_register(kGenesisRegister);
+  if (!genesis) return tl::unexpected(genesis.error());
+  if (!*genesis) return peeked.damaged("its register genesis");
+  return std::move(**genesis);
 }
 
 tl::unexpected<Error> JournalFile::damaged(const std::string& what) const {
@@ -351,7 +375,12 @@ Inspection JournalFile::inspect(bool files) {
   } else if (static_cast<std::uint64_t>(*rows) != found.head.place.value) {  // some have places below 1
     found.faults.push_back(file_.string() + " has rows that are in no place of the order" + std::string(kRemedy));
   }
+  inspect_beside(files, found);
+  return found;
+}
 
+void JournalFile::inspect_beside(bool files, Inspection& found) {
+  const auto note = [&](const Error& error) { found.faults.push_back(error.message); };
   if (const auto bytes = find_register(kFooterRegister); !bytes) {
     note(bytes.error());
   } else if (*bytes) {
@@ -407,7 +436,6 @@ Inspection JournalFile::inspect(bool files) {
         note(damaged("the name of its register " + name).value());
     }
   }
-  return found;
 }
 
 Result<void> JournalFile::set_register(std::string_view name, std::string_view value) {

@@ -25,6 +25,8 @@ namespace osteon {
 [[nodiscard]] std::optional<JournalHead> parse_checkpoint_file(const std::filesystem::path& journal, std::string_view name);
 // Whether a name in the journal's folder is of something that is still being written: the journal, its log, a checkpoint.
 [[nodiscard]] bool is_partial_of(const std::filesystem::path& journal, std::string_view name);
+// Whether it is the journal itself or anything that was made beside it, its lock too.
+[[nodiscard]] bool belongs_to(const std::filesystem::path& journal, std::string_view name);
 
 // What a file says of itself.
 struct Inspection {
@@ -48,6 +50,9 @@ class JournalFile {
   // Any version that this program reads. Error invalid_input: no journal, or damaged beyond reading.
   [[nodiscard]] static Result<JournalFile> open(const std::filesystem::path& file, Disk& disk, const DatabaseOptions& options);
 
+  // The genesis of one that may be in use, without a look at anything else. Errors as of open().
+  [[nodiscard]] static Result<std::string> peek_genesis(const std::filesystem::path& file, Disk& disk);
+
   [[nodiscard]] int version() const { return version_; }
   [[nodiscard]] const std::string& genesis() const { return genesis_; }
   [[nodiscard]] Database& database() { return database_; }
@@ -62,6 +67,8 @@ class JournalFile {
   [[nodiscard]] Result<std::optional<std::string>> find_register(std::string_view name);
   // The whole file: its pages, its chain, its witnesses. `files`: the checkpoints' bytes too.
   [[nodiscard]] Inspection inspect(bool files);
+  // All but pages and rows, of which `found` has the head: what vouches for them, and what is kept beside them.
+  void inspect_beside(bool files, Inspection& found);
 
   // Of the current version, within a transaction.
   [[nodiscard]] Result<void> set_register(std::string_view name, std::string_view value);

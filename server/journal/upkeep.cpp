@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/core/check.hpp"
 #include "server/journal/journal_state.hpp"
 
 namespace osteon {
@@ -10,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kSliceBytes = std::size_t{8} << 20;
+constexpr std::size_t kSliceBytes = std::size_t{1} << 20;
 // More openings than any lost part of a journal can have counted.
 constexpr std::uint64_t kEpochsSkipped = 1'000'000;
 
@@ -66,6 +67,14 @@ Result<VerifyReport> verify_journal(const fs::path& file, Disk* disk) {
   return report_of(**source);
 }
 
+std::vector<std::string> verify_beside(Journal& journal) {
+  auto& state = JournalInside::of(journal);
+  Inspection found;
+  found.head = state.head;
+  state.file.inspect_beside(false, found);
+  return std::move(found.faults);
+}
+
 Result<VerifyReport> verify_journal(Journal& journal) { return report_of(JournalInside::of(journal).file); }
 
 // The copy grows under a name of its own beside its place, and gets its name when it is whole.
@@ -73,89 +82,153 @@ struct JournalCopy::State {
   fs::path from, to, growing;
   Disk* disk;
   JournalFile* source;
+  std::string genesis;     // of the copy
+  JournalHead copied;      // as the source has it
+  JournalHead head;        // as the copy has it
   RoomSeq last;
-  JournalHead copied;
-  std::optional<Journal> target;
-  bool damaged = false;  // what cannot be read is left out
+  std::optional<std::vector<std::string>> only = {};  // a branch: these registers, and nobody
+  bool damaged = false;                               // what cannot be read is left out
+  std::optional<std::uint64_t> epochs = {};           // recovered: openings that the lost part cannot have counted
+  std::optional<Journal> target = {};
+  // Taken from the source and not yet put into the target.
+  std::vector<JournalRow> rows = {};
+  std::vector<std::pair<std::string, std::string>> registers = {};
+  std::vector<Person> people = {};
+  std::vector<Checkpoint> checkpoints = {};
+  std::optional<Error> no_checkpoint = {};  // why the last of them could not be copied
+  bool begun = false, all_taken = false, put_beside = false;
 };
 
 struct JournalCopying {
   static Result<JournalCopy> begin(const fs::path& from, JournalFile& source, RoomSeq last, const fs::path& to, Disk& disk) {
     if (Result<void> clear = check_nothing_left(disk, to); !clear) return tl::unexpected(clear.error());
-    const fs::path growing = to.string() + ".copying";
-    JournalCopy copy(std::make_unique<JournalCopy::State>(
-        JournalCopy::State{from, to, growing, &disk, &source, last, first_head(source.genesis()), std::nullopt, false}));
-    if (Result<void> cleared = clear_growing(*copy.state_); !cleared) return tl::unexpected(cleared.error());
-    auto target = Journal::create(growing, source.genesis(), {.disk = &disk});
-    if (!target) return tl::unexpected(target.error());
-    copy.state_->target = std::move(*target);
-    return copy;
+    const std::string& genesis = source.genesis();
+    return JournalCopy(std::make_unique<JournalCopy::State>(
+        JournalCopy::State{from, to, to.string() + ".copying", &disk, &source, genesis, first_head(genesis), first_head(genesis), last}));
   }
 
   static JournalCopy::State& state(JournalCopy& copy) { return *copy.state_; }
+
+  static Result<void> begin_target(JournalCopy::State& state) {
+    if (const auto nobody = take_lock(*state.disk, state.growing); !nobody) return tl::unexpected(nobody.error());
+    state.begun = true;
+    if (Result<void> cleared = clear_growing(state); !cleared) return cleared;
+    auto target = Journal::create(state.growing, state.genesis, {.disk = state.disk});
+    if (!target) return tl::unexpected(target.error());
+    state.target = std::move(*target);
+    return {};
+  }
 
   // Also what an earlier copy that was cut short left behind.
   static Result<void> clear_growing(const JournalCopy::State& state) {
     const auto names = state.disk->list(folder_of(state.growing));
     if (!names) return tl::unexpected(names.error());
-    const std::string growing = state.growing.filename().string();
     for (const std::string& name : *names)
-      if (name == growing || name == growing + ".lock" || name == log_of(growing) || name == failed_of(growing) ||
-          is_partial_of(growing, name) || parse_checkpoint_file(growing, name))
+      if (belongs_to(state.growing, name))
         if (Result<void> gone = state.disk->remove(folder_of(state.growing) / name); !gone) return gone;
     return {};
   }
 
-  static Result<void> copy_rows(JournalCopy::State& state, std::size_t most_rows) {
-    std::vector<JournalRow> rows;
+  static Result<void> left_out(const JournalCopy::State& state, const Error& error) {
+    if (state.damaged) return {};
+    return tl::unexpected(error);
+  }
+
+  static Result<void> take_rows(JournalCopy::State& state, std::size_t most_rows) {
     std::size_t bytes = 0;
     const Walk walked = state.source->walk(state.copied, state.last, [&](const JournalRow& row, const JournalHead&) {
-      rows.push_back(row);
+      state.rows.push_back(row);
       bytes += row.bytes.size();
-      return rows.size() < most_rows && bytes < kSliceBytes;
+      return state.rows.size() < most_rows && bytes < kSliceBytes;
     });
     if (walked.stopped && !state.damaged) return tl::unexpected(*walked.stopped);
     if (walked.stopped) state.last = walked.head.place;
     state.copied = walked.head;
-    return rows.empty() ? Result<void>{} : state.target->append(rows);
-  }
-
-  static Result<void> copy_rest(JournalCopy::State& state) {
-    const auto left_out = [&](const Error& error) -> Result<void> {
-      if (state.damaged) return {};
-      return tl::unexpected(error);
-    };
-    const auto names = state.source->registers();
-    if (!names) {
-      if (Result<void> on = left_out(names.error()); !on) return on;
-    } else {
-      for (const std::string& name : *names) {
-        const auto value = state.source->find_register(name);
-        Result<void> set;
-        if (!value) set = left_out(value.error());
-        if (value && *value) set = state.target->set_register(name, **value);
-        if (!set) return set;
-      }
-    }
-    const auto people = state.source->people();
-    if (!people) {
-      if (Result<void> on = left_out(people.error()); !on) return on;
-    } else {
-      for (const Person& person : *people)
-        if (Result<void> set = state.target->set_person(person); !set) return set;
-    }
-    const auto checkpoints = state.source->checkpoints();
-    if (!checkpoints) return left_out(checkpoints.error());
-    for (const Checkpoint& checkpoint : *checkpoints) {
-      if (checkpoint.at.place > state.copied.place) continue;
-      if (Result<void> copied = copy_checkpoint(state, checkpoint); !copied)
-        if (Result<void> on = left_out(copied.error()); !on) return on;
-    }
     return {};
   }
 
+  static Result<void> take_beside(JournalCopy::State& state) {
+    const auto names = state.only ? Result<std::vector<std::string>>(*state.only) : state.source->registers();
+    if (!names) {
+      if (Result<void> on = left_out(state, names.error()); !on) return on;
+    } else {
+      for (const std::string& name : *names) {
+        const auto value = state.source->find_register(name);
+        if (value && *value) state.registers.emplace_back(name, **value);
+        if (!value)
+          if (Result<void> on = left_out(state, value.error()); !on) return on;
+      }
+    }
+    if (!state.only) {
+      auto people = state.source->people();
+      if (people) state.people = std::move(*people);
+      else if (Result<void> on = left_out(state, people.error()); !on) return on;
+    }
+    auto checkpoints = state.source->checkpoints();
+    if (!checkpoints) return left_out(state, checkpoints.error());
+    std::erase_if(*checkpoints, [&](const Checkpoint& one) { return one.at.place > state.copied.place; });
+    state.checkpoints = {checkpoints->rbegin(), checkpoints->rend()};
+    return {};
+  }
+
+  // One that could not be copied may have been replaced by a newer one meanwhile.
+  static Result<void> pass_over(JournalCopy::State& state) {
+    const auto known = state.source->checkpoints();
+    const Error why = *std::exchange(state.no_checkpoint, std::nullopt);
+    const auto is_it = [&](const Checkpoint& one) { return one.at == state.checkpoints.back().at; };
+    if (!known || std::ranges::any_of(*known, is_it))
+      if (Result<void> on = left_out(state, why); !on) return on;
+    state.checkpoints.pop_back();
+    return {};
+  }
+
+  static Result<void> take(JournalCopy::State& state, std::size_t most_rows) {
+    if (state.no_checkpoint) return pass_over(state);
+    if (state.all_taken) return {};
+    if (Result<void> taken = take_rows(state, most_rows); !taken) return taken;
+    if (state.copied.place < state.last) return {};
+    state.all_taken = true;
+    return take_beside(state);
+  }
+
+  static Result<bool> put(JournalCopy::State& state) {
+    if (!state.target)
+      if (Result<void> begun = begin_target(state); !begun) return tl::unexpected(begun.error());
+    if (const auto rows = std::exchange(state.rows, {}); !rows.empty())
+      if (Result<void> put = state.target->append(rows); !put) return tl::unexpected(put.error());
+    state.head = state.target->head();
+    if (!state.all_taken) return false;
+    if (!std::exchange(state.put_beside, true))
+      if (Result<void> put = put_beside(state); !put) return tl::unexpected(put.error());
+    if (!state.checkpoints.empty()) {
+      if (Result<void> copied = copy_checkpoint(state, state.checkpoints.back()); copied) state.checkpoints.pop_back();
+      else state.no_checkpoint = copied.error();
+      return false;
+    }
+    return finish(state).map([] { return true; });
+  }
+
+  static Result<void> put_beside(JournalCopy::State& state) {
+    Result<void> done;
+    for (const auto& [name, value] : state.registers)
+      if (done) done = state.target->set_register(name, value);
+    for (const Person& person : state.people)
+      if (done) done = state.target->set_person(person);
+    if (!state.epochs) return done;
+    if (done) done = state.target->set_register(kRecoveredRegister, encode_number(state.copied.place.value));
+    if (done) done = state.target->set_register(kEpochRegister, encode_number(*state.epochs));
+    return done;
+  }
+
   static Result<void> copy_checkpoint(JournalCopy::State& state, const Checkpoint& checkpoint) {
-    auto file = state.target->begin_checkpoint(checkpoint.at, checkpoint.meta);
+    // A branch has the same rows under a chain of its own.
+    JournalHead at = checkpoint.at;
+    if (state.only) {
+      const auto head = state.target->head_at(at.place);
+      if (!head) return tl::unexpected(head.error());
+      at = *head;
+    }
+    auto file = state.target->begin_checkpoint(at, checkpoint.meta);
     if (!file) return tl::unexpected(file.error());
     const fs::path from = checkpoint_file(state.from, checkpoint.at);
     const auto read = read_in_pieces(*state.disk, from, [&](std::string_view piece) { return file->write(piece); });
@@ -184,7 +257,7 @@ struct JournalCopying {
 JournalCopy::JournalCopy(std::unique_ptr<State> state) : state_(std::move(state)) {}
 JournalCopy::JournalCopy(JournalCopy&&) noexcept = default;
 JournalCopy::~JournalCopy() {
-  if (!state_) return;
+  if (!state_ || !state_->begun) return;
   state_->target.reset();
   static_cast<void>(JournalCopying::clear_growing(*state_));
 }
@@ -194,12 +267,29 @@ Result<JournalCopy> JournalCopy::begin(Journal& source, const fs::path& to) {
   return JournalCopying::begin(state.path, state.file, state.head.place, to, *state.disk);
 }
 
+Result<JournalCopy> JournalCopy::begin_branch(Journal& source, const fs::path& to, RoomSeq last, std::string genesis,
+                                              std::vector<std::string> registers) {
+  auto& state = JournalInside::of(source);
+  OSTEON_CHECK(last <= state.head.place);
+  auto copy = JournalCopying::begin(state.path, state.file, last, to, *state.disk);
+  if (!copy) return copy;
+  copy->state_->genesis = std::move(genesis);
+  copy->state_->only = std::move(registers);
+  return copy;
+}
+
+Result<void> JournalCopy::take(std::size_t most_rows) { return JournalCopying::take(*state_, most_rows); }
+Result<bool> JournalCopy::put() { return JournalCopying::put(*state_); }
+
 Result<bool> JournalCopy::step(std::size_t most_rows) {
-  if (Result<void> copied = JournalCopying::copy_rows(*state_, most_rows); !copied) return tl::unexpected(copied.error());
-  if (state_->copied.place < state_->last) return false;
-  const Result<void> done = JournalCopying::copy_rest(*state_).and_then([&] { return JournalCopying::finish(*state_); });
-  if (!done) return tl::unexpected(done.error());
-  return true;
+  return take(most_rows).and_then([&] { return put(); });
+}
+
+const JournalHead& JournalCopy::head() const { return state_->head; }
+
+double JournalCopy::fraction() const {
+  const auto last = static_cast<double>(state_->last.value);
+  return last > 0 ? static_cast<double>(state_->copied.place.value) / last : 1.0;
 }
 
 namespace {
@@ -252,13 +342,8 @@ Result<RecoverReport> recover_journal(const fs::path& file, const fs::path& to, 
                                   ->find_register(kEpochRegister)
                                   .map([](const auto& value) { return value ? decode_number(*value).value_or(0) : 0; })
                                   .value_or(0);
-  Result<void> done;
-  while (done && state.copied.place < state.last) done = JournalCopying::copy_rows(state, 1000);
-  if (done) done = JournalCopying::copy_rest(state);
-  if (done) done = state.target->set_register(kRecoveredRegister, encode_number(state.copied.place.value));
-  if (done) done = state.target->set_register(kEpochRegister, encode_number(epoch + kEpochsSkipped));
-  if (done) done = JournalCopying::finish(state);
-  if (!done) return tl::unexpected(done.error());
+  state.epochs = epoch + kEpochsSkipped;
+  if (const Result<void> done = copy_all(*copy); !done) return tl::unexpected(done.error());
   report.head = state.copied;
   return report;
 }

@@ -9,6 +9,9 @@
 
 namespace osteon {
 
+// The register of a journal that has the last number given to a person.
+inline constexpr const char* kPeopleRegister = "people";
+
 // What a room began as: enough to make it again beside the case itself.
 struct RoomGenesis {
   Digest case_hash;

@@ -1,22 +1,59 @@
-// Keeps a room in a journal: writes what it decides, and makes it again from that.
+// Keeps a room in a journal: writes what it decides, makes it again from that, and looks after it while it is in use.
 #pragma once
+#include <condition_variable>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "server/journal/journal.hpp"
+#include "server/journal/upkeep.hpp"
 #include "server/net/journal_rows.hpp"
+#include "server/net/room_files.hpp"
 #include "server/room/room.hpp"
 
 namespace osteon {
 
 struct KeptRoom;
 
-// Any thread.
+// A mutex that is given in the order in which it was asked for: so that upkeep, which takes it again and again, lets a commit
+// through after every slice, and is let through itself between commits.
+class InTurn {
+ public:
+  void lock();
+  void unlock();
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable next_;
+  std::uint64_t asked_ = 0, served_ = 0;
+};
+
+// The bone when so many rows had been applied to it: Room::room_seq() and Room::field_hash().
+struct BoneAt {
+  RoomSeq place;
+  Digest field_hash{};
+};
+
+// What a live verify found.
+struct RoomReport {
+  JournalHead head;                  // of the last row that the chain confirms: as many rows
+  std::optional<RoomSeq> first_bad;  // row
+  std::size_t checkpoints = 0;       // whose bytes and fields were confirmed
+  BoneAt replayed;                   // made again from the rows alone; place 0: nobody asked for it
+  std::vector<std::string> faults;   // one sentence each
+  [[nodiscard]] bool sound() const { return faults.empty(); }
+};
+
+// Any thread. What takes long holds the journal for a slice of rows at a time, between which rows are written. After close()
+// every function returns the error unavailable.
 class RoomKeeper {
  public:
   struct Options {
@@ -34,24 +71,39 @@ class RoomKeeper {
 
   // Returns when the rows are safe on the disk: for a Committer. Places go on from the last one.
   [[nodiscard]] Result<void> write(std::span<const RoomRow> rows);
-  [[nodiscard]] JournalHead head() const;
+  [[nodiscard]] JournalHead head() const;  // once closed: the last one
   // Rises with every opening.
   [[nodiscard]] std::uint64_t server_epoch() const { return server_epoch_; }
   // Rows that were evaluated again when it was opened.
   [[nodiscard]] std::uint64_t evaluated() const { return evaluated_; }
-  // The pseudonym under which rows know this person; the same for the same label.
-  [[nodiscard]] Result<std::uint32_t> person(const std::string& label);
+  [[nodiscard]] const RoomGenesis& genesis() const { return genesis_; }
+  [[nodiscard]] const std::filesystem::path& file() const { return file_; }
   // What a client was told was safe: see Journal::check_witness.
   [[nodiscard]] Result<void> check_witness(const JournalHead& witness);
-  [[nodiscard]] const RoomGenesis& genesis() const { return genesis_; }
+  // The pseudonym under which rows know this person; the same for the same label.
+  [[nodiscard]] Result<std::uint32_t> person(const std::string& label);
+
+  // Rows from one place to another, both included, or to the head as it is now, each held against the chain, until `take`
+  // returns false. `take` may wait: a live room can be replayed beside its cutting. Errors: of the first row that does not fit.
+  [[nodiscard]] Result<void> read(RoomSeq from, RoomSeq to, const std::function<bool(const RoomRow&)>& take);
+  // Every row up to the head as it is now against the chain; the bytes of every checkpoint against their digest, and its
+  // fields against their hash; what else vouches for places. `live`, of a place that is kept: the rows are also replayed
+  // into a fresh room of this case up to there, which takes as long as all its cuts, and the bones compared. What is damaged
+  // is told in the report. Errors: unavailable (`live` is beyond the head), cancelled, unsupported (of another case).
+  [[nodiscard]] Result<RoomReport> verify(const Case& bone, const std::optional<BoneAt>& live, const UpkeepCalls& calls = {});
+  // A copy of the journal as it is now, with its people and checkpoints: there whole or not at all. Gives its head. Errors:
+  // exists (something is in `to`), invalid_input (damaged: nothing is copied), cancelled.
+  [[nodiscard]] Result<JournalHead> backup(const std::filesystem::path& to, const UpkeepCalls& calls = {});
+  // As branch_journal().
+  [[nodiscard]] Result<JournalHead> branch(const std::filesystem::path& to, RoomSeq place, const std::string& name,
+                                           const UpkeepCalls& calls = {});
 
   // All leaves of the room at head(), so that the next opening need not evaluate every cut again.
   [[nodiscard]] Result<void> checkpoint(RoomSeq place, std::span<const FieldLeaf> leaves);
   [[nodiscard]] Result<void> close();  // clean: nothing may be written afterwards
 
  private:
-  RoomKeeper(Journal journal, RoomGenesis genesis, double pitch_mm)
-      : journal_(std::move(journal)), genesis_(std::move(genesis)), pitch_mm_(pitch_mm) {}
+  RoomKeeper(std::filesystem::path file, Journal journal, RoomGenesis genesis, double pitch_mm, Disk& disk);
   // Of the newest checkpoint that can be read; nothing where there is none.
   struct Fields {
     RoomSeq place;
@@ -60,11 +112,25 @@ class RoomKeeper {
   [[nodiscard]] Fields newest_fields();
   [[nodiscard]] Result<Room> replay(const Case& bone, const CutLimits& limits, const Fields& fields,
                                     const std::function<void(double)>& progress);
+  // Does something with the journal, in turn. Error unavailable: it is closed.
+  template <class Do>
+  auto with_journal(const Do& what) -> decltype(what(std::declval<Journal&>())) {
+    const std::lock_guard in_turn(turn_);
+    if (!journal_) return is_closed();
+    return what(*journal_);
+  }
+  [[nodiscard]] tl::unexpected<Error> is_closed() const;
+  // Rows after `at`, which goes on with them, up to `last`. Error invalid_input: the row after `at` does not fit the chain.
+  [[nodiscard]] Result<void> each_row(JournalHead& at, RoomSeq last, const std::function<bool(const JournalRow&)>& take);
+  [[nodiscard]] Result<void> run(JournalCopy& copy, const UpkeepCalls& calls);
 
-  mutable std::mutex mutex_;
-  Journal journal_;
-  RoomGenesis genesis_;
+  mutable InTurn turn_;
+  std::optional<Journal> journal_;  // nothing: closed
+  JournalHead last_;                // its head then
+  const std::filesystem::path file_;
+  const RoomGenesis genesis_;
   const double pitch_mm_;
+  Disk& disk_;
   std::uint64_t server_epoch_ = 0, evaluated_ = 0;
 };
 
