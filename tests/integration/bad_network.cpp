@@ -1,19 +1,39 @@
 #include "tests/integration/bad_network.hpp"
 
+#include <memory>
 #include <mutex>
 #include <thread>
 
+#include "haptic_client/control/patch_builder.hpp"
 #include "tests/integration/hand.hpp"
 #include "tests/integration/stage.hpp"
 #include "tests/support/relay/impair_process.hpp"
 
 namespace osteon::test {
-namespace {
 
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-// The UDP port that a server has said in its log.
+namespace {
+
+// What a hand has of the bone under its tool, as a client's thread makes it: here the tool is where the other has cut.
+class Felt {
+ public:
+  explicit Felt(const Case& bone) : model_(*haptic::ToolModel::make(*find_tool("burr-round-5"), bone.pitch_mm(), 1.0, "")) {}
+  void feel(const Cut& cut, haptic::Replica& replica) {
+    for (const haptic::ChangedLeaves& change : replica.take_changes())
+      builder_.changed(replica.predicted().bone().pitch_mm(), change.level, change.origins);
+    builder_.build(replica.bodies(), model_, dequantise(cut.path.back()), patch_);
+  }
+
+ private:
+  const haptic::ToolModel model_;
+  haptic::PatchBuilder builder_;
+  haptic::Patch patch_;
+};
+
+}  // namespace
+
 std::string udp_port_of(Process& server) {
   std::string log;
   std::size_t at = std::string::npos;
@@ -22,8 +42,6 @@ std::string udp_port_of(Process& server) {
                    10s);
   return at == std::string::npos ? "" : std::to_string(std::strtoul(log.c_str() + at + 9, nullptr, 10));
 }
-
-}  // namespace
 
 BadNetworkRun run_on(const BadNetwork& network, std::uint64_t seed) {
   BadNetworkRun run;
@@ -51,12 +69,14 @@ BadNetworkRun run_on(const BadNetwork& network, std::uint64_t seed) {
     std::this_thread::sleep_for(300ms);
   }
   for (std::size_t i = 0; i < 2; ++i)
-    hands[i]->surgeon().on_cut([&, i](const Cut& cut) {
-      const Hand& other = *hands[1 - i];
-      if (cut.author != hands[1 - i]->surgeon().session().room().author) return;
-      const std::lock_guard lock(felt_mutex);
-      run.felt.record(Clock::now() - other.sent_at(cut.author_seq));
-    });
+    hands[i]->surgeon().on_cut(
+        [&, i, felt = std::make_shared<Felt>(hands[i]->surgeon().session().bone())](const Cut& cut, haptic::Replica& replica) {
+          const Hand& other = *hands[1 - i];
+          if (cut.author != hands[1 - i]->surgeon().session().room().author) return;
+          felt->feel(cut, replica);
+          const std::lock_guard lock(felt_mutex);
+          run.felt_ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - other.sent_at(cut.author_seq)).count());
+        });
   const std::size_t parts = network.meanwhile.size() + 1;
   for (std::size_t part = 0; part < parts; ++part) {
     std::this_thread::sleep_for(network.work / parts);

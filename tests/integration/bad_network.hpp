@@ -6,24 +6,27 @@
 #include <string>
 #include <vector>
 
-#include "common/runtime/tick_stats.hpp"
+#include "tests/support/process.hpp"
 
 namespace osteon::test {
 
 struct BadNetworkRun {
   std::uint64_t sent = 0, kept = 0;      // cuts of both hands; kept: decided by the server
   double converged_s = 0;                // from quiet (hands rest, the network is good) until all hold one bone
-  DurationHistogram felt;                // from one hand's sending of a cut until it is in the other's replica
+  std::vector<double> felt_ms;           // from one hand's sending of each cut until it is in the other's patch
   bool fast_path_alive = false;          // of both, before quiet
   std::string fault;                     // empty: none
 };
 
 struct BadNetwork {
-  std::vector<std::string> impairment;   // arguments of osteon-impair; none: no relay at all
+  std::vector<std::string> impairment{};   // arguments of osteon-impair; none: no relay at all
   std::chrono::milliseconds work{1500};
-  std::vector<std::string> meanwhile;    // commands for osteon-impair, in equal times during the work
-  std::string fast_path;                 // "off": over the streams alone
+  std::vector<std::string> meanwhile{};  // commands for osteon-impair, in equal times during the work
+  std::string fast_path{};               // "off": over the streams alone
 };
+
+// The UDP port that a server has said in its log; empty where it says none.
+[[nodiscard]] std::string udp_port_of(Process& server);
 
 [[nodiscard]] BadNetworkRun run_on(const BadNetwork& network, std::uint64_t seed);
 

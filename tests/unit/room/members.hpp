@@ -25,8 +25,8 @@ namespace osteon::test {
 
 inline constexpr std::chrono::seconds kPatience{20};
 
-inline wire::JoinedRoom join(const std::string& address, wire::ClientKind kind) {
-  auto room = wire::join_room(address, kind, "test", std::chrono::seconds{5}, {});
+inline wire::JoinedRoom join(const std::string& address, wire::ClientKind kind, const std::string& named = {}) {
+  auto room = wire::join_room(address, kind, "test", std::chrono::seconds{5}, {}, named);
   EXPECT_TRUE(room.has_value()) << room.error().message;
   return room.value();
 }
@@ -42,8 +42,9 @@ inline v1::GetStatusResponse status_of(const wire::JoinedRoom& room) {
 // A haptic client that keeps a replica, as osteon-haptic does.
 class Surgeon {
  public:
-  Surgeon(const std::string& address, const std::filesystem::path& cache, const std::string& fast_path = {}) {
-    auto joined = RoomSession::join({.address = address, .cache = cache, .fast_path = fast_path}, {});
+  Surgeon(const std::string& address, const std::filesystem::path& cache, const std::string& fast_path = {},
+          const std::string& room = {}) {
+    auto joined = RoomSession::join({.address = address, .room = room, .cache = cache, .fast_path = fast_path}, {});
     EXPECT_TRUE(joined.has_value()) << joined.error().message;
     session_.emplace(std::move(*joined));
     replica_.emplace(session_->bone(), BodyId{0}, session_->tools());
@@ -63,9 +64,9 @@ class Surgeon {
                         [this](RoomSeq seq, const Cut& cut) {
                           on([&] {
                             EXPECT_TRUE(complete_);
-                            if (heard_) heard_(cut);
                             EXPECT_GT(seq, seq_) << "committed cuts come in order";
                             replica_->commit(seq, cut, false);
+                            if (heard_) heard_(cut, *replica_);
                             seq_ = seq;
                             if (cut.author != session_->room().author) return;
                             ++own_;
@@ -98,8 +99,8 @@ class Surgeon {
   bool complete() { return read(complete_); }
   RoomSeq seq() { return read(seq_); }
   std::uint64_t own() { return read(own_); }
-  // Called for every cut that comes, with a lock held.
-  void on_cut(std::function<void(const Cut&)> heard) {
+  // Called for every cut that has come and is in the replica, with a lock held.
+  void on_cut(std::function<void(const Cut&, haptic::Replica&)> heard) {
     on([&] { heard_ = std::move(heard); });
   }
   // Of own cuts: their places in the order, as the room said them.
@@ -135,7 +136,7 @@ class Surgeon {
   int interruptions_ = 0;
   std::vector<FieldLeaf> renewed_;
   std::map<std::uint64_t, RoomSeq> acknowledged_;
-  std::function<void(const Cut&)> heard_;
+  std::function<void(const Cut&, haptic::Replica&)> heard_;
   RoomSeq seq_;
   std::uint64_t own_ = 0, lease_ = 0;
   std::vector<BodyId> bodies_;

@@ -1,0 +1,33 @@
+// The cuts of a bur that a simulated hand leads to and fro over a block, as the haptic loop closes them: made once, on virtual
+// time, and then given to rooms at the loop's own rate.
+#pragma once
+#include <chrono>
+#include <vector>
+
+#include "tests/unit/haptic_client/bench.hpp"
+
+namespace osteon::test {
+
+inline constexpr std::chrono::milliseconds kCutsApart{haptic::CutRecorder::kTicksPerCut};  // while the tool cuts
+
+// On haptic::test::block_case(40); by no author yet, and of no lease.
+[[nodiscard]] inline std::vector<Cut> burred_stroke(double seconds) {
+  haptic::PlanStep step;
+  step.action = haptic::Action::burr;
+  step.tool = "burr-round-5";
+  step.tremor_mm = 0.1;
+  step.window_u_mm = 24;
+  step.window_v_mm = 24;
+  step.depth_mm = 8;
+  step.sweep_mm_per_s = 15;
+  step.entry.point_mm = Vec3(0, 0, 0);
+  step.entry.axis = Vec3(0, 0, 1);
+  haptic::test::Bench bench(haptic::test::block_case(40), {step});
+  while (!bench.session().done() && static_cast<double>(bench.cuts().size()) * 1e-3 * static_cast<double>(kCutsApart.count()) < seconds) {
+    (void)bench.tick();
+    bench.follow();
+  }
+  return bench.cuts();
+}
+
+}  // namespace osteon::test
