@@ -124,15 +124,21 @@ class SystemDisk final : public Disk {
     return names;
   }
 
-  // flock() rather than a file that merely exists: it ends with its holder, even one that was killed. The file stays, since
-  // to remove it would let two hold locks of one name.
+  // flock() rather than a file that merely exists: it ends with its holder, even one that was killed. The file stays, but
+  // its holder may remove it: who has just opened the old one would then hold a lock of no name, and opens it anew.
   Result<std::unique_ptr<DiskLock>> lock(const fs::path& file) override {
-    const int fd = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-    if (fd < 0) return cannot("open", file, errno);
-    auto held = std::make_unique<SystemLock>(fd);
-    if (::flock(fd, LOCK_EX | LOCK_NB) == 0) return held;
-    if (errno != EWOULDBLOCK) return cannot("lock", file, errno);
-    return failure(ErrorCode::exists, file.string() + " is held by another process");
+    for (;;) {
+      const int fd = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+      if (fd < 0) return cannot("open", file, errno);
+      auto held = std::make_unique<SystemLock>(fd);
+      if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
+        if (errno != EWOULDBLOCK) return cannot("lock", file, errno);
+        return failure(ErrorCode::exists, file.string() + " is held by another process");
+      }
+      struct stat mine {}, named {};
+      if (::fstat(fd, &mine) != 0) return cannot("look at", file, errno);
+      if (::stat(file.c_str(), &named) == 0 && mine.st_dev == named.st_dev && mine.st_ino == named.st_ino) return held;
+    }
   }
 };
 

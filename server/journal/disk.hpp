@@ -68,6 +68,8 @@ class DurableFile {
   ~DurableFile();  // one that was not finished leaves nothing
 
   [[nodiscard]] Result<void> write(std::string_view piece);
+  // Keeps what is there so far: where the disk takes it bit by bit, nobody else waits long for it.
+  [[nodiscard]] Result<void> sync() { return partial_->sync(); }
   [[nodiscard]] Result<WrittenFile> finish();  // once
 
  private:

@@ -343,6 +343,7 @@ Result<std::size_t> Journal::keep_people(const std::function<bool(const Person&)
   const auto all = people();
   if (!all) return tl::unexpected(all.error());
   const auto staying = static_cast<std::size_t>(std::count_if(all->begin(), all->end(), kept));
+  if (staying == all->size()) return 0;
   Database& database = state_->file.database();
   const Result<void> done = write([&] {
     return database

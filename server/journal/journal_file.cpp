@@ -189,23 +189,35 @@ Result<JournalFile> JournalFile::open(const fs::path& file, Disk& disk, const Da
   return opened;
 }
 
-Result<std::string> JournalFile::peek_genesis(const fs::path& file, Disk& disk) {
+Result<JournalFile> JournalFile::peek(const fs::path& file, Disk& disk) {
   if (Result<void> something = check_not_empty(file, disk); !something) return tl::unexpected(something.error());
   auto database = Database::open(file, disk, {.peek = true});
   if (!database) return tl::unexpected(database.error());
   const Result<std::int64_t> application = database->integer("PRAGMA application_id");
   if (!application) return tl::unexpected(application.error());
   if (*application != kApplication) return failure(ErrorCode::invalid_input, file.string() + " is no journal");
-  // Whoever has it open may be writing to it; but what is read wrongly does not fit its seal.
   JournalFile peeked(file, disk, std::move(*database));
+  if (Result<void> known = peeked.read_version(); !known) return tl::unexpected(known.error());
   auto genesis = peeked.find_register(kGenesisRegister);
   if (!genesis) return tl::unexpected(genesis.error());
   if (!*genesis) return peeked.damaged("its register genesis");
-  return std::move(**genesis);
+  peeked.genesis_ = std::move(**genesis);
+  return peeked;
 }
 
 tl::unexpected<Error> JournalFile::damaged(const std::string& what) const {
   return failure(ErrorCode::invalid_input, file_.string() + ": " + what + " is damaged" + std::string(kRemedy));
+}
+
+Result<void> JournalFile::read_version() {
+  const Result<std::int64_t> version = database_.integer("PRAGMA user_version");
+  if (!version) return tl::unexpected(version.error());
+  if (std::none_of(kVersions.begin(), kVersions.end(), [&](const Version& known) { return known.number == *version; }))
+    return failure(ErrorCode::unsupported, file_.string() + " is a journal of version " + std::to_string(*version) +
+                                               ", this program reads up to version " + std::to_string(kJournalVersion) +
+                                               "; open it with the program that made it");
+  version_ = static_cast<int>(*version);
+  return {};
 }
 
 Result<void> JournalFile::check_tables() {
@@ -215,13 +227,7 @@ Result<void> JournalFile::check_tables() {
   if (!mode) return tl::unexpected(mode.error());
   if (*application != kApplication || *mode != "wal")
     return failure(ErrorCode::invalid_input, file_.string() + " is no journal, or its first page is damaged; go on from a backup");
-  const Result<std::int64_t> version = database_.integer("PRAGMA user_version");
-  if (!version) return tl::unexpected(version.error());
-  if (std::none_of(kVersions.begin(), kVersions.end(), [&](const Version& known) { return known.number == *version; }))
-    return failure(ErrorCode::unsupported, file_.string() + " is a journal of version " + std::to_string(*version) +
-                                               ", this program reads up to version " + std::to_string(kJournalVersion) +
-                                               "; open it with the program that made it");
-  version_ = static_cast<int>(*version);
+  if (Result<void> known = read_version(); !known) return known;
   if (database_.read_only())  // of no permission to write, or of a first page that claims a file of the future
     return failure(ErrorCode::invalid_input, file_.string() + " cannot be written to; see to its permissions, or recover it");
 

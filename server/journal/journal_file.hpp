@@ -50,8 +50,9 @@ class JournalFile {
   // Any version that this program reads. Error invalid_input: no journal, or damaged beyond reading.
   [[nodiscard]] static Result<JournalFile> open(const std::filesystem::path& file, Disk& disk, const DatabaseOptions& options);
 
-  // The genesis of one that may be in use, without a look at anything else. Errors as of open().
-  [[nodiscard]] static Result<std::string> peek_genesis(const std::filesystem::path& file, Disk& disk);
+  // One that may be in use, as far as its log has been carried into the file: only to look for single things in it, since it
+  // may be written to at the same time. What it began as is always there, and held against its seal. Errors as of open().
+  [[nodiscard]] static Result<JournalFile> peek(const std::filesystem::path& file, Disk& disk);
 
   [[nodiscard]] int version() const { return version_; }
   [[nodiscard]] const std::string& genesis() const { return genesis_; }
@@ -78,6 +79,7 @@ class JournalFile {
  private:
   JournalFile(std::filesystem::path file, Disk& disk, Database database)
       : file_(std::move(file)), disk_(&disk), database_(std::move(database)) {}
+  [[nodiscard]] Result<void> read_version();
   [[nodiscard]] Result<void> check_tables();
   [[nodiscard]] tl::unexpected<Error> damaged(const std::string& what) const;
   void check_witness(const JournalHead& witness, const std::string& what, Inspection& found);

@@ -15,6 +15,11 @@ constexpr std::size_t kSliceBytes = std::size_t{1} << 20;
 // More openings than any lost part of a journal can have counted.
 constexpr std::uint64_t kEpochsSkipped = 1'000'000;
 
+constexpr std::string_view kLock = ".lock";
+
+// The name of a copy that is not yet whole.
+fs::path growing_copy(const fs::path& to) { return to.string() + ".copying"; }
+
 // A journal that is only read. SQLite makes an empty log even for that: then it goes again.
 class Source {
  public:
@@ -104,7 +109,7 @@ struct JournalCopying {
     if (Result<void> clear = check_nothing_left(disk, to); !clear) return tl::unexpected(clear.error());
     const std::string& genesis = source.genesis();
     return JournalCopy(std::make_unique<JournalCopy::State>(
-        JournalCopy::State{from, to, to.string() + ".copying", &disk, &source, genesis, first_head(genesis), first_head(genesis), last}));
+        JournalCopy::State{from, to, growing_copy(to), &disk, &source, genesis, first_head(genesis), first_head(genesis), last}));
   }
 
   static JournalCopy::State& state(JournalCopy& copy) { return *copy.state_; }
@@ -324,6 +329,63 @@ Result<void> migrate_journal(const fs::path& file, const fs::path& to, Disk* dis
     return failure(ErrorCode::exists,
                    file.string() + " is of version " + std::to_string(kJournalVersion) + " already; open it as it is");
   return copy_sound(file, **source, to, or_system(disk));
+}
+
+Result<bool> has_head(const fs::path& file, const JournalHead& head, Disk* disk) {
+  auto source = Source::open(file, or_system(disk));
+  if (source) return (*source)->chain_at(head.place).map([&](const auto& chain) { return chain == head.chain; });
+  if (source.error().code != ErrorCode::exists) return tl::unexpected(source.error());
+  // What is read beside a write may be half of one: only a row that fits the one before it counts.
+  auto peeked = JournalFile::peek(file, or_system(disk));
+  if (!peeked) return tl::unexpected(source.error());
+  if (!head.place) return first_head(peeked->genesis()) == head;
+  const RoomSeq before{head.place.value - 1};
+  const auto chain = peeked->chain_at(before);
+  if (!chain || !*chain) return tl::unexpected(source.error());
+  const Walk walked = peeked->walk({before, **chain}, head.place, [](const JournalRow&, const JournalHead&) { return true; });
+  if (walked.stopped || walked.head.place != head.place) return tl::unexpected(source.error());
+  return walked.head == head;
+}
+
+Result<void> delete_journals(const std::vector<fs::path>& files, Disk* given) {
+  Disk& disk = or_system(given);
+  struct Doomed {
+    fs::path file;
+    std::vector<fs::path> others;
+    std::unique_ptr<DiskLock> lock;
+  };
+  std::vector<Doomed> all;
+  for (const fs::path& file : files) {
+    const auto names = disk.list(folder_of(file));
+    if (!names) return tl::unexpected(names.error());
+    Doomed doomed{file, {}, nullptr};
+    bool there = false;
+    for (const std::string& name : *names) {
+      const bool of_copy = belongs_to(growing_copy(file), name);
+      if (!of_copy && !belongs_to(file, name)) continue;
+      there = there || !name.ends_with(kLock);
+      if (name != file.filename()) doomed.others.push_back(folder_of(file) / name);
+    }
+    if (!there) return failure(ErrorCode::not_found, "there is no journal " + file.string());
+    auto lock = take_lock(disk, file);
+    if (!lock) return tl::unexpected(lock.error());
+    doomed.lock = std::move(*lock);
+    all.push_back(std::move(doomed));
+  }
+  for (Doomed& doomed : all) {
+    // The file itself first, and for good: without its log it would be a shorter journal, which nothing contradicts once the
+    // checkpoints are gone, while a log without its file is nothing.
+    const fs::path folder = folder_of(doomed.file);
+    Result<void> done = disk.remove(doomed.file).and_then([&] { return disk.sync_folder(folder); });
+    std::ranges::sort(doomed.others, {}, [](const fs::path& other) { return other.string().ends_with(kLock); });
+    for (const fs::path& other : doomed.others)
+      if (done) done = disk.remove(other);
+    if (done) done = disk.remove(doomed.file.string() + std::string(kLock));  // which take_lock() may have made
+    if (done) done = disk.sync_folder(folder);
+    if (!done) return done;
+    doomed.lock.reset();
+  }
+  return {};
 }
 
 Result<RecoverReport> recover_journal(const fs::path& file, const fs::path& to, Disk* disk,

@@ -67,6 +67,17 @@ class JournalCopy {
 [[nodiscard]] Result<void> migrate_journal(const std::filesystem::path& file, const std::filesystem::path& to,
                                            Disk* disk = nullptr);
 
+// Whether a journal has this head in its history, as stored: then whoever names it has continued this one. Of a journal that
+// is in use it is looked for in what has been carried from the log into the file. Errors: those of verify_journal; exists
+// (in use, and the place is not found).
+[[nodiscard]] Result<bool> has_head(const std::filesystem::path& file, const JournalHead& head, Disk* disk = nullptr);
+
+// Removes journals with all that was made beside them, one after the other, once none of them is in use; also what is left
+// of one whose removal was cut short. Each is there whole until it is no journal any more. Copies elsewhere stay, and
+// whoever can read the disk itself may find what a file was. Errors: exists (in use: nothing is removed), not_found
+// (nothing of it is there: nothing is removed).
+[[nodiscard]] Result<void> delete_journals(const std::vector<std::filesystem::path>& files, Disk* disk = nullptr);
+
 struct RecoverReport {
   JournalHead head;                 // of the new journal
   RoomSeq witnessed;                // what was vouched for; beyond head: lost

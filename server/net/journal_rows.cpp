@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 
 #include "common/field/kernel.hpp"
 #include "common/wire/convert.hpp"
@@ -54,6 +55,22 @@ Result<Pose> pose_of(const google::protobuf::RepeatedField<double>& parts) {
   Pose pose{{parts[0], parts[1], parts[2]}, Eigen::Quaterniond(parts[6], parts[3], parts[4], parts[5])};
   if (std::abs(pose.rotation.norm() - 1.0) > 1e-3) return bad("item.pose_bone_item is not a unit quaternion");
   return pose;
+}
+
+// As JSON has it.
+std::string json_text(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    if (static_cast<unsigned char>(c) >= 0x20) {
+      out += c;
+      continue;
+    }
+    char escaped[8];
+    std::snprintf(escaped, sizeof escaped, "\\u%04x", static_cast<unsigned>(c));
+    out += escaped;
+  }
+  return out + '"';
 }
 
 struct Writer {
@@ -271,6 +288,35 @@ Result<std::string> row_as_json(RoomSeq place, std::chrono::nanoseconds at, std:
     return bad("row " + std::to_string(place.value) + ": it is no row of a room");
   return "{\"place\":" + std::to_string(place.value) + ",\"at_s\":" + std::to_string(std::chrono::duration<double>(at).count()) +
          ",\"event\":" + event + "}";
+}
+
+PersonExport::PersonExport(std::uint32_t person, const std::vector<Person>& people) : person_(person) {
+  const std::string number = std::to_string(person);
+  for (const Person& one : people)
+    if (one.pseudonym == number)
+      who_ = "{\"person\":" + number + ",\"label\":" + json_text(one.label) +
+             ",\"joined_day\":" + std::to_string(one.joined_day) + "}";
+}
+
+Result<std::optional<std::string>> PersonExport::of(const JournalRow& row) {
+  const std::chrono::nanoseconds at(row.at_ns);
+  const Result<RoomRow> read = row_from_bytes(row.place, at, row.bytes);
+  if (!read) return tl::unexpected(read.error());
+  const auto* join = std::get_if<JoinRow>(&read->what);
+  if (join != nullptr && join->person == person_) authors_.insert(join->author);
+  const auto* cut = std::get_if<CutRow>(&read->what);
+  const auto* rejection = std::get_if<RejectionRow>(&read->what);
+  const AuthorId whose = join != nullptr        ? join->author
+                         : cut != nullptr       ? cut->cut.author
+                         : rejection != nullptr ? rejection->author
+                                                : read->author;
+  if (!authors_.contains(whose)) return std::nullopt;
+  return row_as_json(row.place, at, row.bytes).map([](std::string line) { return std::optional(std::move(line)); });
+}
+
+tl::unexpected<Error> PersonExport::nobody() const {
+  return failure(ErrorCode::not_found, "the journal has nothing of a person " + std::to_string(person_) +
+                                           "; \"people\" lists those it knows");
 }
 
 }  // namespace osteon

@@ -1,10 +1,14 @@
 // A room's rows as bytes of its journal, and back.
 #pragma once
+#include <cstdint>
+#include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "common/core/result.hpp"
+#include "server/journal/journal_parts.hpp"
 #include "server/room/room.hpp"
 
 namespace osteon {
@@ -38,5 +42,21 @@ struct RoomGenesis {
 
 // {"place": 12, "at_s": 3.25, "event": {...}}, on one line.
 [[nodiscard]] Result<std::string> row_as_json(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes);
+
+// All that a journal has of one person, as lines of JSON.
+class PersonExport {
+ public:
+  PersonExport(std::uint32_t person, const std::vector<Person>& people);
+  // {"person": 3, "label": "...", "joined_day": 20778}; nothing: it was forgotten, or there is no such.
+  [[nodiscard]] const std::optional<std::string>& who() const { return who_; }
+  // As row_as_json(), of the next row where it is this person's: its coming, and what it asked for as whoever it then was.
+  [[nodiscard]] Result<std::optional<std::string>> of(const JournalRow& row);
+  [[nodiscard]] tl::unexpected<Error> nobody() const;  // error not_found
+
+ private:
+  std::uint32_t person_;
+  std::optional<std::string> who_;
+  std::set<AuthorId> authors_;
+};
 
 }  // namespace osteon

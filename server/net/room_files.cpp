@@ -1,5 +1,8 @@
 #include "server/net/room_files.hpp"
 
+#include <algorithm>
+#include <array>
+#include <string_view>
 #include <utility>
 
 #include "server/journal/journal_file.hpp"
@@ -9,6 +12,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Ends of names of files that are beside a journal, or not a whole one.
+constexpr std::array<std::string_view, 6> kNoJournals{"-wal", ".lock", ".failed", ".checkpoint", ".partial", ".copying"};
+
 Disk& or_system(Disk* disk) { return disk != nullptr ? *disk : system_disk(); }
 
 }  // namespace
@@ -16,9 +22,9 @@ Disk& or_system(Disk* disk) { return disk != nullptr ? *disk : system_disk(); }
 tl::unexpected<Error> given_up(const std::string& what) { return failure(ErrorCode::cancelled, what + " was given up"); }
 
 Result<RoomGenesis> peek_genesis(const fs::path& file, Disk* disk) {
-  const Result<std::string> bytes = JournalFile::peek_genesis(file, or_system(disk));
-  if (!bytes) return tl::unexpected(bytes.error());
-  Result<RoomGenesis> genesis = genesis_from_bytes(*bytes);
+  const Result<JournalFile> peeked = JournalFile::peek(file, or_system(disk));
+  if (!peeked) return tl::unexpected(peeked.error());
+  Result<RoomGenesis> genesis = genesis_from_bytes(peeked->genesis());
   if (!genesis) return failure(genesis.error().code, file.string() + ": " + genesis.error().message);
   return genesis;
 }
@@ -28,8 +34,9 @@ Result<JournalCopy> begin_branch(Journal& from, const fs::path& to, RoomSeq plac
   if (!genesis) return tl::unexpected(genesis.error());
   const JournalHead& head = from.head();
   if (place > head.place)
-    return failure(ErrorCode::invalid_input, "a branch at event " + std::to_string(place.value) + " lies beyond the last one of " +
-                                                 genesis->room + ", " + std::to_string(head.place.value));
+    return failure(ErrorCode::invalid_input, "a branch at event " + std::to_string(place.value) +
+                                                 " lies beyond the last one of the room " + genesis->room + ", " +
+                                                 std::to_string(head.place.value));
   const Result<JournalHead> at = place ? from.head_at(place) : head;
   if (!at) return tl::unexpected(at.error());
   genesis->parent = std::exchange(genesis->room, name);
@@ -57,6 +64,49 @@ Result<JournalHead> branch_journal(const fs::path& from, const fs::path& to, Roo
   const Result<void> closed = journal->close();
   if (made && !closed) return tl::unexpected(closed.error());
   return made;
+}
+
+Result<std::vector<RoomFile>> branches_of(const fs::path& folder, const fs::path& file, const HasHead& has, Disk* given) {
+  Disk& disk = or_system(given);
+  Result<RoomGenesis> first = peek_genesis(file, given);
+  if (!first) return tl::unexpected(first.error());
+  const auto names = disk.list(folder);
+  if (!names) return tl::unexpected(names.error());
+  std::vector<RoomFile> others;
+  for (const std::string& name : *names) {
+    const bool may_be = std::ranges::none_of(kNoJournals, [&](std::string_view end) { return name.ends_with(end); });
+    if (!may_be || folder / name == file) continue;
+    if (Result<RoomGenesis> genesis = peek_genesis(folder / name, given); genesis && !genesis->parent.empty())
+      others.push_back({folder / name, std::move(*genesis)});
+  }
+  // The first is the room itself.
+  std::vector<RoomFile> found{{file, std::move(*first)}};
+  for (std::size_t at = 0; at < found.size(); ++at) {
+    for (RoomFile& other : others) {
+      if (other.genesis.parent != found[at].genesis.room) continue;
+      const JournalHead from{other.genesis.parent_room_seq, other.genesis.parent_chain};
+      const Result<bool> is_branch = has ? has(found[at].file, from) : has_head(found[at].file, from, given);
+      if (!is_branch) return tl::unexpected(is_branch.error());
+      if (*is_branch) found.push_back(std::move(other));
+    }
+    std::erase_if(others, [](const RoomFile& other) { return other.file.empty(); });
+  }
+  found.erase(found.begin());
+  return found;
+}
+
+Result<std::vector<fs::path>> delete_room(const fs::path& file, bool branches, Disk* disk) {
+  std::vector<fs::path> files{file};
+  if (branches) {
+    const auto found = branches_of(folder_of(file), file, {}, disk);
+    if (!found && found.error().code != ErrorCode::not_found) return tl::unexpected(found.error());
+    if (found)
+      for (const RoomFile& branch : *found) files.push_back(branch.file);
+  }
+  // The room last: where it is cut short, the branches that are left can still be found by it.
+  std::ranges::reverse(files);
+  if (const Result<void> done = delete_journals(files, disk); !done) return tl::unexpected(done.error());
+  return files;
 }
 
 }  // namespace osteon

@@ -25,10 +25,30 @@ struct UpkeepCalls {
 // A room of its own, in `to`, that begins with all that another one was up to a place, null for all of it: rows and
 // checkpoints. It knows numbers of people, not who they are. The journal must not be in use: else RoomKeeper::branch. Errors:
 // not_found; exists (in use, or there is something in `to`); invalid_input (no such place, damaged); cancelled.
-[[nodiscard]] Result<JournalHead> branch_journal(const std::filesystem::path& from, const std::filesystem::path& to, RoomSeq place,
-                                                 const std::string& name, const UpkeepCalls& calls = {}, Disk* disk = nullptr);
+[[nodiscard]] Result<JournalHead> branch_journal(const std::filesystem::path& from, const std::filesystem::path& to,
+                                                 RoomSeq place, const std::string& name, const UpkeepCalls& calls = {},
+                                                 Disk* disk = nullptr);
 
-// The same of a journal that somebody uses, step by step.
+// Whether a journal has this head in its history.
+using HasHead = std::function<Result<bool>(const std::filesystem::path& file, const JournalHead& head)>;
+
+// The branches of a room among the files of a folder, and the branches of those, each after the one that it was made from:
+// by the name of the room and by its history, which the branch names. `has_head`: for rooms that are in use; null: has_head()
+// of server/journal/upkeep.hpp. Errors: those of it.
+struct RoomFile {
+  std::filesystem::path file;
+  RoomGenesis genesis;
+};
+[[nodiscard]] Result<std::vector<RoomFile>> branches_of(const std::filesystem::path& folder, const std::filesystem::path& file,
+                                                        const HasHead& has = {}, Disk* disk = nullptr);
+
+// Removes a room's journal with all that is beside it, and where `branches`, before it the branches in its folder: none of
+// them may be in use. Gives the journals that were there. Backups, and branches elsewhere, stay: nobody can know where they
+// are. Errors: those of delete_journals() and branches_of().
+[[nodiscard]] Result<std::vector<std::filesystem::path>> delete_room(const std::filesystem::path& file, bool branches,
+                                                                     Disk* disk = nullptr);
+
+// As branch_journal(), of a journal that somebody uses, step by step.
 [[nodiscard]] Result<JournalCopy> begin_branch(Journal& from, const std::filesystem::path& to, RoomSeq place,
                                                const std::string& name);
 // Why something was given up.

@@ -3,21 +3,32 @@
 #include <algorithm>
 #include <chrono>
 #include <optional>
+#include <string_view>
 #include <utility>
+#include <variant>
 
 #include "common/field/field_hash.hpp"
 #include "common/runtime/log.hpp"
 #include "common/wire/convert.hpp"
 #include "osteon/v1/journal.pb.h"
+#include "server/journal/journal_file.hpp"
 
 namespace osteon {
 namespace {
 
 constexpr std::size_t kPieceBytes = 128 * 1024;  // of a checkpoint, about
 
-std::int32_t today() {
+constexpr std::size_t kSyncBytes = 1024 * 1024;  // no commit waits behind more than this of a checkpoint
+
+std::int32_t computers_day() {
   return static_cast<std::int32_t>(
       std::chrono::duration_cast<std::chrono::days>(std::chrono::system_clock::now().time_since_epoch()).count());
+}
+
+// Whether a replay has work with it.
+bool changes_bone(const RoomRow& row) {
+  return std::holds_alternative<CutRow>(row.what) || std::holds_alternative<SplitRow>(row.what) ||
+         std::holds_alternative<UndoRow>(row.what) || std::holds_alternative<RedoRow>(row.what);
 }
 
 // A piece of a checkpoint: its length, then a JournalFields.
@@ -73,7 +84,8 @@ Result<KeptRoom> RoomKeeper::open(const std::filesystem::path& file, const Case&
   Result<Journal> journal = Journal::open(file, options.journal);
   bool made = false;
   if (!journal && journal.error().code == ErrorCode::not_found) {
-    const RoomGenesis genesis = genesis_of(Room(bone, options.limits, options.tools ? options.tools : builtin_tool_box()), options.name);
+    const std::shared_ptr<ToolBox> tools = options.tools ? options.tools : builtin_tool_box();
+    const RoomGenesis genesis = genesis_of(Room(bone, options.limits, tools), options.name);
     journal = Journal::create(file, to_bytes(genesis), options.journal);
     made = true;
   }
@@ -88,6 +100,10 @@ Result<KeptRoom> RoomKeeper::open(const std::filesystem::path& file, const Case&
     keeper->server_epoch_ = *epoch;
   else
     return tl::unexpected(epoch.error());
+  keeper->retention_days_ = options.retention_days;
+  keeper->today_ = options.today ? options.today : computers_day;
+  if (const auto forgotten = keeper->forget_old(); !forgotten)
+    log::warn("people who should be forgotten are not", {{"file", file.string()}, {"reason", forgotten.error().message}});
   const Fields fields = keeper->newest_fields();
   Result<Room> room = keeper->replay(bone, options.limits, fields, progress);
   if (!room) return failure(room.error().code, file.string() + ": " + room.error().message);
@@ -102,11 +118,17 @@ RoomKeeper::Fields RoomKeeper::newest_fields() {
     if (one.at.place > journal_->head().place) continue;
     const Result<std::string> bytes = journal_->read_checkpoint(one);
     if (!bytes) continue;
-    std::optional<std::vector<FieldLeaf>> leaves = leaves_of(*bytes);
-    if (leaves && to_hex(field_hash(*leaves, pitch_mm_)) == one.meta) return {one.at.place, std::move(*leaves)};
+    if (Result<std::vector<FieldLeaf>> leaves = fields_of(one, *bytes)) return {one.at.place, std::move(*leaves)};
     log::warn("a checkpoint is passed over", {{"place", one.at.place.value}});
   }
   return {};
+}
+
+Result<std::vector<FieldLeaf>> RoomKeeper::fields_of(const Checkpoint& one, std::string_view bytes) const {
+  std::optional<std::vector<FieldLeaf>> leaves = leaves_of(bytes);
+  if (leaves && to_hex(field_hash(*leaves, pitch_mm_)) == one.meta) return std::move(*leaves);
+  return failure(ErrorCode::invalid_input, checkpoint_file(file_, one.at).string() +
+                                               " does not hold the fields that it says it holds; remove it");
 }
 
 Result<Room> RoomKeeper::replay(const Case& bone, const CutLimits& limits, const Fields& fields,
@@ -120,6 +142,7 @@ Result<Room> RoomKeeper::replay(const Case& bone, const CutLimits& limits, const
     replayed = row ? room->replay(*row, one.place <= fields.place ? Room::Fields::leave : Room::Fields::evaluate)
                    : Result<void>(tl::unexpected(row.error()));
     if (replayed && one.place == fields.place) replayed = room->set_fields(fields.leaves);
+    if (replayed && one.place > fields.place && changes_bone(*row)) changes_.push_back(one.place);
     if (progress && one.place.value % 64 == 0) progress(static_cast<double>(one.place.value) / static_cast<double>(rows));
     return replayed.has_value();
   };
@@ -134,7 +157,12 @@ Result<void> RoomKeeper::write(std::span<const RoomRow> rows) {
   std::vector<JournalRow> out;
   out.reserve(rows.size());
   for (const RoomRow& row : rows) out.push_back({row.place, row.at.count(), to_bytes(row)});
-  return with_journal([&](Journal& journal) { return journal.append(out); });
+  return with_journal([&](Journal& journal) {
+    const Result<void> kept = journal.append(out);
+    for (const RoomRow& row : rows)
+      if (kept && changes_bone(row)) changes_.push_back(row.place);
+    return kept;
+  });
 }
 
 JournalHead RoomKeeper::head() const {
@@ -157,7 +185,7 @@ Result<std::uint32_t> RoomKeeper::person(const std::string& label) {
     if (*given) newest = std::max(newest, static_cast<std::uint32_t>(std::stoul(**given)));
     const std::string pseudonym = std::to_string(newest + 1);
     if (Result<void> set = journal.set_register(kPeopleRegister, pseudonym); !set) return tl::unexpected(set.error());
-    if (Result<void> set = journal.set_person({pseudonym, label, today()}); !set) return tl::unexpected(set.error());
+    if (Result<void> set = journal.set_person({pseudonym, label, today_()}); !set) return tl::unexpected(set.error());
     return newest + 1;
   });
 }
@@ -166,27 +194,51 @@ Result<void> RoomKeeper::check_witness(const JournalHead& witness) {
   return with_journal([&](Journal& journal) { return journal.check_witness(witness); });
 }
 
-Result<void> RoomKeeper::checkpoint(RoomSeq place, std::span<const FieldLeaf> leaves) {
-  return with_journal([&](Journal& journal) -> Result<void> {
-    if (journal.head().place != place || !place) return {};
-    if (const auto known = journal.checkpoints(); known && !known->empty() && known->front().at.place == place) return {};
-    const Digest hash = field_hash({leaves.begin(), leaves.end()}, pitch_mm_);
-    Result<CheckpointFile> file = journal.begin_checkpoint(journal.head(), to_hex(hash));
-    if (!file) return tl::unexpected(file.error());
-    for (std::size_t next = 0; next < leaves.size();) {
-      v1::JournalFields piece;
-      for (std::size_t size = 0; next < leaves.size() && size < kPieceBytes; ++next) {
-        *piece.add_leaves() = wire::to_wire(leaves[next]);
-        size += piece.leaves(piece.leaves_size() - 1).values().size() + 24;
-      }
-      if (Result<void> written = file->write(piece_of(piece)); !written) return written;
+Result<void> RoomKeeper::checkpoint(RoomSeq place, std::span<const FieldLeaf> leaves, const UpkeepCalls& calls) {
+  const std::lock_guard one_at_a_time(checkpointing_);
+  const auto needed = with_journal([&](Journal& journal) -> Result<std::optional<JournalHead>> {
+    if (!place || place > journal.head().place) return std::nullopt;
+    const auto known = journal.checkpoints();
+    if (known && !known->empty() && known->front().at.place >= place) return std::nullopt;
+    return journal.head_at(place);
+  });
+  if (!needed) return tl::unexpected(needed.error());
+  if (!*needed) return {};
+  const std::string meta = to_hex(field_hash({leaves.begin(), leaves.end()}, pitch_mm_));
+  Result<CheckpointFile> file = with_journal([&](Journal& journal) { return journal.begin_checkpoint(**needed, meta); });
+  if (!file) return tl::unexpected(file.error());
+  for (std::size_t next = 0, unsynced = 0; next < leaves.size();) {
+    if (closing_ || (calls.stop && calls.stop())) return given_up("the checkpoint at place " + std::to_string(place.value));
+    v1::JournalFields fields;
+    for (std::size_t size = 0; next < leaves.size() && size < kPieceBytes; ++next) {
+      *fields.add_leaves() = wire::to_wire(leaves[next]);
+      size += fields.leaves(fields.leaves_size() - 1).values().size() + 24;
     }
-    if (Result<void> finished = file->finish(); !finished) return finished;
-    return journal.add_checkpoint(std::move(*file));
+    const std::string piece = piece_of(fields);
+    if (Result<void> written = file->write(piece); !written) return written;
+    unsynced += piece.size();
+    if (unsynced >= kSyncBytes) {
+      if (Result<void> synced = file->sync(); !synced) return synced;
+      unsynced = 0;
+    }
+    if (calls.progress) calls.progress(static_cast<double>(next) / static_cast<double>(leaves.size()));
+  }
+  if (Result<void> finished = file->finish(); !finished) return finished;
+  return with_journal([&](Journal& journal) {
+    const Result<void> added = journal.add_checkpoint(std::move(*file));
+    if (added) std::erase_if(changes_, [&](RoomSeq change) { return change <= place; });
+    return added;
   });
 }
 
+std::uint64_t RoomKeeper::changes_since_checkpoint() const {
+  const std::lock_guard in_turn(turn_);
+  return changes_.size();
+}
+
 Result<void> RoomKeeper::close() {
+  closing_ = true;
+  const std::lock_guard no_checkpoint(checkpointing_);
   return with_journal([&](Journal& journal) {
     last_ = journal.head();
     const Result<void> done = journal.close();

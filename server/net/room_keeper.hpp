@@ -1,5 +1,7 @@
 // Keeps a room in a journal: writes what it decides, makes it again from that, and looks after it while it is in use.
 #pragma once
+#include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
@@ -10,6 +12,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -42,6 +45,16 @@ struct BoneAt {
   Digest field_hash{};
 };
 
+// Whether it is time for the next checkpoint. A cut takes a millisecond or two to evaluate again: so much is asked that the
+// next opening takes a few seconds at most, and so long is waited that not the same leaves are written all the time.
+struct CheckpointPolicy {
+  std::uint64_t changes = 2000;
+  std::chrono::nanoseconds apart = std::chrono::seconds(60);
+  [[nodiscard]] bool is_due(std::uint64_t changes_since, std::chrono::nanoseconds since) const {
+    return changes_since >= changes && since >= apart;
+  }
+};
+
 // What a live verify found.
 struct RoomReport {
   JournalHead head;                  // of the last row that the chain confirms: as many rows
@@ -61,6 +74,8 @@ class RoomKeeper {
     CutLimits limits;
     std::shared_ptr<ToolBox> tools;     // that a new one begins with; null: the built-in ones
     JournalOptions journal;
+    int retention_days = 0;             // who joined more days ago is forgotten; 0: nobody ever
+    std::function<std::int32_t()> today;  // days since 1970-01-01; null: the computer's
   };
   // Goes on with the journal's room, up to the last row that anyone was told of, or makes a new one where there is no such
   // file. `progress` hears the fraction of the rows replayed. Errors: those of Journal::open; unsupported (of another case,
@@ -80,8 +95,17 @@ class RoomKeeper {
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
   // What a client was told was safe: see Journal::check_witness.
   [[nodiscard]] Result<void> check_witness(const JournalHead& witness);
-  // The pseudonym under which rows know this person; the same for the same label.
+
+  // The pseudonym under which rows know this person; the same for the same label, until it is forgotten.
   [[nodiscard]] Result<std::uint32_t> person(const std::string& label);
+  [[nodiscard]] Result<std::vector<Person>> people();
+  // Forgets who a person is, here and not in copies; what it did stays, under its number. False: nobody has that number.
+  [[nodiscard]] Result<bool> forget(std::uint32_t person);
+  // Whoever joined too long ago by Options::retention_days, as open() does; for once a day. Gives how many.
+  [[nodiscard]] Result<std::size_t> forget_old();
+  // All that there is of a person: a line of JSON that says who it is, then one for each event of its, until `take` returns
+  // false. Error not_found: no event and no name is of that number.
+  [[nodiscard]] Result<void> export_person(std::uint32_t person, const std::function<bool(const std::string&)>& take);
 
   // Rows from one place to another, both included, or to the head as it is now, each held against the chain, until `take`
   // returns false. `take` may wait: a live room can be replayed beside its cutting. Errors: of the first row that does not fit.
@@ -98,9 +122,17 @@ class RoomKeeper {
   [[nodiscard]] Result<JournalHead> branch(const std::filesystem::path& to, RoomSeq place, const std::string& name,
                                            const UpkeepCalls& calls = {});
 
-  // All leaves of the room at head(), so that the next opening need not evaluate every cut again.
-  [[nodiscard]] Result<void> checkpoint(RoomSeq place, std::span<const FieldLeaf> leaves);
-  [[nodiscard]] Result<void> close();  // clean: nothing may be written afterwards
+  // Whether this head is of its history: for branches_of().
+  [[nodiscard]] Result<bool> has_head(const JournalHead& head);
+
+  // All leaves of the room as it was at `place`, while rows may have gone on, so that the next opening need not evaluate every
+  // cut again: written and synced in pieces, noted in a transaction of its own. Nothing happens where the rows up to there
+  // are not kept yet, or a checkpoint goes as far. Error cancelled.
+  [[nodiscard]] Result<void> checkpoint(RoomSeq place, std::span<const FieldLeaf> leaves, const UpkeepCalls& calls = {});
+  // Rows since the newest checkpoint that the next opening would have to evaluate: for CheckpointPolicy.
+  [[nodiscard]] std::uint64_t changes_since_checkpoint() const;
+  // Clean; what takes long is given up, and a checkpoint that is being written waited for.
+  [[nodiscard]] Result<void> close();
 
  private:
   RoomKeeper(std::filesystem::path file, Journal journal, RoomGenesis genesis, double pitch_mm, Disk& disk);
@@ -109,6 +141,8 @@ class RoomKeeper {
     RoomSeq place;
     std::vector<FieldLeaf> leaves;
   };
+  // Leaves and their hash, of a checkpoint's bytes. Error invalid_input.
+  [[nodiscard]] Result<std::vector<FieldLeaf>> fields_of(const Checkpoint& one, std::string_view bytes) const;
   [[nodiscard]] Fields newest_fields();
   [[nodiscard]] Result<Room> replay(const Case& bone, const CutLimits& limits, const Fields& fields,
                                     const std::function<void(double)>& progress);
@@ -123,7 +157,11 @@ class RoomKeeper {
   // Rows after `at`, which goes on with them, up to `last`. Error invalid_input: the row after `at` does not fit the chain.
   [[nodiscard]] Result<void> each_row(JournalHead& at, RoomSeq last, const std::function<bool(const JournalRow&)>& take);
   [[nodiscard]] Result<void> run(JournalCopy& copy, const UpkeepCalls& calls);
+  // What is wrong with a checkpoint's bytes; nothing also where it has been replaced by a newer one meanwhile.
+  [[nodiscard]] Result<void> check_bytes(const Checkpoint& one, RoomReport& report);
 
+  std::mutex checkpointing_;        // held while one is written; taken before turn_
+  std::atomic<bool> closing_ = false;
   mutable InTurn turn_;
   std::optional<Journal> journal_;  // nothing: closed
   JournalHead last_;                // its head then
@@ -131,6 +169,9 @@ class RoomKeeper {
   const RoomGenesis genesis_;
   const double pitch_mm_;
   Disk& disk_;
+  int retention_days_ = 0;
+  std::function<std::int32_t()> today_;
+  std::vector<RoomSeq> changes_;    // since the newest checkpoint
   std::uint64_t server_epoch_ = 0, evaluated_ = 0;
 };
 

@@ -1,6 +1,9 @@
 // What a RoomKeeper does beside the commits of a room in use.
+#include <algorithm>
 #include <utility>
 
+#include "common/field/field_hash.hpp"
+#include "server/journal/journal_file.hpp"
 #include "server/net/room_keeper.hpp"
 
 namespace osteon {
@@ -19,7 +22,8 @@ Result<void> RoomKeeper::each_row(JournalHead& at, RoomSeq last, const std::func
     for (const JournalRow& row : slice->rows)
       if (!take(row)) return {};
     if (slice->stopped) return tl::unexpected(*slice->stopped);
-    if (slice->rows.empty()) return failure(ErrorCode::invalid_input, file_.string() + " has no row " + std::to_string(at.place.value + 1));
+    if (slice->rows.empty())
+      return failure(ErrorCode::invalid_input, file_.string() + " has no row " + std::to_string(at.place.value + 1));
   }
   return {};
 }
@@ -42,6 +46,7 @@ Result<void> RoomKeeper::read(RoomSeq from, RoomSeq to, const std::function<bool
 
 Result<void> RoomKeeper::run(JournalCopy& copy, const UpkeepCalls& calls) {
   for (Result<bool> done = false; !*done;) {
+    if (closing_) return is_closed();
     if (calls.stop && calls.stop()) return given_up("the copy of " + file_.string());
     const Result<void> taken = with_journal([&](Journal&) { return copy.take(kSliceRows); });
     if (!taken) return taken;
@@ -72,31 +77,129 @@ Result<RoomReport> RoomKeeper::verify(const Case& bone, const std::optional<Bone
   if (!room) return tl::unexpected(room.error());
   RoomReport report;
   RoomSeq last;
-  const auto begun = with_journal([&](Journal& journal) -> Result<JournalHead> {
+  const auto checkpoints = with_journal([&](Journal& journal) -> Result<std::vector<Checkpoint>> {
     last = journal.head().place;
+    report.head = first_head(journal.genesis());
     report.faults = verify_beside(journal);
-    return journal.head_at(RoomSeq{});
+    // A journal whose list of them cannot be read has said so just now.
+    return journal.checkpoints().value_or(std::vector<Checkpoint>{});
   });
-  if (!begun) return tl::unexpected(begun.error());
-  if (live && live->place > last)
-    return failure(ErrorCode::unavailable, "event " + std::to_string(live->place.value) + " of " + genesis_.room + " is not kept yet");
-  report.head = *begun;
+  if (!checkpoints) return tl::unexpected(checkpoints.error());
+  const RoomSeq replayed_to = live ? live->place : RoomSeq{};
+  if (replayed_to > last)
+    return failure(ErrorCode::unavailable, "event " + std::to_string(replayed_to.value) + " of the room " + genesis_.room +
+                                               " is not kept yet; try again");
+
+  // Rows, and what they make.
   bool stopped = false;
-  Result<void> replayed;
+  Result<void> outcome;
   const Result<void> read = each_row(report.head, last, [&](const JournalRow& one) {
     stopped = calls.stop && calls.stop();
     if (stopped) return false;
     if (calls.progress && one.place.value % 64 == 0)
       calls.progress(static_cast<double>(one.place.value) / static_cast<double>(last.value));
-    if (!live || one.place > live->place || !replayed) return true;
+    if (!outcome) return true;  // what follows is still held against the chain
     const Result<RoomRow> row = row_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
-    replayed = row ? room->replay(*row) : Result<void>(tl::unexpected(row.error()));
+    if (!row) outcome = tl::unexpected(row.error());
+    if (!row || one.place > replayed_to) return true;
+    outcome = room->replay(*row);
     (void)room->take_changes();
+    for (const Checkpoint& point : *checkpoints)
+      if (point.at.place == one.place && to_hex(field_hash(room->all_leaves(), pitch_mm_)) != point.meta)
+        report.faults.push_back("the checkpoint at place " + std::to_string(one.place.value) + " of " + file_.string() +
+                                " is not what its rows make; remove it");
     return true;
   });
-  if (stopped) return given_up("the check of " + genesis_.room);
-  if (!read) report.faults.push_back(read.error().message);
+  if (stopped) return given_up("the check of the room " + genesis_.room);
+  if (!read && read.error().code == ErrorCode::unavailable) return tl::unexpected(read.error());
+  if (!read) {
+    report.first_bad = RoomSeq{report.head.place.value + 1};
+    report.faults.push_back(read.error().message);
+  }
+  if (!outcome) report.faults.push_back(file_.string() + ": " + outcome.error().message);
+  if (live && outcome && room->room_seq() == live->place) {
+    report.replayed = {live->place, room->field_hash()};
+    if (report.replayed.field_hash != live->field_hash)
+      report.faults.push_back("the rows of the room " + genesis_.room + " up to " + std::to_string(live->place.value) +
+                              " make another bone than the one that is being cut; close the room and open it again");
+  }
+
+  for (const Checkpoint& one : *checkpoints) {
+    if (calls.stop && calls.stop()) return given_up("the check of the room " + genesis_.room);
+    if (const Result<void> good = check_bytes(one, report); !good) return tl::unexpected(good.error());
+  }
   return report;
+}
+
+// Without the journal's lock: a checkpoint's file never changes.
+Result<void> RoomKeeper::check_bytes(const Checkpoint& one, RoomReport& report) {
+  std::string bytes;
+  const std::filesystem::path file = checkpoint_file(file_, one.at);
+  const auto read = read_in_pieces(disk_, file, [&](std::string_view piece) {
+    bytes += piece;
+    return Result<void>{};
+  });
+  Result<void> good;
+  if (!read) good = tl::unexpected(read.error());
+  else if (read->size != one.size || read->digest != one.digest)
+    good = failure(ErrorCode::invalid_input, file.string() + " is not what was written; the checkpoint before it has to serve");
+  else if (const auto fields = fields_of(one, bytes); !fields) good = tl::unexpected(fields.error());
+  if (good) {
+    ++report.checkpoints;
+    return {};
+  }
+  const auto known = with_journal([](Journal& journal) { return journal.checkpoints(); });
+  if (!known && known.error().code == ErrorCode::unavailable) return tl::unexpected(known.error());
+  const bool replaced = known && std::ranges::none_of(*known, [&](const Checkpoint& kept) { return kept.at == one.at; });
+  if (!replaced) report.faults.push_back(good.error().message);
+  return {};
+}
+
+Result<std::vector<Person>> RoomKeeper::people() {
+  return with_journal([](Journal& journal) { return journal.people(); });
+}
+
+Result<bool> RoomKeeper::forget(std::uint32_t person) {
+  return with_journal([&](Journal& journal) { return journal.forget_person(std::to_string(person)); })
+      .map([](std::size_t forgotten) { return forgotten > 0; });
+}
+
+Result<std::size_t> RoomKeeper::forget_old() {
+  return with_journal([&](Journal& journal) -> Result<std::size_t> {
+    if (retention_days_ <= 0) return 0;
+    return journal.forget_people_before(today_() - retention_days_);
+  });
+}
+
+Result<void> RoomKeeper::export_person(std::uint32_t person, const std::function<bool(const std::string&)>& take) {
+  RoomSeq last;
+  JournalHead at;
+  const auto people = with_journal([&](Journal& journal) {
+    last = journal.head().place;
+    at = first_head(journal.genesis());
+    return journal.people();
+  });
+  if (!people) return tl::unexpected(people.error());
+  PersonExport lines(person, *people);
+  if (const auto& who = lines.who(); who && !take(*who)) return {};
+  Result<void> outcome;
+  bool any = lines.who().has_value();
+  const Result<void> read = each_row(at, last, [&](const JournalRow& row) {
+    const Result<std::optional<std::string>> line = lines.of(row);
+    if (!line) outcome = tl::unexpected(line.error());
+    any = any || (line && *line);
+    return line && (!*line || take(**line));
+  });
+  if (!outcome) return outcome;
+  if (read && !any) return lines.nobody();
+  return read;
+}
+
+Result<bool> RoomKeeper::has_head(const JournalHead& head) {
+  return with_journal([&](Journal& journal) -> Result<bool> {
+    if (head.place > journal.head().place) return false;
+    return journal.head_at(head.place).map([&](const JournalHead& here) { return here == head; });
+  });
 }
 
 }  // namespace osteon

@@ -1,0 +1,462 @@
+// What is done to the journal of a room in use: reading, checking, copying and branching it, and its checkpoints.
+#include "server/net/room_keeper.hpp"
+
+#include <gmock/gmock.h>
+
+#include <atomic>
+#include <thread>
+
+#include "tests/support/disk/memory_disk.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/unit/room/kept_room.hpp"
+
+namespace osteon {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+using test::KeptCuts;
+using test::MemoryDisk;
+using test::plain_rows;
+using test::replay_of;
+using test::rows_of;
+using test::test_block;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+constexpr const char *kFile = "/rooms/femur", *kTo = "/else/copy";
+
+class KeeperTest : public ::testing::Test {
+ protected:
+  // Writes a row whenever it is called: where the journal were held meanwhile, for ever.
+  UpkeepCalls writing(KeptCuts& kept, int& written) {
+    return {[&kept, &written](double) {
+              kept.cut(1);
+              ++written;
+            },
+            {}};
+  }
+  std::size_t files_of(const std::string& path) const {
+    const MemoryDisk::Image image = disk_.image();
+    return static_cast<std::size_t>(std::ranges::count_if(image, [&](const auto& file) { return file.first.starts_with(path); }));
+  }
+  MemoryDisk disk_{1};
+};
+
+TEST_F(KeeperTest, OnceClosedItSaysSoAndTouchesNothing) {
+  KeptCuts kept(kFile, &disk_, "femur");
+  kept.cut(3);
+  RoomKeeper& keeper = *kept.keeper;
+  const JournalHead head = keeper.head();
+  ASSERT_TRUE(keeper.close());
+  const MemoryDisk::Image before = disk_.image();
+  const MemoryDisk::Counts counts = disk_.counts();
+  std::vector<Error> errors;
+  const auto note = [&](const auto& result) {
+    ASSERT_FALSE(result);
+    errors.push_back(result.error());
+  };
+  note(keeper.write(plain_rows(head.place, 1)));
+  note(keeper.person("Anna"));
+  note(keeper.people());
+  note(keeper.forget(1));
+  note(keeper.forget_old());
+  note(keeper.check_witness(head));
+  note(keeper.has_head(head));
+  note(keeper.read(RoomSeq{1}, head.place, [](const RoomRow&) { return true; }));
+  note(keeper.export_person(1, [](const std::string&) { return true; }));
+  note(keeper.verify(test_block(), std::nullopt));
+  note(keeper.backup(kTo));
+  note(keeper.branch(kTo, {}, "branch"));
+  note(keeper.checkpoint(head.place, kept.room->all_leaves()));
+  note(keeper.close());
+  for (const Error& error : errors) {
+    EXPECT_EQ(error.code, ErrorCode::unavailable) << error.message;
+    EXPECT_THAT(error.message, HasSubstr("the room femur is closed"));
+  }
+  EXPECT_THAT(errors, SizeIs(14));
+  EXPECT_EQ(keeper.head(), head);
+  EXPECT_EQ(disk_.image(), before);
+  EXPECT_EQ(disk_.counts().writes, counts.writes);
+}
+
+TEST_F(KeeperTest, IsReadWhileItIsWritten) {
+  KeptCuts kept(kFile, &disk_, "femur");
+  kept.cut(300);
+  const BoneAt bone = kept.bone();
+  const Digest hash = kept.room->room_hash();
+  Room replayed(test_block());
+  int written = 0;
+  const Result<void> read = kept.keeper->read(RoomSeq{1}, RoomSeq{1'000'000}, [&](const RoomRow& row) {
+    EXPECT_TRUE(replayed.replay(row));
+    if (row.place.value % 20 == 0 && ++written) kept.cut(1);
+    return true;
+  });
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(replayed.room_seq(), bone.place) << "the head as it was when the reading began";
+  EXPECT_EQ(replayed.room_hash(), hash);
+  EXPECT_GT(written, 30);
+  EXPECT_GT(kept.keeper->head().place, bone.place);
+
+  std::vector<std::uint64_t> places;
+  const auto note = [&](const RoomRow& row) {
+    places.push_back(row.place.value);
+    return places.size() < 4;
+  };
+  ASSERT_TRUE(kept.keeper->read(RoomSeq{257}, RoomSeq{259}, note));
+  EXPECT_THAT(places, ::testing::ElementsAre(257, 258, 259));
+  places.clear();
+  ASSERT_TRUE(kept.keeper->read(RoomSeq{}, RoomSeq{600}, note));
+  EXPECT_THAT(places, ::testing::ElementsAre(1, 2, 3, 4)) << "until it was told to stop";
+  places.clear();
+  ASSERT_TRUE(kept.keeper->read(RoomSeq{10'000}, RoomSeq{20'000}, note));
+  EXPECT_THAT(places, IsEmpty());
+}
+
+TEST_F(KeeperTest, AVerifyConfirmsRowsCheckpointsAndBone) {
+  KeptCuts kept(kFile, &disk_, "femur");
+  kept.cut(30);
+  kept.checkpoint();
+  kept.cut(30);
+  kept.checkpoint();
+  kept.cut(30);
+  const BoneAt live = kept.bone();
+  kept.cut(5);
+  const JournalHead head = kept.keeper->head();
+  int written = 0;
+  const Result<RoomReport> report = kept.keeper->verify(test_block(), live, writing(kept, written));
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_THAT(report->faults, IsEmpty());
+  EXPECT_TRUE(report->sound());
+  EXPECT_EQ(report->head, head);
+  EXPECT_EQ(report->first_bad, std::nullopt);
+  EXPECT_EQ(report->checkpoints, 2u);
+  EXPECT_EQ(report->replayed.place, live.place);
+  EXPECT_EQ(report->replayed.field_hash, live.field_hash);
+  EXPECT_GT(written, 1);
+  EXPECT_GT(kept.keeper->head().place, head.place);
+
+  const Result<RoomReport> rows_only = kept.keeper->verify(test_block(), std::nullopt);
+  ASSERT_TRUE(rows_only);
+  EXPECT_TRUE(rows_only->sound());
+  EXPECT_EQ(rows_only->replayed.place, RoomSeq{});
+  EXPECT_EQ(rows_only->head, kept.keeper->head());
+
+  BoneAt other = live;
+  other.field_hash.bytes[0] ^= 1;
+  const Result<RoomReport> wrong = kept.keeper->verify(test_block(), other);
+  ASSERT_TRUE(wrong);
+  ASSERT_THAT(wrong->faults, SizeIs(1));
+  EXPECT_THAT(wrong->faults[0], HasSubstr("make another bone"));
+
+  const RoomSeq later{kept.keeper->head().place.value + 1};
+  EXPECT_EQ(kept.keeper->verify(test_block(), BoneAt{later, {}}).error().code, ErrorCode::unavailable);
+  const Case another = test::plain_block(24.0, 12.0, test::kBlockPitch_mm, 1.2);
+  EXPECT_EQ(kept.keeper->verify(another, live).error().code, ErrorCode::unsupported);
+  int asked = 0;
+  const UpkeepCalls stopping{{}, [&] { return ++asked == 10; }};
+  EXPECT_EQ(kept.keeper->verify(test_block(), live, stopping).error().code, ErrorCode::cancelled);
+  EXPECT_EQ(asked, 10);
+}
+
+TEST_F(KeeperTest, AVerifyFindsCheckpointsThatWereSpoiledOrMadeOfAnotherBone) {
+  KeptCuts kept(kFile, &disk_, "femur");
+  kept.cut(10);
+  const std::vector<FieldLeaf> earlier = kept.room->all_leaves();
+  kept.cut(10);
+  kept.checkpoint();
+  const RoomSeq good = kept.room->room_seq();
+  kept.cut(1);
+  ASSERT_TRUE(kept.keeper->checkpoint(kept.room->room_seq(), earlier)) << "which it cannot know to be of an earlier place";
+  Result<RoomReport> report = kept.keeper->verify(test_block(), kept.bone());
+  ASSERT_TRUE(report);
+  ASSERT_THAT(report->faults, SizeIs(1));
+  EXPECT_THAT(report->faults[0], AllOf(HasSubstr("the checkpoint at place " + std::to_string(kept.room->room_seq().value)),
+                                       HasSubstr("is not what its rows make")));
+  EXPECT_EQ(report->checkpoints, 2u) << "its bytes are those that were written";
+
+  for (const auto& [name, bytes] : disk_.image())
+    if (name.find("-" + std::to_string(good.value) + "-") != std::string::npos) disk_.flip_bit(name, 4 * bytes.size());
+  report = kept.keeper->verify(test_block(), std::nullopt);
+  ASSERT_TRUE(report);
+  ASSERT_THAT(report->faults, SizeIs(1));
+  EXPECT_THAT(report->faults[0], HasSubstr("is not what was written"));
+  EXPECT_EQ(report->checkpoints, 1u);
+  EXPECT_EQ(kept.keeper->backup(kTo).error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(files_of("/else/"), 0u);
+}
+
+// On the disk, under a journal that is open: beyond what SQLite still has in memory.
+TEST_F(KeeperTest, DamageUnderAnOpenJournalIsFound) {
+  KeptCuts kept(kFile, &disk_, "femur");
+  kept.keep();
+  ASSERT_TRUE(kept.keeper->write(plain_rows(kept.keeper->head().place, 600, 20'000)));
+  const JournalHead head = kept.keeper->head();
+  const std::string log = std::string(kFile) + "-wal", bytes = disk_.image().at(log);
+  const std::size_t at = bytes.find("100." + std::string(50, 'x'));
+  ASSERT_NE(at, std::string::npos);
+  disk_.flip_bit(log, 8 * (at + 20) + 1);
+  const Result<RoomReport> report = kept.keeper->verify(test_block(), std::nullopt);
+  ASSERT_TRUE(report);
+  EXPECT_EQ(report->first_bad, RoomSeq{100});
+  EXPECT_EQ(report->head.place, RoomSeq{99});
+  ASSERT_FALSE(report->sound());
+  EXPECT_THAT(report->faults[0], HasSubstr("row 100 does not fit the chain of hashes"));
+  std::size_t seen = 0;
+  const Result<void> read = kept.keeper->read(RoomSeq{1}, head.place, [&](const RoomRow&) { return ++seen > 0; });
+  EXPECT_EQ(read.error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(seen, 99u);
+  EXPECT_EQ(kept.keeper->backup(kTo).error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(kept.keeper->branch(kTo, {}, "b").error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(files_of("/else/"), 0u);
+  EXPECT_TRUE(kept.keeper->branch(kTo, RoomSeq{99}, "b")) << "which the damage does not reach";
+}
+
+// On the computer's disk, and each waits for the other: so rows get through between any two slices of a check or a copy.
+TEST(KeeperThreads, RowsAreWrittenWhileAJournalIsCheckedAndCopied) {
+  const test::TempDir folder;
+  KeptCuts kept(folder.path() / "room", nullptr, "room");
+  kept.keep();
+  RoomKeeper& keeper = *kept.keeper;
+  ASSERT_TRUE(keeper.write(plain_rows(keeper.head().place, 20'000)));
+  std::atomic<bool> end = false;
+  std::atomic<std::uint64_t> written = 0;
+  std::thread writer([&] {
+    for (RoomSeq at = keeper.head().place; !end; ++at.value, ++written) ASSERT_TRUE(keeper.write(plain_rows(at, 1)));
+  });
+  const auto wait_for_a_row = [&](double) {
+    for (const std::uint64_t before = written; written == before;) std::this_thread::yield();
+  };
+  for (const bool copied : {false, true}) {
+    const std::uint64_t before = written;
+    const JournalHead head = keeper.head();
+    int waits = 0;
+    const UpkeepCalls calls{[&](double fraction) {
+                              if (++waits % 20 == 0) wait_for_a_row(fraction);
+                            },
+                            {}};
+    if (copied) {
+      const Result<JournalHead> made = keeper.backup(folder.path() / "copy", calls);
+      ASSERT_TRUE(made) << made.error().message;
+      EXPECT_GE(made->place, head.place);
+      EXPECT_TRUE(*keeper.has_head(*made));
+      EXPECT_GE(waits, 20'000 / 256);
+    } else {
+      const Result<RoomReport> report = keeper.verify(test_block(), std::nullopt, calls);
+      ASSERT_TRUE(report) << report.error().message;
+      EXPECT_TRUE(report->sound()) << report->faults[0];
+      EXPECT_GE(report->head.place, head.place);
+    }
+    EXPECT_GE(written - before, static_cast<std::uint64_t>(waits / 20));
+    std::printf("%s of %llu rows: %llu rows written meanwhile, %d waited for\n", copied ? "a copy" : "a check",
+                static_cast<unsigned long long>(head.place.value), static_cast<unsigned long long>(written - before), waits / 20);
+  }
+  // Without any waiting, neither keeps the other from its turn.
+  const std::uint64_t before = written;
+  ASSERT_TRUE(keeper.verify(test_block(), std::nullopt));
+  std::printf("a check that waits for nobody: %llu rows written meanwhile\n", static_cast<unsigned long long>(written - before));
+  EXPECT_GT(written - before, 20u) << "about one for each of 80 slices";
+  end = true;
+  writer.join();
+  ASSERT_TRUE(keeper.close());
+  const Result<VerifyReport> copy = verify_journal(folder.path() / "copy");
+  ASSERT_TRUE(copy);
+  EXPECT_TRUE(copy->sound());
+}
+
+TEST_F(KeeperTest, ABackupIsTheRoomAsItWasWhileItGoesOn) {
+  KeptCuts kept(kFile, &disk_, "femur");
+  kept.cut(150);
+  kept.checkpoint();
+  kept.cut(100);
+  const JournalHead head = kept.keeper->head();
+  const Digest hash = kept.room->room_hash();
+  ASSERT_EQ(kept.keeper->person("Anna").value(), 1u);
+  int written = 0;
+  const Result<JournalHead> made = kept.keeper->backup(kTo, writing(kept, written));
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ(*made, head);
+  EXPECT_GT(written, 2);
+  EXPECT_GT(kept.keeper->head().place, head.place);
+  const Result<VerifyReport> copy = verify_journal(kTo, &disk_);
+  ASSERT_TRUE(copy);
+  EXPECT_TRUE(copy->sound());
+  EXPECT_EQ(copy->head, head);
+  {
+    const Result<KeptRoom> again = RoomKeeper::open(kTo, test_block(), kept.options);
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_EQ(again->room.room_hash(), hash);
+    EXPECT_EQ(again->keeper->evaluated(), head.place.value - (1 + 150 * 2 + 30)) << "its checkpoint was copied, too";
+    EXPECT_THAT(again->keeper->people().value(), SizeIs(1));
+  }
+  EXPECT_EQ(kept.keeper->backup(kTo).error().code, ErrorCode::exists);
+
+  int asked = 0;
+  const std::size_t before = files_of("/");
+  EXPECT_EQ(kept.keeper->backup("/else/other", {{}, [&] { return ++asked > 1; }}).error().code, ErrorCode::cancelled);
+  EXPECT_EQ(files_of("/"), before);
+}
+
+// The checkpoints that it found when it began are gone when it comes to them.
+TEST_F(KeeperTest, ABackupPassesOverCheckpointsThatWereReplacedMeanwhile) {
+  KeptCuts kept(kFile, &disk_, "femur");
+  for (int i = 0; i < 2; ++i) {
+    kept.cut(20);
+    kept.checkpoint();
+  }
+  const JournalHead head = kept.keeper->head();
+  const Digest hash = kept.room->room_hash();
+  int calls = 0;
+  const UpkeepCalls replacing{[&](double) {
+                                if (++calls > 4) return;
+                                kept.cut(1);
+                                kept.checkpoint();
+                              },
+                              {}};
+  const Result<JournalHead> made = kept.keeper->backup(kTo, replacing);
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ(*made, head);
+  EXPECT_GT(calls, 2);
+  EXPECT_TRUE(verify_journal(kTo, &disk_)->sound());
+  const Result<KeptRoom> again = RoomKeeper::open(kTo, test_block(), kept.options);
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->room.room_hash(), hash);
+}
+
+TEST_F(KeeperTest, ABackupThatWasCutShortIsNotInTheWayOfTheNext) {
+  KeptCuts kept(kFile, &disk_, "femur");
+  kept.cut(150);
+  std::optional<MemoryDisk::Image> half;
+  const UpkeepCalls calls{[&](double) {
+                            if (!half) half = disk_.image();
+                          },
+                          {}};
+  (void)kept.keeper->backup(kTo, calls);
+  ASSERT_TRUE(half && half->contains("/else/copy.copying") && half->contains("/else/copy.copying-wal"));
+  kept.keeper.reset();
+  disk_.load(*half);
+  kept.open(kFile);
+  const Result<JournalHead> made = kept.keeper->backup(kTo);
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ(files_of("/else/"), 1u);
+}
+
+TEST_F(KeeperTest, ACheckpointIsOfItsPlaceThoughRowsGoOn) {
+  KeptCuts kept(kFile, &disk_, "femur");
+  kept.cut(40);
+  const RoomSeq place = kept.room->room_seq();
+  const std::vector<FieldLeaf> leaves = kept.room->all_leaves();
+  EXPECT_EQ(kept.keeper->changes_since_checkpoint(), 48u) << "40 cuts, 8 undos";
+  kept.cut(10);
+  int written = 0;
+  const Result<void> done = kept.keeper->checkpoint(place, leaves, writing(kept, written));
+  ASSERT_TRUE(done) << done.error().message;
+  EXPECT_GT(written, 0);
+  EXPECT_EQ(kept.keeper->changes_since_checkpoint(), static_cast<std::uint64_t>(12 + written));
+  const std::size_t files = files_of(kFile);
+  ASSERT_TRUE(kept.keeper->checkpoint(place, leaves)) << "there is one";
+  ASSERT_TRUE(kept.keeper->checkpoint(RoomSeq{5}, leaves)) << "there is a newer one";
+  ASSERT_TRUE(kept.keeper->checkpoint(RoomSeq{kept.keeper->head().place.value + 1}, leaves)) << "not kept yet";
+  EXPECT_EQ(files_of(kFile), files);
+  EXPECT_EQ(kept.keeper->checkpoint(kept.room->room_seq(), kept.room->all_leaves(), {{}, [] { return true; }}).error().code,
+            ErrorCode::cancelled);
+  EXPECT_EQ(files_of(kFile), files);
+
+  const Digest hash = kept.room->room_hash();
+  const RoomSeq head = kept.keeper->head().place;
+  ASSERT_TRUE(kept.keeper->verify(test_block(), kept.bone())->sound());
+  kept.keeper.reset();  // as if it had been killed
+  kept.open(kFile);
+  EXPECT_EQ(kept.keeper->evaluated(), head.value - place.value);
+  EXPECT_EQ(kept.keeper->changes_since_checkpoint(), static_cast<std::uint64_t>(12 + written));
+  EXPECT_EQ(kept.room->room_hash(), hash);
+}
+
+TEST_F(KeeperTest, ALargeCheckpointIsSyncedBitByBit) {
+  KeptCuts kept(kFile, &disk_, "femur");
+  kept.cut(1);
+  std::vector<FieldLeaf> leaves;
+  for (int i = 0; i < 8000; ++i) {
+    leaves.push_back({BodyId{0}, 0, {8 * i, 0, 0}, std::vector<std::int16_t>(kLeafVoxels)});
+    for (int k = 0; k < kLeafVoxels; ++k)
+      leaves.back().values[static_cast<std::size_t>(k)] = static_cast<std::int16_t>(i * 31 + k * 7);
+  }
+  std::uint64_t syncs = disk_.counts().syncs, written = disk_.counts().written_bytes, most = 0, since = 0, all = 0;
+  const auto look = [&](double) {
+    const std::uint64_t now = disk_.counts().written_bytes - written;
+    since = disk_.counts().syncs == syncs ? since + now : 0;
+    syncs = disk_.counts().syncs;
+    written = disk_.counts().written_bytes;
+    all += now;
+    most = std::max(most, since);
+  };
+  ASSERT_TRUE(kept.keeper->checkpoint(kept.room->room_seq(), leaves, {look, {}}));
+  EXPECT_GT(all, 5u << 20);
+  EXPECT_LE(most, 1u << 20);
+  std::printf("%llu bytes, never more than %llu of them unsynced\n", static_cast<unsigned long long>(all),
+              static_cast<unsigned long long>(most));
+}
+
+TEST(CheckpointPolicyTest, AsksForWorkAndForTime) {
+  const CheckpointPolicy policy;
+  EXPECT_TRUE(policy.is_due(2000, 60s));
+  EXPECT_FALSE(policy.is_due(1999, 1h));
+  EXPECT_FALSE(policy.is_due(1'000'000, 59s));
+}
+
+// Rows of the branch are those of its parent; everything else is its own.
+TEST_F(KeeperTest, ABranchIsARoomOfItsOwn) {
+  KeptCuts kept(kFile, &disk_, "femur");
+  ASSERT_EQ(kept.keeper->person("Anna").value(), 1u);
+  ASSERT_EQ(kept.keeper->person("Bela").value(), 2u);
+  kept.cut(200);
+  kept.checkpoint();
+  kept.cut(10);
+  const RoomSeq place{1 + 440 + 5};
+  const std::vector<RoomRow> before = rows_of(*kept.keeper, place);
+  const Room expected = replay_of(before);
+  int written = 0;
+  const Result<JournalHead> live = kept.keeper->branch("/else/live", place, "second try", writing(kept, written));
+  ASSERT_TRUE(live) << live.error().message;
+  EXPECT_GT(written, 1);
+  const Result<RoomGenesis> peeked = peek_genesis("/else/live", &disk_);
+  ASSERT_TRUE(peeked);
+  EXPECT_EQ(peeked->room, "second try");
+  EXPECT_EQ(peeked->parent, "femur");
+  EXPECT_EQ(peeked->parent_room_seq, place);
+  EXPECT_TRUE(kept.keeper->has_head({place, peeked->parent_chain}).value());
+  EXPECT_EQ(kept.keeper->branch("/else/live", place, "second try").error().code, ErrorCode::exists);
+  const RoomSeq beyond{kept.keeper->head().place.value + 1};
+  EXPECT_EQ(kept.keeper->branch("/else/beyond", beyond, "b").error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(branch_journal(kFile, "/else/file", place, "b", {}, &disk_).error().code, ErrorCode::exists) << "in use";
+
+  ASSERT_TRUE(kept.keeper->close());
+  const Result<JournalHead> from_file = branch_journal(kFile, "/else/file", place, "second try", {}, &disk_);
+  ASSERT_TRUE(from_file) << from_file.error().message;
+  EXPECT_EQ(*from_file, *live) << "the same, by the other road";
+  EXPECT_TRUE(verify_journal(kFile, &disk_)->closed_cleanly);
+  for (const char* file : {"/else/live", "/else/file"}) {
+    EXPECT_TRUE(verify_journal(file, &disk_)->sound());
+    const Result<KeptRoom> branch = RoomKeeper::open(file, test_block(), kept.options);
+    ASSERT_TRUE(branch) << branch.error().message;
+    EXPECT_EQ(branch->room.room_hash(), expected.room_hash());
+    EXPECT_EQ(branch->keeper->head(), *live);
+    EXPECT_EQ(branch->keeper->evaluated(), 5u) << "its parent's checkpoint serves";
+    EXPECT_EQ(branch->keeper->server_epoch(), 1u);
+    EXPECT_THAT(branch->keeper->people().value(), IsEmpty());
+    EXPECT_EQ(branch->keeper->person("Cora").value(), 3u) << "1 and 2 are others in its rows";
+  }
+  const Result<JournalHead> whole = branch_journal(kFile, "/else/whole", {}, "all", {}, &disk_);
+  ASSERT_TRUE(whole);
+  EXPECT_EQ(whole->place, kept.keeper->head().place);
+  int asked = 0;
+  const std::size_t files = files_of("/");
+  EXPECT_EQ(branch_journal(kFile, "/else/no", {}, "no", {{}, [&] { return ++asked > 1; }}, &disk_).error().code,
+            ErrorCode::cancelled);
+  EXPECT_EQ(files_of("/"), files);
+}
+
+}  // namespace
+}  // namespace osteon
