@@ -26,13 +26,22 @@ Bytes mutated(Bytes bytes, std::mt19937& random) {
 
 TEST(Fuzz, TargetsStandMutatedInputs) {
   const char* asked = std::getenv("OSTEON_FUZZ_RUNS");
-  const long runs = asked ? std::atol(asked) : 2000;
   for (const Target& target : targets()) {
     SCOPED_TRACE(target.name);
     std::mt19937 random(1);
+    const long runs = asked ? std::atol(asked) : target.mutations;
     for (const Bytes& seed : target.seeds) {
       target.run(seed);
-      for (long i = 0; i < runs; ++i) target.run(mutated(seed, random));
+      for (long i = 0; i < runs; ++i) {
+        Bytes input = seed;
+        // A few changes of form on top of each other, or changes of bytes.
+        if (target.change && random() % 4) {
+          for (std::size_t changes = 1 + random() % 6; changes > 0; --changes) target.change(input, random);
+        } else {
+          input = mutated(std::move(input), random);
+        }
+        target.run(input);
+      }
     }
   }
 }

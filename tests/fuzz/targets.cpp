@@ -1,5 +1,7 @@
 #include "tests/fuzz/targets.hpp"
 
+#include <google/protobuf/stubs/logging.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -12,6 +14,7 @@
 #include "common/wire/convert.hpp"
 #include "common/wire/server_link.hpp"
 #include "tests/fuzz/datagram_target.hpp"
+#include "tests/fuzz/journal_target.hpp"
 
 namespace osteon::fuzz {
 namespace {
@@ -179,6 +182,7 @@ Target named(std::string name, Target target) {
 }  // namespace
 
 std::vector<Target> targets() {
+  google::protobuf::SetLogHandler(nullptr);  // it writes a line for every text that is none
   FieldLeaf leaf{{}, 1, {8, -16, 0}, std::vector<std::int16_t>(kLeafVoxels, 7)};
   return {{"cut", parse_and_convert<v1::Cut>, {bytes_of(wire::to_wire(a_cut()).SerializeAsString())}},
           {"cutting_state", parse_and_convert<v1::CuttingState>, {bytes_of(wire::to_wire(CuttingState{}).SerializeAsString())}},
@@ -190,7 +194,10 @@ std::vector<Target> targets() {
            {bytes_of(wire::to_wire(Look{{1, 2, 3}, {4, 5, 6}, 0.001, 0.3}).SerializeAsString())}},
           named("up_packet", datagram_target(as_up_packet, {an_up_packet()})),
           named("down_packet", datagram_target(as_down_packet, {a_down_packet()})),
-          {"mesh_block", decode_any_block, {a_block().bytes, a_seamed_block().bytes}}};
+          {"mesh_block", decode_any_block, {a_block().bytes, a_seamed_block().bytes}},
+          rows_target(),
+          genesis_target(),
+          journal_file_target()};
 }
 
 }  // namespace osteon::fuzz

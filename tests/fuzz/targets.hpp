@@ -1,8 +1,9 @@
 // What untrusted bytes can reach. Each target takes any bytes and must neither crash nor break a promise; sanitizers see
-// the rest. A target is linked to libFuzzer by naming it in LLVMFuzzerTestOneInput, and run here on seeded mutations.
+// the rest. Run by libFuzzer (osteon-fuzz, of the preset fuzz) and, in every test run, on seeded mutations.
 #pragma once
 #include <cstdint>
 #include <functional>
+#include <random>
 #include <span>
 #include <string>
 #include <vector>
@@ -15,6 +16,9 @@ struct Target {
   std::string name;
   std::function<void(std::span<const std::uint8_t>)> run;
   std::vector<Bytes> seeds;  // valid inputs, to mutate
+  long mutations = 2000;     // of each seed in a test run
+  // Changes an input as only who knows its form can; none: bytes are changed.
+  std::function<void(Bytes&, std::mt19937&)> change = nullptr;
 };
 
 [[nodiscard]] std::vector<Target> targets();

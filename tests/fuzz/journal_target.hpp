@@ -1,0 +1,14 @@
+// What a journal may hold as fuzz targets: rows of a room, what a room began as, and the files themselves.
+#pragma once
+#include "tests/fuzz/targets.hpp"
+
+namespace osteon::fuzz {
+
+// Any bytes as a sequence of rows, each with its place and time: what is refused changes nothing, what is taken makes the
+// same room again, from the beginning and from a checkpoint, and can be gone on with.
+[[nodiscard]] Target rows_target();
+[[nodiscard]] Target genesis_target();
+// Any bytes as a list of damages to a small journal: what is read or recovered is what was written, up to some row.
+[[nodiscard]] Target journal_file_target();
+
+}  // namespace osteon::fuzz

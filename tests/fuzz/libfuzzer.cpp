@@ -1,0 +1,74 @@
+// osteon-fuzz --target=NAME [--seeds=FOLDER] [OPTIONS OF LIBFUZZER] [FOLDER...]: one target under libFuzzer, which looks for
+// inputs that reach what no input has reached. --seeds writes the target's own seeds into that folder first.
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <string>
+#include <string_view>
+
+#include "tests/fuzz/targets.hpp"
+
+namespace osteon::fuzz {
+namespace {
+
+const Target* chosen = nullptr;
+
+[[noreturn]] void usage(const std::vector<Target>& all) {
+  std::fprintf(stderr, "osteon-fuzz --target=NAME [--seeds=FOLDER] [OPTIONS OF LIBFUZZER] [FOLDER...]; targets:");
+  for (const Target& target : all) std::fprintf(stderr, " %s", target.name.c_str());
+  std::fprintf(stderr, "\n");
+  std::exit(2);
+}
+
+void write_seeds(const Target& target, const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder);
+  for (std::size_t i = 0; i < target.seeds.size(); ++i) {
+    std::ofstream file(folder / ("seed-" + target.name + "-" + std::to_string(i)), std::ios::binary);
+    for (const std::uint8_t byte : target.seeds[i]) file.put(static_cast<char>(byte));
+  }
+}
+
+// libFuzzer passes over options that begin with two dashes.
+void choose(std::span<char*> arguments) {
+  static const std::vector<Target> all = targets();
+  constexpr std::string_view kTarget = "--target=", kSeeds = "--seeds=";
+  std::filesystem::path folder;
+  for (const std::string_view argument : arguments) {
+    if (argument.starts_with(kTarget)) {
+      const auto found = std::ranges::find(all, argument.substr(kTarget.size()), &Target::name);
+      chosen = found == all.end() ? nullptr : &*found;
+    }
+    if (argument.starts_with(kSeeds)) folder = argument.substr(kSeeds.size());
+  }
+  if (chosen == nullptr) usage(all);
+  if (!folder.empty()) write_seeds(*chosen, folder);
+}
+
+}  // namespace
+}  // namespace osteon::fuzz
+
+extern "C" {
+std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t most);
+
+int LLVMFuzzerInitialize(int* argc, char*** argv) {
+  osteon::fuzz::choose({*argv, static_cast<std::size_t>(*argc)});
+  return 0;
+}
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  osteon::fuzz::chosen->run({data, size});
+  return 0;
+}
+std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t most, unsigned seed) {
+  std::mt19937 random(seed);
+  const osteon::fuzz::Target& target = *osteon::fuzz::chosen;
+  if (!target.change || random() % 2 == 0) return LLVMFuzzerMutate(data, size, most);
+  osteon::fuzz::Bytes input(data, data + size);
+  target.change(input, random);
+  if (input.size() > most) return LLVMFuzzerMutate(data, size, most);
+  std::ranges::copy(input, data);
+  return input.size();
+}
+}
