@@ -10,6 +10,9 @@ template <class... F>
 struct Overloaded : F... {
   using F::operator()...;
 };
+// Deduced without it too, but not by clang before 17.
+template <class... F>
+Overloaded(F...) -> Overloaded<F...>;
 
 tl::unexpected<Error> refuse(const Tool& tool, const char* why) { return failure(ErrorCode::invalid_input, "\"" + tool.name + "\" " + why); }
 
