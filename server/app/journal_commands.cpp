@@ -8,7 +8,9 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "common/field/kernel.hpp"
 #include "common/runtime/progress.hpp"
@@ -16,6 +18,7 @@
 #include "common/volume/field_file.hpp"
 #include "server/journal/upkeep.hpp"
 #include "server/net/journal_rows.hpp"
+#include "server/net/room_files.hpp"
 
 namespace osteon {
 namespace {
@@ -25,8 +28,9 @@ namespace fs = std::filesystem;
 struct Arguments {
   fs::path file, to, case_folder, fields;
   std::uint64_t at = 0;
-  std::string person;
+  std::uint32_t person = 0;
   int days = 0;
+  bool branches = false, alone = false;
 };
 
 void say(const std::string& what, const std::string& value) { std::printf("%-12s %s\n", (what + ":").c_str(), value.c_str()); }
@@ -114,53 +118,68 @@ Result<void> replay(const Arguments& given) {
   return save_fields(given.fields, saved);
 }
 
-// A room of its own that begins with all that another one was up to a place.
 Result<void> branch(const Arguments& given) {
-  Result<Journal> from = Journal::open(given.file);
-  if (!from) return tl::unexpected(from.error());
-  Result<RoomGenesis> genesis = genesis_from_bytes(from->genesis());
-  if (!genesis) return tl::unexpected(genesis.error());
-  const std::uint64_t last = given.at == 0 ? from->head().place.value : given.at;
-  if (last > from->head().place.value)
-    return failure(ErrorCode::invalid_input, "--at " + std::to_string(last) + " lies beyond the last event of " + given.file.string());
-  genesis->parent = genesis->room;
-  genesis->parent_room_seq = RoomSeq{last};
-  genesis->room = given.to.stem().string();
-  std::vector<JournalRow> rows;
-  JournalHead head = first_head(from->genesis());
-  const Result<void> read = from->read(RoomSeq{1}, [&](const JournalRow& row) {
-    if (row.place.value > last) return false;
-    rows.push_back(row);
-    head = next_head(head, row);
-    return true;
-  });
-  if (!read) return read;
-  genesis->parent_chain = head.chain;
-  Result<Journal> made = Journal::create(given.to, to_bytes(*genesis));
+  Progress progress("branch");
+  const Result<JournalHead> made = branch_journal(given.file, given.to, RoomSeq{given.at}, given.to.stem().string(),
+                                                  {[&](double fraction) { progress.update(fraction); }, {}});
   if (!made) return tl::unexpected(made.error());
-  if (Result<void> copied = made->append(rows); !copied) return copied;
-  say("branch", given.to.string() + " of " + genesis->parent + " at " + std::to_string(last));
-  return made->close();
+  say("branch", given.to.string() + " of " + given.file.string() + " at " + std::to_string(made->place.value));
+  return {};
 }
 
-// One line of text for each event.
+// The room, and with it what was made of it: asked twice, since nothing brings it back.
+Result<void> remove(const Arguments& given) {
+  const Result<std::vector<RoomFile>> branches = branches_of(folder_of(given.file), given.file);
+  if (!branches && branches.error().code != ErrorCode::not_found) return tl::unexpected(branches.error());
+  if (branches && !branches->empty() && !given.branches && !given.alone) {
+    for (const RoomFile& branch : *branches) say("branch", branch.file.string());
+    return failure(ErrorCode::invalid_input, given.file.string() + " has branches, which hold what was cut in it; "
+                                                                   "say --branches or --alone");
+  }
+  const Result<std::vector<fs::path>> gone = delete_room(given.file, given.branches);
+  if (!gone) return tl::unexpected(gone.error());
+  for (const fs::path& file : *gone) say("deleted", file.string());
+  say("not deleted", "backups, and branches in other folders: nobody has kept where they are");
+  return {};
+}
+
+// One line of text for each event, of all or of one person.
 Result<void> write_out(const Arguments& given) {
   Result<Journal> journal = Journal::open(given.file);
   if (!journal) return tl::unexpected(journal.error());
   std::ofstream out(given.to);
   if (!out) return failure(ErrorCode::internal, "cannot write " + given.to.string() + "; give another file");
+  std::optional<PersonExport> of_person;
+  if (given.person != 0) {
+    const Result<std::vector<Person>> people = journal->people();
+    if (!people) return tl::unexpected(people.error());
+    of_person.emplace(given.person, *people);
+    if (of_person->who()) out << *of_person->who() << '\n';
+  }
   Result<void> outcome;
+  std::uint64_t events = 0;
+  const auto put = [&](const std::string& line) {
+    out << line << '\n';
+    ++events;
+  };
   const Result<void> read = journal->read(RoomSeq{1}, [&](const JournalRow& row) {
-    const Result<std::string> text = row_as_json(row.place, std::chrono::nanoseconds(row.at_ns), row.bytes);
-    if (text) out << *text << '\n';
-    else outcome = tl::unexpected(text.error());
+    if (of_person) {
+      const Result<std::optional<std::string>> line = of_person->of(row);
+      if (!line) outcome = tl::unexpected(line.error());
+      else if (*line) put(**line);
+    } else {
+      const Result<std::string> line = row_as_json(row.place, std::chrono::nanoseconds(row.at_ns), row.bytes);
+      if (!line) outcome = tl::unexpected(line.error());
+      else put(*line);
+    }
     return outcome.has_value() && out.good();
   });
   if (!outcome) return outcome;
   if (!read) return read;
   if (!out.flush()) return failure(ErrorCode::internal, "cannot write all of " + given.to.string() + "; is the disk full?");
-  say("events", std::to_string(journal->head().place.value));
-  return {};
+  if (of_person && !of_person->who() && events == 0) return of_person->nobody();
+  say("events", std::to_string(events));
+  return journal->close();
 }
 
 Result<void> list_people(const Arguments& given) {
@@ -177,14 +196,14 @@ Result<void> list_people(const Arguments& given) {
 }
 
 Result<void> forget(const Arguments& given) {
-  if (given.person.empty() == (given.days == 0))
+  if ((given.person == 0) == (given.days == 0))
     return failure(ErrorCode::invalid_input, "forget needs either --person NUMBER, as \"people\" lists it, or --older-than DAYS");
   Result<Journal> journal = Journal::open(given.file);
   if (!journal) return tl::unexpected(journal.error());
   const auto today = std::chrono::duration_cast<std::chrono::days>(std::chrono::system_clock::now().time_since_epoch());
-  const Result<std::size_t> forgotten = given.person.empty()
+  const Result<std::size_t> forgotten = given.person == 0
                                             ? journal->forget_people_before(static_cast<std::int32_t>(today.count()) - given.days)
-                                            : journal->forget_person(given.person);
+                                            : journal->forget_person(std::to_string(given.person));
   if (!forgotten) return tl::unexpected(forgotten.error());
   say("forgotten", std::to_string(*forgotten) + " (what they did stays, under a number)");
   return journal->close();
@@ -216,11 +235,15 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
   again->add_option("--case", given->case_folder, "Folder of the case")->required();
   again->add_option("--to", given->at, "room_seq of the last event; all by default");
   again->add_option("--fields", given->fields, "Writes the bone as it was then (.vdb), for --resume and osteon-import surface");
-  copies("export", "Writes each event as a line of JSON", write_out);
+  copies("export", "Writes each event as a line of JSON", write_out)
+      ->add_option("--person", given->person, "Number of one, as \"people\" lists it: who it is and only what it did");
   command("people", "Lists the people whose numbers the events have", list_people);
   CLI::App* gone = command("forget", "Forgets who people were; what they did stays", forget);
   gone->add_option("--person", given->person, "Number of one, as \"people\" lists it");
   gone->add_option("--older-than", given->days, "All who came more than so many days ago");
+  CLI::App* end = command("delete", "Removes a room: its journal and all files beside it", remove);
+  CLI::Option* too = end->add_flag("--branches", given->branches, "And its branches in the same folder, and theirs");
+  end->add_flag("--alone", given->alone, "Its branches stay")->excludes(too);
 }
 
 }  // namespace osteon
