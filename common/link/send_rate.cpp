@@ -17,9 +17,9 @@ double SendRate::tokens(Time now) const {
   return std::min(static_cast<double>(params_.burst_bytes), tokens_ + seconds(now - filled_) * params_.bytes_per_s);
 }
 
-SendRate::Time SendRate::next(Time now, Time wanted, std::size_t needed_bytes) const {
+SendRate::Time SendRate::next(Time now, Time wanted, std::size_t needed_bytes, bool fresh) const {
   if (last_ == Time::min()) return now;
-  Time at = std::max(now, last_ + params_.interval);
+  Time at = std::max(now, last_ + (fresh ? params_.fresh_interval : params_.interval));
   at = std::max(at, std::min(wanted, last_ + params_.idle_interval));
   const std::size_t needed = std::min(needed_bytes, kMostDatagramBytes) + params_.overhead_bytes;
   const double lacking = static_cast<double>(std::max(params_.least_bytes, needed)) - tokens(at);
@@ -27,8 +27,8 @@ SendRate::Time SendRate::next(Time now, Time wanted, std::size_t needed_bytes) c
   return at;
 }
 
-std::size_t SendRate::budget(Time now) const {
-  if (next(now, now) > now) return 0;
+std::size_t SendRate::budget(Time now, bool fresh) const {
+  if (next(now, now, 0, fresh) > now) return 0;
   // A byte that is there but for rounding is there.
   return std::min(kMostDatagramBytes, static_cast<std::size_t>(tokens(now) + 1e-3) - params_.overhead_bytes);
 }

@@ -81,6 +81,7 @@ class SendWindow {
   [[nodiscard]] std::uint64_t oldest() const { return oldest_; }  // unacknowledged; next() when there is none
   [[nodiscard]] std::uint64_t next() const { return oldest_ + waiting_.size(); }
   [[nodiscard]] bool empty() const { return waiting_.empty(); }
+  [[nodiscard]] bool holds_fresh() const { return unsent_ > 0; }  // items that were in no packet yet
   [[nodiscard]] std::size_t items_unacknowledged() const { return waiting_.size(); }
   [[nodiscard]] std::size_t bytes_unacknowledged() const { return bytes_; }
   [[nodiscard]] const SendCounts& counts() const { return counts_; }

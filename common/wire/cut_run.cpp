@@ -97,12 +97,14 @@ std::string coded_knot(const Numbers& knot, const Numbers& expected, std::uint8_
   return out;
 }
 
-void put_cut(std::string& out, const Cut& cut, const QuantisedPose& from, std::uint32_t path_us_before) {
+// `before`: whose time and speed this cut mostly has, or nearly.
+void put_cut(std::string& out, const Cut& cut, const QuantisedPose& from, const Cut& before) {
   const bool own_first = cut.path.empty() || cut.path.front() != from;
-  const bool own_time = cut.path_us != path_us_before;
+  const bool own_time = cut.path_us != before.path_us, own_speed = cut.spindle_rpm != before.spindle_rpm;
   const std::size_t first = own_first ? 0 : 1;
-  put_varint(out, (cut.path.size() - first) << 2 | (own_first ? 2u : 0u) | (own_time ? 1u : 0u));
+  put_varint(out, (cut.path.size() - first) << 3 | (own_speed ? 4u : 0u) | (own_first ? 2u : 0u) | (own_time ? 1u : 0u));
   if (own_time) put_varint(out, cut.path_us);
+  if (own_speed) put_varint(out, zigzag(std::int64_t{cut.spindle_rpm} - std::int64_t{before.spindle_rpm}));
   Numbers last = numbers_of(from), by{};
   for (std::size_t k = first; k < cut.path.size(); ++k) {
     const Numbers knot = numbers_of(cut.path[k]);
@@ -113,14 +115,20 @@ void put_cut(std::string& out, const Cut& cut, const QuantisedPose& from, std::u
   }
 }
 
-// Appends to `cut`, whose other fields are there; `cut.path_us` is that of the cut before.
+// Appends to `cut`, whose other fields are there; `cut.path_us` and `cut.spindle_rpm` are those of the cut before.
 bool get_cut(Reader& in, Cut& cut, const QuantisedPose& from) {
   const std::uint64_t what = in.varint();
-  const std::uint64_t knots = what >> 2;
+  const std::uint64_t knots = what >> 3;
   if ((what & 1) != 0) {
     const std::uint64_t path_us = in.varint();
     if (path_us > std::numeric_limits<std::uint32_t>::max()) return false;
     cut.path_us = static_cast<std::uint32_t>(path_us);
+  }
+  if ((what & 4) != 0) {
+    // A sum beyond what a number holds wraps round, and is no speed either.
+    const auto speed = static_cast<std::int64_t>(cut.spindle_rpm + static_cast<std::uint64_t>(unzigzag(in.varint())));
+    if (speed < 0 || speed > std::numeric_limits<std::uint32_t>::max()) return false;
+    cut.spindle_rpm = static_cast<std::uint32_t>(speed);
   }
   if ((what & 2) == 0) cut.path.push_back(from);
   Numbers last = numbers_of(from), by{};
@@ -144,8 +152,7 @@ bool get_cut(Reader& in, Cut& cut, const QuantisedPose& from) {
 
 // Everything that the cuts of a run have in common.
 bool same_run(const Cut& a, const Cut& b) {
-  return a.author == b.author && a.lease_epoch == b.lease_epoch && a.body == b.body && a.tool == b.tool && a.level == b.level &&
-         a.spindle_rpm == b.spindle_rpm;
+  return a.author == b.author && a.lease_epoch == b.lease_epoch && a.body == b.body && a.tool == b.tool && a.level == b.level;
 }
 
 RunState state_before(const Cut& first) {
@@ -168,7 +175,7 @@ v1::CutRun head_of(const Cut& cut, const RunState& before, const ToolNumbers& to
   if (const auto number = tools.number_of(cut.tool)) head.set_tool_number(*number);
   else head.set_tool_hash(to_wire(cut.tool));
   head.set_level(static_cast<std::uint32_t>(cut.level));
-  head.set_spindle_rpm(cut.spindle_rpm);
+  head.set_spindle_rpm(before.last.spindle_rpm);
   for (const std::int32_t p : before.pose.position) head.add_start(p);
   for (const std::int16_t r : before.pose.rotation) head.add_start(r);
   head.set_path_us(before.last.path_us);
@@ -271,7 +278,7 @@ bool CutSender::push(const Cut& cut) {
   OSTEON_CHECK(cut.author_seq == window_.next() && cut.level >= 0 && cut.level < kLevels && fits_a_packet(cut));
   const RunState before = state_ ? *state_ : state_before(cut);
   SendItem item;
-  put_cut(item.bytes, cut, before.pose, before.last.path_us);
+  put_cut(item.bytes, cut, before.pose, before.last);
   item.head = head_of(cut, before, tools_).SerializeAsString();
   if (state_ && same_run(before.last, cut)) item.follows = cut.author_seq - 1;
   if (!window_.push(std::move(item))) return false;
@@ -301,7 +308,7 @@ bool RowSender::push(const SessionRow& row) {
   } else {
     put_varint(item.bytes, 0);
   }
-  put_cut(item.bytes, cut, before.pose, before.last.path_us);
+  put_cut(item.bytes, cut, before.pose, before.last);
   v1::RowRun head;
   head.set_author(cut.author.value);
   head.set_index(index);

@@ -3,9 +3,11 @@
 // A cut is coded against the one before it: of its first pose, which is that one's last, nothing is sent; each further pose
 // is a byte that says which of its seven numbers differ from what was expected, and these differences as zigzag varints.
 // Expected is the pose before, or that pose moved on by the step before, whichever takes fewer bytes. What cuts of a stretch
-// have in common, and the pose to go on from, is the head of a run; it goes before the first of neighbouring items only.
+// have in common, and the pose to go on from, is the head of a run; it goes before the first of neighbouring items only. The
+// speed of the spindle is no part of that: under load it is another in every cut, by a little.
 //
-//   cut:   knots << 2 | own first << 1 | time differs, [path_us], knots x (second order << 7 | which of x y z qx qy qz qw, ...)
+//   cut:   knots << 3 | speed differs << 2 | own first << 1 | time differs, [path_us], [difference of spindle_rpm],
+//          knots x (second order << 7 | which of x y z qx qy qz qw, ...)
 //   row:   (index step - 1) << 1 | more, [room_seq step - index step, author_seq step - 1], cut
 //
 // The steps of a run's first row are passed over, since its head says where it is. Every cut comes back as it was, whatever

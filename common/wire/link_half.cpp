@@ -27,6 +27,7 @@ std::optional<Time> from_us(std::uint64_t us) {
 LinkOptions server_link_options() {
   LinkOptions options;
   options.rate.interval = 4ms;
+  options.rate.fresh_interval = 1ms;
   options.rate.bytes_per_s = 1'000'000.0 / 8.0;
   return options;
 }
@@ -112,12 +113,14 @@ Time LinkHalf::next(Time now, Time wanted) const {
   const Time keep_alive = *sent_at_ + keep_alive_interval();
   // Where nobody answers, packets only ask whether anybody is there again.
   wanted = alive(now) ? std::min(wanted, keep_alive) : keep_alive;
-  return rate_.next(now, wanted, kFixedBytes + window_.least_room(now));
+  return rate_.next(now, wanted, kFixedBytes + window_.least_room(now), fresh(now));
 }
+
+bool LinkHalf::fresh(Time now) const { return alive(now) && window_.holds_fresh(); }
 
 std::size_t LinkHalf::room(Time now) const {
   constexpr std::size_t kAsking = 280;  // where perhaps nobody hears it
-  const std::size_t budget = rate_.budget(now);
+  const std::size_t budget = rate_.budget(now, fresh(now));
   return (alive(now) ? budget : std::min(budget, kAsking)) - kSealBytes;
 }
 

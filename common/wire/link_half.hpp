@@ -120,6 +120,7 @@ class LinkHalf {
   void heard(const v1::PacketTimes& times, const Opened& opened, Time now);
   void put_times(v1::PacketTimes& times, Time now) const;
   [[nodiscard]] Time keep_alive_interval() const;
+  [[nodiscard]] bool fresh(Time now) const;  // something waits that was never sent, and may go sooner than repeats
 
   const LinkOptions options_;
   Sealer sealer_;

@@ -29,6 +29,22 @@ TEST(SendRate, GoesEvery8MsWithSomethingToSayAnd4TimesASecondWithout) {
   EXPECT_GT(rate.budget(3s + 8ms), 0u);
 }
 
+// As long as bytes are there: once they are short, new packets come no sooner than others.
+TEST(SendRate, WhatIsNewGoesSooner) {
+  SendRate rate;
+  rate.sent(3s, 100);
+  EXPECT_EQ(rate.next(3s, 3s, 0, true), 3s + 4ms);
+  EXPECT_EQ(rate.budget(3s + 3ms, true), 0u);
+  EXPECT_GT(rate.budget(3s + 4ms, true), 0u);
+  EXPECT_EQ(rate.budget(3s + 4ms), 0u);
+  SendRate::Time now = 3s + 4ms;
+  for (int i = 0; i < 100; ++i) {
+    now = rate.next(now, now, 0, true);
+    rate.sent(now, 252);
+  }
+  EXPECT_GT(rate.next(now, now, 0, true), now + 7ms) << "280 bytes at 300 kbit/s";
+}
+
 // Always everything that is allowed, at times of any kind: over every stretch at most the rate and one burst.
 TEST(SendRate, KeepsTheBytesASecond) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {

@@ -152,7 +152,7 @@ TEST(CutRun, ARunEndsWhereItsHeadChanges) {
   EXPECT_EQ(runs_of([](Cut& c) { c.body = {1}; }), 2);
   EXPECT_EQ(runs_of([](Cut& c) { c.tool = digest(2); }), 2);
   EXPECT_EQ(runs_of([](Cut& c) { c.level = 1; }), 2);
-  EXPECT_EQ(runs_of([](Cut& c) { c.spindle_rpm = 1; }), 2);
+  EXPECT_EQ(runs_of([](Cut& c) { c.spindle_rpm = 1; }), 1) << "a spindle under load has another speed in every cut";
 }
 
 // By hand. Steps of 300, -200 and 100: a byte that says which numbers, and 2 bytes for each; the same step again: that one
@@ -190,6 +190,10 @@ TEST(CutRun, TakesAsFewBytesAsItSays) {
   cut.path_us = 7000;
   cut.path = {pose};
   EXPECT_EQ(bytes(), 3u) << "another time";
+  cut.spindle_rpm = 20'000;
+  EXPECT_EQ(bytes(), 1u + 3) << "from standing to full speed";
+  cut.spindle_rpm -= 60;
+  EXPECT_EQ(bytes(), 1u + 1) << "a little slower";
   cut.path.clear();
   move(5, 0, 0);
   EXPECT_EQ(bytes(), 1u + 2) << "begins elsewhere";
@@ -219,6 +223,30 @@ TEST(CutRun, IsNeverTwiceAsLongAsThePlainMessage) {
   EXPECT_LE(worst, 2.0);
 }
 
+// Of a speed only the difference goes, and what it leads to must be one.
+TEST(CutRun, SpeedsBeyondWhatANumberHoldsAreNone) {
+  const wire::ToolNumbers numbers = numbers_1_to_3();
+  const auto speed_after = [&](std::uint32_t before, std::initializer_list<std::uint8_t> difference) -> std::optional<std::uint32_t> {
+    v1::CutRun run;
+    run.set_author_seq(1);
+    run.set_tool_number(1);
+    run.set_spindle_rpm(before);
+    for (int i = 0; i < 7; ++i) run.add_start(0);
+    std::string cut(1, '\4');  // no knot, another speed
+    for (const std::uint8_t byte : difference) cut += static_cast<char>(byte);
+    run.set_cuts(cut);
+    const auto cuts = wire::cuts_of(run, {7}, numbers);
+    return cuts ? std::optional((*cuts)[0].spindle_rpm) : std::nullopt;
+  };
+  EXPECT_EQ(speed_after(1000, {2}), 1001u);
+  EXPECT_EQ(speed_after(1000, {1}), 999u);
+  EXPECT_EQ(speed_after(0, {1}), std::nullopt);
+  EXPECT_EQ(speed_after(~0u, {1}), ~0u - 1);
+  EXPECT_EQ(speed_after(~0u, {2}), std::nullopt);
+  EXPECT_EQ(speed_after(1, {0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 1}), std::nullopt);
+  EXPECT_EQ(speed_after(1, {0xfe, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 1}), std::nullopt);
+}
+
 // The longest that fits_a_packet() lets through, with the numbers that take most bytes.
 TEST(CutRun, TheLongestCutFitsAPacket) {
   Cut cut;
@@ -236,13 +264,23 @@ TEST(CutRun, TheLongestCutFitsAPacket) {
     cut.path.push_back(pose);
   }
   ASSERT_TRUE(wire::fits_a_packet(cut));
+  // After one of which nothing is the same.
+  Cut before = cut;
+  --before.author_seq;
+  before.spindle_rpm = before.path_us = 0;
+  before.path = {QuantisedPose{}};
   const wire::ToolNumbers none;
-  SendWindow window(kWide, cut.author_seq);
+  const auto after_it = [&](SendWindow& window, auto push) {
+    ASSERT_TRUE(push(before));
+    (void)window.pick(0s, kMostPlainBytes, 1);
+    ASSERT_TRUE(window.acknowledge(before.author_seq));
+    ASSERT_TRUE(push(cut));
+  };
+  SendWindow window(kWide, before.author_seq), row_window(kWide, before.author_seq);
   wire::CutSender sender(window, none);
-  ASSERT_TRUE(sender.push(cut));
-  SendWindow row_window(kWide, cut.author_seq);
   wire::RowSender row_sender(row_window, none);
-  ASSERT_TRUE(row_sender.push(committed(cut)));
+  after_it(window, [&](const Cut& one) { return sender.push(one); });
+  after_it(row_window, [&](const Cut& one) { return row_sender.push(committed(one)); });
   std::printf("%zu B up, %zu B down\n", window.least_room(0s), row_window.least_room(0s));
   EXPECT_LE(window.least_room(0s), kMostPlainBytes - 100);
   EXPECT_LE(row_window.least_room(0s), kMostPlainBytes - 100);
