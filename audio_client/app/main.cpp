@@ -36,7 +36,7 @@ constexpr auto kStale = 2s;
 constexpr auto kRunDown = 2s;
 
 struct Options {
-  std::string server;
+  std::string server, room;
   std::string output = "pulse";
   std::filesystem::path wav_file, state_log_file, summary_file;
   double patience_s = 5;
@@ -134,7 +134,7 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   Result<wire::JoinedRoom> room =
       wire::join_room(options.server, wire::ClientKind::audio, "audio",
                       std::chrono::milliseconds(static_cast<std::int64_t>(1000 * options.patience_s)),
-                      [&] { return stop.requested(); });
+                      [&] { return stop.requested(); }, options.room);
   // A stop is what was asked for, also before the server answered.
   if (!room && room.error().code == ErrorCode::cancelled) return {};
   if (!room) return tl::unexpected(room.error());
@@ -206,6 +206,7 @@ int main(int argc, char** argv) {
   Options options;
   CLI::App app("Makes the tools of a room heard: the drill's sound follows speed, load and bone density.", kProgram);
   app.add_option("--server", options.server, "HOST:PORT of osteon-server")->required();
+  app.add_option("--room", options.room, "Name of the room; not needed where the server has one");
   app.add_option("--output", options.output, "pulse: PulseAudio's default sink; none: at the same pace to nowhere")
       ->capture_default_str();
   app.add_option("--wav", options.wav_file, "Record what is heard: 48 kHz, 16 bit, mono");

@@ -4,6 +4,8 @@
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
+#include <utility>
+#include <vector>
 
 #include "common/field/kernel.hpp"
 #include "common/wire/convert.hpp"
@@ -23,7 +25,32 @@ constexpr auto kAgainTime = 1s;                    // for one attempt to come ba
 // longer than its RoomWatch does.
 constexpr int kPingMs = 2000, kPingAnswerMs = 3000, kHandsPingAnswerMs = 25'000;
 
-std::shared_ptr<grpc::Channel> make_channel(const std::string& address, ClientKind kind) {
+// Puts the room's name on every call of a channel.
+class RoomNamer final : public grpc::experimental::Interceptor {
+ public:
+  explicit RoomNamer(const std::string& room) : room_(room) {}
+  void Intercept(grpc::experimental::InterceptorBatchMethods* call) override {
+    if (call->QueryInterceptionHookPoint(grpc::experimental::InterceptionHookPoints::PRE_SEND_INITIAL_METADATA))
+      call->GetSendInitialMetadata()->insert({"osteon-room", room_});
+    call->Proceed();
+  }
+
+ private:
+  const std::string& room_;  // of the factory, which lives as long as the channel
+};
+
+class RoomNamers final : public grpc::experimental::ClientInterceptorFactoryInterface {
+ public:
+  explicit RoomNamers(std::string room) : room_(std::move(room)) {}
+  grpc::experimental::Interceptor* CreateClientInterceptor(grpc::experimental::ClientRpcInfo*) override {
+    return new RoomNamer(room_);  // which the call deletes
+  }
+
+ private:
+  const std::string room_;
+};
+
+std::shared_ptr<grpc::Channel> make_channel(const std::string& address, ClientKind kind, const std::string& room) {
   // What fails is told in one sentence by the program, not in gRPC's own lines.
   gpr_set_log_function([](gpr_log_func_args*) {});
   grpc::ChannelArguments arguments;
@@ -36,7 +63,10 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address, ClientKi
   arguments.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
-  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> namers;
+  if (!room.empty()) namers.push_back(std::make_unique<RoomNamers>(room));
+  return grpc::experimental::CreateCustomChannelWithInterceptors(address, grpc::InsecureChannelCredentials(), arguments,
+                                                                 std::move(namers));
 }
 
 bool is_host_port(const std::string& address) {
@@ -91,27 +121,34 @@ Result<JoinedRoom> ask_to_join(JoinedRoom room, const v1::JoinRequest& request, 
   room.pitch_mm = response.pitch_mm();
   room.bounds = {from_wire(response.bounds_min_mm()), from_wire(response.bounds_max_mm())};
   room.room_seq = RoomSeq{response.room_seq()};
+  room.name = response.room();
   if (!response.secret().empty()) room.secret = response.secret();
   return room;
 }
 
 }  // namespace
 
-Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
-                             std::chrono::milliseconds patience, const std::function<bool()>& stop) {
+Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, const std::string& room, ClientKind kind,
+                                                    std::chrono::milliseconds patience, const std::function<bool()>& stop) {
   if (!is_host_port(address))
     return failure(ErrorCode::invalid_input, "the server's address " + address +
                                                  " is not HOST:PORT; give the one that osteon-server prints, such as 127.0.0.1:50151");
-  JoinedRoom room;
-  room.channel = make_channel(address, kind);
-
+  std::shared_ptr<grpc::Channel> channel = make_channel(address, kind, room);
   // In short waits, so that a person who gives up is heard.
   const auto until = Clock::now() + patience;
-  while (!room.channel->WaitForConnected(std::chrono::system_clock::now() + 50ms)) {
+  while (!channel->WaitForConnected(std::chrono::system_clock::now() + 50ms)) {
     if (stop && stop()) return failure(ErrorCode::cancelled, "stopped before the server at " + address + " answered");
     if (Clock::now() >= until) return tl::unexpected(nobody_answers(address, patience));
   }
+  return channel;
+}
 
+Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
+                             std::chrono::milliseconds patience, const std::function<bool()>& stop, const std::string& named) {
+  Result<std::shared_ptr<grpc::Channel>> channel = reach_server(address, named, kind, patience, stop);
+  if (!channel) return tl::unexpected(channel.error());
+  JoinedRoom room;
+  room.channel = std::move(*channel);
   v1::JoinRequest request = request_of(kind);
   request.set_name(name);
   grpc::ClientContext context;

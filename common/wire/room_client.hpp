@@ -20,7 +20,8 @@ namespace osteon::wire {
 enum class ClientKind { haptic = 1, viewer = 2, audio = 3 };
 
 struct JoinedRoom {
-  std::shared_ptr<grpc::Channel> channel;  // shared with every stub made from it
+  std::shared_ptr<grpc::Channel> channel;  // shared with every stub made from it; every call over it is to this room
+  std::string name;
   AuthorId author;
   std::uint64_t server_epoch = 0;
   std::uint64_t lease_epoch = 0;
@@ -32,10 +33,17 @@ struct JoinedRoom {
   std::string secret;                      // proves that a later connection is this one's
 };
 
-// Errors: unavailable (nobody answers at `address` within `patience`, one sentence with the remedy), unsupported
-// (protocol or kernel version differ), cancelled (`stop` returned true).
+// A channel to the server, over which every call is to `room`: empty, the only one that is open there. Errors: invalid_input
+// (`address` is not HOST:PORT), unavailable (nobody answers there within `patience`, one sentence with the remedy), cancelled
+// (`stop` returned true).
+[[nodiscard]] Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, const std::string& room, ClientKind kind,
+                                                                  std::chrono::milliseconds patience, const std::function<bool()>& stop);
+
+// `name`: the caller's, shown to others. Errors: those of reach_server, and unsupported (protocol or kernel version differ; no
+// such room is open).
 [[nodiscard]] Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
-                                           std::chrono::milliseconds patience, const std::function<bool()>& stop);
+                                           std::chrono::milliseconds patience, const std::function<bool()>& stop,
+                                           const std::string& room = {});
 
 // The same author again over the same channel, after the stream or the server was lost. `kept`: the newest event that the
 // server said is kept, and its chain. Errors: unavailable (try again), any other (the room knows this client no more).

@@ -249,6 +249,7 @@ int main(int argc, char** argv) {
       "Other commands: check, devices, laws (each with --help).",
       kProgram);
   app.add_option("--server", options.room.address, "HOST:PORT of osteon-server")->required();
+  app.add_option("--room", options.room.room, "Name of the room; not needed where the server has one");
   app.add_option("--plan", options.hand.plan, "JSON file with the steps of a simulated surgeon");
   app.add_option("--tool", options.hand.tool,
                  "The tool for your own hand, of the box or of the server's --tools, e.g. drill-3.2; no --plan then");

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,6 +19,7 @@
 #include "common/runtime/stop_signal.hpp"
 #include "common/volume/mesh_distance.hpp"
 #include "server/app/journal_commands.hpp"
+#include "server/app/room_commands.hpp"
 #include "server/net/room_server.hpp"
 
 namespace {
@@ -26,21 +28,24 @@ using namespace osteon;
 constexpr const char* kProgram = "osteon-server";
 constexpr std::chrono::seconds kHealthEvery{10};
 
-// What is asked of a hand over a network. No surgical motor gives more than 500 W [A]. A swept voxel takes about a nanosecond of a core; a cup reamer asks for 2e8.
+// What is asked of a hand over a network. No surgical motor gives more than 500 W [A]. A swept voxel takes about a nanosecond
+// of a core; a cup reamer asks for 2e8.
 constexpr CutLimits kServedLimits{.time_slack = std::chrono::milliseconds(1000), .swept_voxels_per_s = 5e8, .power_w = 500.0};
 
 struct Options {
-  std::filesystem::path case_folder;
+  std::vector<std::filesystem::path> case_folders;
   std::string listen = "127.0.0.1:0";
   std::filesystem::path address_file;
   std::filesystem::path summary_file;
   std::filesystem::path tools_folder;
-  std::filesystem::path save_file, resume_file, journal_file;
+  std::filesystem::path save_file, resume_file, journal_file, rooms_folder;
+  int retention_days = 0;
   Detail detail = Detail::automatic;
 };
 
-void log_health(const HostHealth& health, const LinkServerHealth& links) {
-  log::info("health", {{"room_seq", health.room_seq.value},
+void log_health(const std::string& room, const HostHealth& health) {
+  log::info("health", {{"room", room},
+                       {"room_seq", health.room_seq.value},
                        {"committed", health.counts.committed},
                        {"rejected", health.counts.rejected},
                        {"refused", health.counts.refused},
@@ -54,12 +59,17 @@ void log_health(const HostHealth& health, const LinkServerHealth& links) {
                        {"mesh_streams", health.mesh_streams},
                        {"cutting_streams", health.cutting_streams},
                        {"waiting_rows", health.waiting_rows},
-                       {"commit_p99_us", health.commit.percentile_us(99)},
-                       {"links", links.links},
-                       {"links_alive", links.alive},
-                       {"datagrams_in", links.port.received},
-                       {"datagrams_out", links.port.sent},
-                       {"strangers", links.strangers}});
+                       {"commit_p99_us", health.commit.percentile_us(99)}});
+}
+
+void log_health(RoomServer& server) {
+  for (const std::shared_ptr<OpenRoom>& room : server.rooms().open_rooms()) log_health(room->name, room->host().health());
+  const LinkServerHealth links = server.link_health();
+  log::info("fast path", {{"links", links.links},
+                          {"links_alive", links.alive},
+                          {"datagrams_in", links.port.received},
+                          {"datagrams_out", links.port.sent},
+                          {"strangers", links.strangers}});
 }
 
 nlohmann::json durations(const DurationHistogram& histogram) {
@@ -69,11 +79,11 @@ nlohmann::json durations(const DurationHistogram& histogram) {
           {"max_us", histogram.max_us()}};
 }
 
-nlohmann::json summary_of(const RoomServerSummary& summary, const Case& bone) {
+nlohmann::json summary_of(const RoomSummary& summary, const Digest& case_hash) {
   const HostHealth& health = summary.health;
   nlohmann::json bodies = nlohmann::json::array();
   for (const BodyId body : summary.bone.bodies) bodies.push_back(body.value);
-  return {{"case_hash", to_hex(bone.hash())},
+  return {{"case_hash", to_hex(case_hash)},
           {"field_hash", to_hex(summary.bone.field_hash)},
           {"mesh_hash", to_hex(summary.surface_hash)},
           {"room_seq", summary.bone.room_seq.value},
@@ -118,14 +128,23 @@ Result<void> load_tools(const std::filesystem::path& folder, ToolBox& box) {
   return {};
 }
 
-Result<Room> make_room(const Options& options, const Case& bone) {
-  const std::shared_ptr<ToolBox> tools = builtin_tool_box();  // shared by the room and its fields
+// The box that every new room begins with. Tools are loaded once, so that a folder that changes meanwhile changes no room.
+Result<std::function<std::shared_ptr<ToolBox>()>> tool_boxes(const Options& options) {
+  const std::shared_ptr<ToolBox> loaded = builtin_tool_box();  // shared with the function below
   if (!options.tools_folder.empty())
-    if (Result<void> loaded = load_tools(options.tools_folder, *tools); !loaded) return tl::unexpected(loaded.error());
-  if (options.resume_file.empty()) return Room(bone, kServedLimits, tools);
+    if (Result<void> done = load_tools(options.tools_folder, *loaded); !done) return tl::unexpected(done.error());
+  return [loaded] {
+    std::shared_ptr<ToolBox> box = builtin_tool_box();
+    for (const ToolBox::Entry* entry : loaded->entries()) box->add(entry->tool);
+    return box;
+  };
+}
+
+Result<Room> make_room(const Options& options, const Case& bone, std::shared_ptr<ToolBox> tools) {
+  if (options.resume_file.empty()) return Room(bone, kServedLimits, std::move(tools));
   const Result<SavedFields> saved = load_fields(options.resume_file);
   if (!saved) return tl::unexpected(saved.error());
-  Result<Room> room = Room::resume(bone, *saved, kServedLimits, tools);
+  Result<Room> room = Room::resume(bone, *saved, kServedLimits, std::move(tools));
   if (!room) return failure(room.error().code, options.resume_file.string() + ": " + room.error().message);
   log::info("resumed", {{"file", options.resume_file.string()},
                         {"room_seq", saved->room_seq.value},
@@ -134,10 +153,9 @@ Result<Room> make_room(const Options& options, const Case& bone) {
 }
 
 // The room that the journal keeps, or a new one in a new journal.
-Result<Room> open_journal(const Options& options, const Case& bone, std::unique_ptr<RoomKeeper>& keeper) {
-  RoomKeeper::Options keeping{.name = options.journal_file.stem().string(), .limits = kServedLimits, .tools = builtin_tool_box(), .journal = {}};
-  if (!options.tools_folder.empty())
-    if (Result<void> loaded = load_tools(options.tools_folder, *keeping.tools); !loaded) return tl::unexpected(loaded.error());
+Result<Room> open_journal(const Options& options, const Case& bone, std::shared_ptr<ToolBox> tools, std::unique_ptr<RoomKeeper>& keeper) {
+  RoomKeeper::Options keeping{.name = options.journal_file.stem().string(), .limits = kServedLimits, .tools = std::move(tools), .journal = {}, .today = {}};
+  keeping.retention_days = options.retention_days;
   Progress progress("journal");
   Result<KeptRoom> kept = RoomKeeper::open(options.journal_file, bone, keeping, [&](double fraction) { progress.update(fraction); });
   if (!kept) return tl::unexpected(kept.error());
@@ -150,6 +168,56 @@ Result<Room> open_journal(const Options& options, const Case& bone, std::unique_
   return std::move(kept->room);
 }
 
+// What the command line asks for: the rooms of a folder, or one room.
+Result<std::unique_ptr<Rooms>> open_rooms(const Options& options) {
+  Result<std::function<std::shared_ptr<ToolBox>()>> tools = tool_boxes(options);
+  if (!tools) return tl::unexpected(tools.error());
+  RoomsOptions rooms_options;
+  rooms_options.folder = options.rooms_folder;
+  rooms_options.limits = kServedLimits;
+  rooms_options.tools = *tools;
+  rooms_options.detail = options.detail;
+  rooms_options.retention_days = options.retention_days;
+  for (const std::filesystem::path& folder : options.case_folders) {
+    Result<Case> bone = Case::load(folder);
+    if (!bone) return tl::unexpected(bone.error());
+    log::info("case", {{"title", bone->info().title},
+                       {"pitch_mm", bone->pitch_mm()},
+                       {"volume_mm3", bone->volume_mm3()},
+                       {"hash", to_hex(bone->hash())}});
+    rooms_options.cases.push_back({std::move(*bone), folder});
+  }
+  const Case bone = rooms_options.cases.front().bone;
+  auto rooms = std::make_unique<Rooms>(std::move(rooms_options));
+  Progress progress("surface");
+  const auto tell = [&](double fraction) { progress.update(fraction); };
+  if (!options.rooms_folder.empty()) {
+    rooms->resume_all(tell);
+    return rooms;
+  }
+  std::unique_ptr<RoomKeeper> keeper;
+  Result<Room> room = options.journal_file.empty() ? make_room(options, bone, (*tools)()) : open_journal(options, bone, (*tools)(), keeper);
+  if (!room) return tl::unexpected(room.error());
+  const std::string name = keeper ? keeper->genesis().room : "room";
+  if (auto added = rooms->add(name, std::move(*room), std::move(keeper), options.save_file, tell); !added)
+    return tl::unexpected(added.error());
+  return rooms;
+}
+
+Result<void> check_rooms_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (!folder.empty()) std::filesystem::create_directories(folder, error);
+  if (error) return failure(ErrorCode::internal, "the folder --rooms " + folder.string() + " cannot be made: " + error.message());
+  return folder.empty() ? Result<void>{} : check_writable(folder / "open-rooms", "which rooms are open", "--rooms");
+}
+
+// The only room's own, or one for each by its name.
+nlohmann::json summary_of(const std::map<std::string, RoomSummary>& rooms, const std::map<std::string, Digest>& cases, bool many) {
+  nlohmann::json all = nlohmann::json::object();
+  for (const auto& [name, summary] : rooms) all[name] = summary_of(summary, cases.at(name));
+  return many ? nlohmann::json{{"rooms", all}} : all.front();
+}
+
 Result<void> run(const Options& options, const StopSignal& stop) {
   // An address of an earlier run must not be taken for this one's.
   if (!options.address_file.empty()) {
@@ -158,45 +226,31 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   }
   if (Result<void> usable = RoomServer::check_listen(options.listen); !usable) return usable;
   if (Result<void> usable = check_writable(options.save_file, "the fields", "--save"); !usable) return usable;
-  Result<Case> bone = Case::load(options.case_folder);
-  if (!bone) return tl::unexpected(bone.error());
-  log::info("case", {{"title", bone->info().title},
-                     {"pitch_mm", bone->pitch_mm()},
-                     {"volume_mm3", bone->volume_mm3()},
-                     {"hash", to_hex(bone->hash())}});
-
-  std::unique_ptr<RoomKeeper> keeper;
-  Result<Room> room = options.journal_file.empty() ? make_room(options, *bone) : open_journal(options, *bone, keeper);
-  if (!room) return tl::unexpected(room.error());
-
-  RoomServerOptions server_options;
-  server_options.listen = options.listen;
-  server_options.case_folder = options.case_folder;
-  server_options.save = options.save_file;
-  server_options.detail = options.detail;
-  Result<std::unique_ptr<RoomServer>> server = [&] {
-    Progress progress("surface");
-    return RoomServer::start(std::move(*room), server_options, [&](double fraction) { progress.update(fraction); },
-                             std::move(keeper));
-  }();
+  if (Result<void> usable = check_rooms_folder(options.rooms_folder); !usable) return usable;
+  Result<std::unique_ptr<Rooms>> rooms = open_rooms(options);
+  if (!rooms) return tl::unexpected(rooms.error());
+  Result<std::unique_ptr<RoomServer>> server = RoomServer::start(std::move(*rooms), options.listen);
   if (!server) return tl::unexpected(server.error());
+  const HostHealth first = (*server)->health();
   log::info("listening", {{"address", (*server)->address()},
                           {"udp_port", (*server)->link_port()},
-                          {"surface_blocks", (*server)->health().blocks},
-                          {"surface_bytes", (*server)->health().surface_bytes}});
+                          {"surface_blocks", first.blocks},
+                          {"surface_bytes", first.surface_bytes}});
   if (!options.address_file.empty())
     if (Result<void> written = write_file(options.address_file, (*server)->address() + "\n"); !written)
       return tl::unexpected(written.error());
 
-  while (!stop.wait_for(kHealthEvery)) log_health((*server)->health(), (*server)->link_health());
+  while (!stop.wait_for(kHealthEvery)) log_health(**server);
 
   log::info("stopping");
-  const RoomServerSummary summary = (*server)->stop();
-  log_health(summary.health, {});
+  std::map<std::string, Digest> cases;
+  for (const std::shared_ptr<OpenRoom>& room : (*server)->rooms().open_rooms()) cases[room->name] = room->host().bone().hash();
+  const std::map<std::string, RoomSummary> summaries = (*server)->stop_all();
+  for (const auto& [name, summary] : summaries) log_health(name, summary.health);
   if (!options.save_file.empty())
-    if (Result<void> saved = save_fields(options.save_file, summary.fields); !saved) return saved;
+    if (Result<void> saved = save_fields(options.save_file, summaries.begin()->second.fields); !saved) return saved;
   if (options.summary_file.empty()) return {};
-  return write_file(options.summary_file, summary_of(summary, *bone).dump(2) + "\n");
+  return write_file(options.summary_file, summary_of(summaries, cases, !options.rooms_folder.empty()).dump(2) + "\n");
 }
 
 }  // namespace
@@ -206,9 +260,11 @@ int main(int argc, char** argv) {
   CLI::App app("Owns the bone of a case: applies the cuts of haptic clients in one order and streams the surface and the "
                "tools' states to viewers and audio clients.",
                kProgram);
-  app.add_option("--case", options.case_folder, "Folder of the case, as osteon-import writes it");
-  std::function<Result<void>()> journal_command;
-  add_journal_commands(app, journal_command);
+  app.add_option("--case", options.case_folders, "Folder of the case, as osteon-import writes it; with --rooms several, each for rooms of its own")
+      ->allow_extra_args(false);
+  std::function<Result<void>()> command;
+  add_journal_commands(app, command);
+  add_room_commands(app, command);
   app.require_subcommand(0, 1);
   app.add_option("--listen", options.listen, "HOST:PORT on this machine; port 0 lets the system choose")->capture_default_str();
   app.add_option("--address-file", options.address_file, "Written with HOST:PORT when clients may come");
@@ -222,6 +278,15 @@ int main(int argc, char** argv) {
                  "Every event of the room, on the disk before anyone is told of it; where the file is there, the room goes on, "
                  "with all that can be undone")
       ->excludes(resume);
+  CLI::Option* rooms = app.add_option("--rooms", options.rooms_folder,
+                                      "Folder of many rooms, each kept in a journal: those that were open are opened, and "
+                                      "\"osteon-server rooms\" makes, closes, branches and deletes them")
+                           ->excludes(resume)
+                           ->excludes("--journal")
+                           ->excludes("--save");
+  app.add_option("--retention-days", options.retention_days,
+                 "After so many days the journals forget who somebody was; what they did stays")
+      ->check(CLI::Range(1, 36500));
   const std::map<std::string, Detail> details{{"auto", Detail::automatic}, {"full", Detail::full}, {"near", Detail::near}};
   app.add_option("--detail", options.detail,
                  "full: viewers are sent the whole bone at its own pitch; near: that only where they look and where tools "
@@ -231,13 +296,15 @@ int main(int argc, char** argv) {
   app.add_option("--summary", options.summary_file, "JSON written at the end: field hash, counts, ticks, latencies");
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
 
-  if (journal_command) {
-    const Result<void> done = journal_command();
+  if (command) {
+    const Result<void> done = command();
     return done ? 0 : log::exit_with(kProgram, done.error());
   }
   log::open(kProgram);
-  if (options.case_folder.empty())
+  if (options.case_folders.empty())
     return log::exit_with(kProgram, {ErrorCode::invalid_input, "--case is required; see osteon-server --help"});
+  if (options.case_folders.size() > 1 && rooms->count() == 0)
+    return log::exit_with(kProgram, {ErrorCode::invalid_input, "--case was given more than once, but there is one room; give --rooms FOLDER for many"});
   const StopSignal stop;
   const Result<void> outcome = run(options, stop);
   return outcome ? 0 : log::exit_with(kProgram, outcome.error());

@@ -116,13 +116,15 @@ using WriteReactor = grpc::ServerWriteReactor<ByteBuffer>;
 using BidiReactor = grpc::ServerBidiReactor<ByteBuffer, ByteBuffer>;
 
 // A stream that is refused at once.
-class RefusedStream final : public OutStream<WriteReactor> {
+template <class Reactor>
+class RefusedStream final : public OutStream<Reactor> {
   bool take(ByteBuffer&) override { return false; }
   void leave() override {}
 };
 
-inline WriteReactor* refused(Status status) {
-  RefusedStream* stream = RefusedStream::launch(std::make_shared<RefusedStream>());
+template <class Reactor = WriteReactor>
+Reactor* refused(Status status) {
+  auto* stream = RefusedStream<Reactor>::launch(std::make_shared<RefusedStream<Reactor>>());
   stream->close(std::move(status));
   return stream;
 }

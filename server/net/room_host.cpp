@@ -20,6 +20,7 @@
 #include "common/runtime/periodic.hpp"
 #include "common/wire/convert.hpp"
 #include "server/net/host_parts.hpp"
+#include "server/net/job_thread.hpp"
 #include "server/net/mesh_room.hpp"
 #include "server/net/piece_watch.hpp"
 #include "server/net/room_rows.hpp"
@@ -35,11 +36,16 @@ using Clock = RoomHost::Clock;
 // Leaves copied at once. Between two batches the room goes on cutting.
 constexpr std::size_t kLeafBatch = 64;
 
-// Lock order: room_mutex, then sessions_mutex or that of the surface or the board, then a stream's own, then jobs_mutex.
+// Rows that happen again in one tick at most: so the surface and the health of a fast playback are told as they go.
+constexpr int kRowsPlayedPerTick = 256;
+// Who watches a playback is no row of it, so their numbers must not be those of the room that is shown.
+constexpr std::uint64_t kFirstWatcherOfPlayback = 1ull << 40;
+
+// Lock order: room_mutex, then sessions_mutex or that of the surface or the board, then a stream's own, then that of the jobs.
 // queue_mutex, pieces_mutex and stats_mutex are never held with another.
 struct RoomHost::Impl {
-  Impl(Room r, HostRates rates, Detail detail, RoomKeeper* k)
-      : keeper(k), room(std::move(r)),
+  Impl(Room r, HostRates rates, Detail detail, RoomKeeper* k, std::optional<Playback> p)
+      : keeper(k), playback(std::move(p)), room(std::move(r)), time_at_start(room.time()),
         rates_(rates),
         room_began(Clock::now() - std::chrono::duration_cast<Clock::duration>(room.time())),
         mesh(room, room_mutex, {rates.mesh, rates.looks}, detail, [this] { return board.tool_tips_mm(); }),
@@ -52,7 +58,7 @@ struct RoomHost::Impl {
   void run_ticks();
   // Whether anything was decided.
   bool tick(std::chrono::nanoseconds now, bool last);
-  void run_jobs();
+  bool play(std::chrono::nanoseconds now);
   void run_pieces();
   void decide(QueuedCut& queued);
   void decide(QueuedEvent& queued);
@@ -67,6 +73,7 @@ struct RoomHost::Impl {
   [[nodiscard]] std::optional<Error> closed() const;
   void end_sessions(const std::string& why);
   void show_scene();
+  void show_tool(const Cut& cut);
   void read_leaves(std::vector<FieldLeaf>& leaves);
 
   // All bodies at one place of the order, copied while the room went on.
@@ -76,11 +83,16 @@ struct RoomHost::Impl {
     std::map<BodyId, CutField> bodies;
     std::vector<SceneItem> items;
   };
-  BoneCopy copy_bone();
+  enum class Bodies { that_exist, all };
+  BoneCopy copy_bone(Bodies which = Bodies::that_exist);
   void ask_for_split(Separation found);
 
   RoomKeeper* const keeper;  // null: nothing is kept
+  std::optional<Playback> playback;
+  std::optional<RoomRow> upcoming;        // of the tick thread: the playback's next row
+  std::atomic<std::uint64_t> next_watcher{kFirstWatcherOfPlayback};  // of a playback
   Room room;
+  const std::chrono::nanoseconds time_at_start;
   std::shared_mutex room_mutex;
   std::optional<std::vector<Cut>> meanwhile;  // under room_mutex: cuts applied since copy_bone() began to copy
   const HostRates rates_;
@@ -109,10 +121,7 @@ struct RoomHost::Impl {
   bool look_wanted = false;                       // someone waits for the next one
   PieceWatch pieces{room, room_mutex, [this](std::vector<FieldLeaf>& leaves) { read_leaves(leaves); }};  // of the piece thread
 
-  std::mutex jobs_mutex;
-  std::condition_variable jobs_wake;
-  std::deque<std::function<void()>> jobs;
-  bool jobs_end = false;
+  JobThread jobs;
 
   mutable std::mutex stats_mutex;
   TickStats stats;
@@ -125,7 +134,7 @@ struct RoomHost::Impl {
   std::chrono::nanoseconds next_kept{};   // of the tick thread: when it is next said how much is kept
   Committer committer;                    // the last member with a thread: it tells the others
 
-  std::thread tick_thread, piece_thread, job_thread;
+  std::thread tick_thread, piece_thread;
 };
 
 bool RoomHost::Impl::tick(std::chrono::nanoseconds now, bool last) {
@@ -134,13 +143,56 @@ bool RoomHost::Impl::tick(std::chrono::nanoseconds now, bool last) {
     std::swap(batch, queue);
     queue_closed = last;
   }
-  room.set_time(now);
+  if (!playback) room.set_time(now);
   for (Queued& queued : batch) std::visit([this](auto& one) { decide(one); }, queued);
-  const bool decided = !batch.empty();
+  const bool decided = playback ? play(now) : !batch.empty();
   batch.clear();
   committer.commit(room.take_rows(), std::exchange(tells, {}));
   board.publish(RoomSeq{room_seq});
   return decided;
+}
+
+// Whether anything happened.
+bool RoomHost::Impl::play(std::chrono::nanoseconds now) {
+  const auto passed = std::chrono::duration<double, std::nano>(now - time_at_start) * playback->speed;
+  const auto until = time_at_start + std::chrono::duration_cast<std::chrono::nanoseconds>(passed);
+  int played = 0;
+  for (; playback->speed > 0 && playback->next && played < kRowsPlayedPerTick; ++played) {
+    if (!upcoming && !(upcoming = playback->next())) playback->next = nullptr;
+    if (!upcoming || upcoming->at > until) break;
+    const RoomRow row = std::move(*std::exchange(upcoming, std::nullopt));
+    const CutRow* cut = std::get_if<CutRow>(&row.what);
+    {
+      const std::unique_lock lock(room_mutex);
+      if (const Result<void> happened = room.replay(row); !happened) {
+        log::error("playback ended", {{"place", row.place.value}, {"reason", happened.error().message}});
+        playback->next = nullptr;
+        break;
+      }
+      room_seq = room.room_seq().value;
+      if (meanwhile && cut) meanwhile->push_back(cut->cut);
+    }
+    if (cut)
+      show_tool(cut->cut);
+    else
+      show_scene();
+  }
+  if (played > 0) note_changed(Clock::now());
+  return played > 0;
+}
+
+// A recorded cut says where its tool was.
+void RoomHost::Impl::show_tool(const Cut& cut) {
+  const ToolBox::Entry* tool = room.tools()->find(cut.tool);
+  if (!tool) return;
+  CuttingState state;
+  state.author = cut.author;
+  state.state_seq = cut.author_seq;
+  state.tool_name = tool->tool.name;
+  state.pose_bone_tool = state.pose_bone_device = dequantise(cut.path.back());
+  state.spindle_rpm = cut.spindle_rpm;
+  state.phase = CuttingPhase::cutting;
+  board.offer(std::move(state));
 }
 
 void RoomHost::Impl::run_ticks() {
@@ -215,6 +267,7 @@ void RoomHost::Impl::decide(QueuedCut& queued) {
 void RoomHost::Impl::decide(QueuedEvent& queued) {
   Result<RoomEvent> event = [&]() -> Result<RoomEvent> {
     if (const std::optional<Error> why = closed()) return tl::unexpected(*why);
+    if (playback) return failure(ErrorCode::unavailable, "this room shows what happened in another: it can be watched, not changed");
     const std::unique_lock lock(room_mutex);
     Result<RoomEvent> decision = queued.change(room);
     room_seq = room.room_seq().value;
@@ -294,23 +347,9 @@ void RoomHost::Impl::end_sessions(const std::string& why) {
 // What viewers draw beside the surface.
 void RoomHost::Impl::show_scene() { board.show(room.items(), room.bodies()); }
 
-void RoomHost::Impl::run_jobs() {
-  while (true) {
-    std::function<void()> job;
-    {
-      std::unique_lock lock(jobs_mutex);
-      jobs_wake.wait(lock, [&] { return !jobs.empty() || jobs_end; });
-      if (jobs.empty()) return;
-      job = std::move(jobs.front());
-      jobs.pop_front();
-    }
-    job();
-  }
-}
-
 RoomHost::RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress, Detail detail,
-                   RoomKeeper* keeper)
-    : impl_(std::make_unique<Impl>(std::move(room), rates, detail, keeper)) {
+                   RoomKeeper* keeper, std::optional<Playback> playback)
+    : impl_(std::make_unique<Impl>(std::move(room), rates, detail, keeper, std::move(playback))) {
   if (!impl_->driven()) impl_->mesh.make_whole_surface(progress);
   impl_->room_seq = impl_->room.room_seq().value;
   impl_->show_scene();
@@ -318,7 +357,7 @@ RoomHost::RoomHost(Room room, HostRates rates, const std::function<void(double)>
   impl_->tick_thread = std::thread([this] { impl_->run_ticks(); });
   impl_->mesh.start();
   impl_->piece_thread = std::thread([this] { impl_->run_pieces(); });
-  impl_->job_thread = std::thread([this] { impl_->run_jobs(); });
+  impl_->jobs.start();
 }
 
 RoomHost::~RoomHost() { stop(); }
@@ -334,7 +373,14 @@ std::vector<SceneItem> RoomHost::items() const {
   const std::shared_lock lock(impl_->room_mutex);
   return impl_->room.items();
 }
-bool RoomHost::knows(AuthorId author) const { return author && author.value <= impl_->authors; }
+std::vector<std::pair<RoomSeq, std::string>> RoomHost::marks() const {
+  const std::shared_lock lock(impl_->room_mutex);
+  return impl_->room.marks();
+}
+bool RoomHost::knows(AuthorId author) const {
+  if (impl_->playback && author.value >= kFirstWatcherOfPlayback) return author.value < impl_->next_watcher;
+  return author && author.value <= impl_->authors;
+}
 
 HostHealth RoomHost::health() const {
   HostHealth health;
@@ -376,13 +422,8 @@ void RoomHost::tick(std::chrono::nanoseconds now, bool keep) {
   (void)impl_->room.take_stale_blocks();
 }
 
-void RoomHost::run_slowly(std::function<void()> job) {
-  if (impl_->driven()) return job();
-  const std::lock_guard lock(impl_->jobs_mutex);
-  if (impl_->jobs_end) return;
-  impl_->jobs.push_back(std::move(job));
-  impl_->jobs_wake.notify_one();
-}
+// A driven host's jobs never start.
+void RoomHost::run_slowly(std::function<void()> job) { impl_->jobs.run(std::move(job)); }
 
 Result<void> RoomHost::resume(AuthorId author, const Digest& secret, const std::optional<JournalHead>& kept) {
   {
@@ -397,6 +438,10 @@ Result<void> RoomHost::resume(AuthorId author, const Digest& secret, const std::
 
 void RoomHost::join(MemberKind kind, const std::string& name, const Digest& secret,
                     std::function<void(const Result<AuthorId>&)> answer) {
+  if (impl_->playback) {
+    if (kind == MemberKind::watcher) return answer(AuthorId{impl_->next_watcher++});
+    return answer(failure(ErrorCode::unavailable, "this room shows what happened in another: watch it with osteon-viewer"));
+  }
   std::uint32_t person = 0;
   if (impl_->keeper && !name.empty()) {
     const Result<std::uint32_t> known = impl_->keeper->person(name);
@@ -432,15 +477,16 @@ void RoomHost::Impl::read_leaves(std::vector<FieldLeaf>& leaves) {
   for (std::size_t i = 0; i < leaves.size();) {
     const std::shared_lock lock(room_mutex);
     for (const std::size_t end = std::min(leaves.size(), i + kLeafBatch); i < end; ++i)
-      if (const CutField* field = room.find_field(leaves[i].body)) field->read(leaves[i]);
+      if (const CutField* field = room.any_field(leaves[i].body)) field->read(leaves[i]);
   }
   std::erase_if(leaves, [](const FieldLeaf& leaf) { return leaf.values.empty(); });
 }
 
-RoomHost::Impl::BoneCopy RoomHost::Impl::copy_bone() {
+RoomHost::Impl::BoneCopy RoomHost::Impl::copy_bone(Bodies which) {
+  const auto bodies = [&] { return which == Bodies::all ? room.all_bodies() : room.bodies(); };
   const auto places = [&] {
     std::vector<FieldLeaf> leaves;
-    for (const BodyId body : room.bodies()) std::ranges::move(room.find_field(body)->leaf_places(), std::back_inserter(leaves));
+    for (const BodyId body : bodies()) std::ranges::move(room.any_field(body)->leaf_places(), std::back_inserter(leaves));
     return leaves;
   };
   for (int attempt = 0;; ++attempt) {
@@ -468,10 +514,10 @@ RoomHost::Impl::BoneCopy RoomHost::Impl::copy_bone() {
       if (changes != room.bone_changes()) {
         if (attempt < 3) continue;
         leaves = places();
-        for (FieldLeaf& leaf : leaves) room.find_field(leaf.body)->read(leaf);
+        for (FieldLeaf& leaf : leaves) room.any_field(leaf.body)->read(leaf);
         cuts.clear();
       }
-      for (const BodyId body : room.bodies()) copy.bodies.emplace(body, CutField(room.bone(), body, room.tools()));
+      for (const BodyId body : bodies()) copy.bodies.emplace(body, CutField(room.bone(), body, room.tools()));
     }
     // Leaves that contain some of the cuts since their copying began get the others now, and those once more, which
     // changes nothing: the copy is the bone at room_seq.
@@ -502,6 +548,13 @@ BoneStatus RoomHost::bone_status() {
   status.field_hash = field_hash(std::move(leaves), bone().pitch_mm());
   impl_->last_status = status;
   return status;
+}
+
+RoomHost::Leaves RoomHost::leaves_now() {
+  const Impl::BoneCopy copy = impl_->copy_bone(Impl::Bodies::all);
+  Leaves all{copy.room_seq, {}};
+  for (const auto& [id, field] : copy.bodies) std::ranges::move(field.leaves(), std::back_inserter(all.leaves));
+  return all;
 }
 
 SavedFields RoomHost::saved_fields() {
@@ -644,8 +697,14 @@ void RoomHost::leave(SessionSink& sink) {
 }
 
 void RoomHost::queue_cut(std::shared_ptr<SessionSink> sink, Cut cut, Clock::time_point arrived) {
-  const std::lock_guard lock(impl_->queue_mutex);
-  impl_->queue.emplace_back(std::in_place_type<QueuedCut>, QueuedCut{std::move(sink), std::move(cut), arrived});
+  {
+    const std::lock_guard lock(impl_->queue_mutex);
+    if (!impl_->queue_closed) {
+      impl_->queue.emplace_back(std::in_place_type<QueuedCut>, QueuedCut{std::move(sink), std::move(cut), arrived});
+      return;
+    }
+  }
+  sink->decided();
 }
 
 void RoomHost::queue_event(std::function<Result<RoomEvent>(Room&)> change,
@@ -657,8 +716,10 @@ void RoomHost::queue_event(std::function<Result<RoomEvent>(Room&)> change,
       return;
     }
   }
-  answer(failure(ErrorCode::unavailable, "the server stops"));
+  answer(failure(ErrorCode::unavailable, "the room is closed"));
 }
+
+bool RoomHost::stopped() const { return impl_->stopping || impl_->committer.failure(); }
 
 void RoomHost::end_streams(const std::string& why) {
   impl_->end_sessions(why);
@@ -689,12 +750,7 @@ void RoomHost::stop() {
     impl_->committer.commit(impl_->room.take_rows(), {});
     impl_->committer.drain();
   }
-  {
-    const std::lock_guard lock(impl_->jobs_mutex);
-    impl_->jobs_end = true;
-    impl_->jobs_wake.notify_all();
-  }
-  if (impl_->job_thread.joinable()) impl_->job_thread.join();
+  impl_->jobs.stop();
 }
 
 }  // namespace osteon

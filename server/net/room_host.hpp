@@ -66,6 +66,12 @@ struct HostHealth {
   std::size_t surface_bytes = 0;    // of the newest blocks: what a viewer that joins is sent
 };
 
+// Rows of another room that happen again in this one, which decides nothing itself.
+struct Playback {
+  std::function<std::optional<RoomRow>()> next;  // [tick] nothing: the last one was given
+  double speed = 1.0;                            // times as fast as it happened; 0: nothing happens
+};
+
 // The bone at one place of the room's order.
 struct BoneStatus {
   RoomSeq room_seq;
@@ -81,8 +87,9 @@ class RoomHost {
 
   // Makes the whole surface, then starts the threads. `progress` hears fractions from one thread at a time.
   // `keeper` makes rows durable before anyone hears of them, and outlives the host; without it nothing is kept.
+  // `playback`: rows after those of `room` happen at their times; whoever joins may watch and nothing else.
   RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress, Detail detail = Detail::automatic,
-           RoomKeeper* keeper = nullptr);
+           RoomKeeper* keeper = nullptr, std::optional<Playback> playback = {});
   ~RoomHost();
   RoomHost(const RoomHost&) = delete;
   RoomHost& operator=(const RoomHost&) = delete;
@@ -93,6 +100,7 @@ class RoomHost {
   [[nodiscard]] bool knows(AuthorId author) const;
   [[nodiscard]] const ToolBox& tools() const;
   [[nodiscard]] std::vector<SceneItem> items() const;
+  [[nodiscard]] std::vector<std::pair<RoomSeq, std::string>> marks() const;
   [[nodiscard]] HostHealth health() const;
   [[nodiscard]] Digest surface_hash() const;  // of the newest blocks
 
@@ -100,7 +108,7 @@ class RoomHost {
   // false: that is left to a later tick, as by a slow disk.
   void tick(std::chrono::nanoseconds now, bool keep = true);
 
-  // Runs `job` on the thread for slow requests, in order; it may call the functions below.
+  // Runs `job` on the thread for slow requests, in order; it may call the functions below. Of a stopped host: at once.
   void run_slowly(std::function<void()> job);
   // `answer` is called when it is durable, on the committing thread. Error unavailable: the room has stopped or keeps nothing
   // any more.
@@ -111,6 +119,12 @@ class RoomHost {
   // secret of which the author has the digest), unavailable (the room has lost what was said to be safe).
   [[nodiscard]] Result<void> resume(AuthorId author, const Digest& secret, const std::optional<JournalHead>& kept);
   [[nodiscard]] BoneStatus bone_status();
+  // [thread for slow requests] All bodies' leaves, those that were taken away too, at one place of the order.
+  struct Leaves {
+    RoomSeq place;
+    std::vector<FieldLeaf> leaves;
+  };
+  [[nodiscard]] Leaves leaves_now();
   void find_pieces();                        // waits until what was cut so far is looked through, and its pieces are bodies
   [[nodiscard]] SavedFields saved_fields();  // of all bodies, at its room_seq
   // The sink hears every row after those of its leaves. With the digest of the author's secret it takes the place of an
@@ -134,6 +148,7 @@ class RoomHost {
   // by then every session has been told. Error unavailable: the room has stopped.
   void queue_event(std::function<Result<RoomEvent>(Room&)> change, std::function<void(const Result<RoomEvent>&)> answer);
 
+  [[nodiscard]] bool stopped() const;        // takes no more
   void end_streams(const std::string& why);  // those open now and those that come later
   void stop();                               // joins the threads; what is queued is decided before
   [[nodiscard]] std::vector<FieldLeaf> all_leaves() const;  // Room::all_leaves(), of one that has stopped

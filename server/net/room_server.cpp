@@ -13,6 +13,7 @@
 #include <system_error>
 #include <utility>
 
+#include "common/core/check.hpp"
 #include "common/runtime/log.hpp"
 #include "server/net/link_server.hpp"
 #include "server/net/services.hpp"
@@ -95,10 +96,10 @@ Result<void> try_to_listen(const std::string& listen, const HostPort& at) {
   return {};
 }
 
-std::uint64_t new_server_epoch() {
-  // Without a journal that counts, the calendar is what rises from one opening to the next.
-  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
-  return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(since_1970).count());
+// Where datagrams are heard: the numeric address of `host`.
+std::string numeric(const std::string& host) {
+  if (host == "localhost") return "127.0.0.1";
+  return host == "[::1]" ? "::1" : host;
 }
 
 constexpr int kMaxReceiveBytes = 4 * 1024 * 1024;  // a cut of 64 knots is below 4 kB, a tool made from a mesh a few MB
@@ -109,27 +110,17 @@ constexpr int kShortestPingMs = 500;               // clients may ask that often
 }  // namespace
 
 struct RoomServer::Impl {
-  std::unique_ptr<RoomKeeper> keeper;  // outlives the host, which writes to it
-  std::unique_ptr<RoomHost> host;
+  std::unique_ptr<Rooms> rooms;
   std::unique_ptr<LinkServer> links;   // outlives the streams
   std::vector<std::unique_ptr<grpc::Service>> services;
   std::unique_ptr<grpc::Server> server;
   std::string address;
-  bool saves = false;
-  void close_journal();
 };
-
-// Nothing is lost where this fails: the next opening takes longer.
-void RoomServer::Impl::close_journal() {
-  Result<void> done = keeper->checkpoint(host->room_seq(), host->all_leaves());
-  if (done) done = keeper->close();
-  if (!done) log::warn("the journal was not closed cleanly", {{"reason", done.error().message}});
-}
 
 RoomServer::RoomServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 RoomServer::~RoomServer() {
-  if (impl_->server) stop();
+  if (impl_->server) (void)stop_all();
 }
 
 Result<void> RoomServer::check_listen(const std::string& listen) {
@@ -146,32 +137,34 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(Room room, const RoomServe
                                                       const std::function<void(double)>& progress,
                                                       std::unique_ptr<RoomKeeper> keeper) {
   if (Result<void> usable = check_listen(options.listen); !usable) return tl::unexpected(usable.error());
+  RoomsOptions of_one{.cases = {{room.bone(), options.case_folder}}, .rates = options.rates, .detail = options.detail};
+  auto rooms = std::make_unique<Rooms>(std::move(of_one));
+  const std::string name = keeper ? keeper->genesis().room : "room";
+  if (const auto added = rooms->add(name, std::move(room), std::move(keeper), options.save, progress); !added)
+    return tl::unexpected(added.error());
+  return start(std::move(rooms), options.listen);
+}
+
+Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> rooms, const std::string& listen) {
+  if (Result<void> usable = check_listen(listen); !usable) return tl::unexpected(usable.error());
   // What fails is told in one sentence by the caller, not in gRPC's own lines.
   gpr_set_log_function([](gpr_log_func_args*) {});
 
   auto impl = std::make_unique<Impl>();
-  impl->saves = !options.save.empty();
-  // What took long to make again should not take so long the next time.
-  constexpr std::uint64_t kLongReplay = 5000;
-  if (keeper && keeper->evaluated() > kLongReplay)
-    if (Result<void> kept = keeper->checkpoint(room.room_seq(), room.all_leaves()); !kept)
-      log::warn("no checkpoint", {{"reason", kept.error().message}});
-  const std::uint64_t epoch = keeper ? keeper->server_epoch() : new_server_epoch();
-  impl->keeper = std::move(keeper);
-  impl->host = std::make_unique<RoomHost>(std::move(room), options.rates, progress, options.detail, impl->keeper.get());
+  impl->rooms = std::move(rooms);
   // Beside the streams; without it all goes over them.
-  const Result<HostPort> at = parse_listen(options.listen);
-  if (Result<std::unique_ptr<LinkServer>> links = LinkServer::open(at->host == "localhost" || at->host == "[::1]" ? at->host == "[::1]" ? "::1" : "127.0.0.1" : at->host); links)
+  if (Result<std::unique_ptr<LinkServer>> links = LinkServer::open(numeric(parse_listen(listen)->host)); links)
     impl->links = std::move(*links);
   else
     log::warn("no fast path", {{"reason", links.error().message}});
-  impl->services.push_back(make_room_service(*impl->host, {options.case_folder, options.save}, epoch));
-  impl->services.push_back(make_cutting_service(*impl->host, epoch, impl->links.get()));
-  impl->services.push_back(make_watch_service(*impl->host));
+  impl->services.push_back(make_room_service(*impl->rooms));
+  impl->services.push_back(make_cutting_service(*impl->rooms, impl->links.get()));
+  impl->services.push_back(make_watch_service(*impl->rooms));
+  impl->services.push_back(make_rooms_service(*impl->rooms));
 
   grpc::ServerBuilder builder;
   int port = 0;
-  builder.AddListeningPort(options.listen, grpc::InsecureServerCredentials(), &port);
+  builder.AddListeningPort(listen, grpc::InsecureServerCredentials(), &port);
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveMs);
@@ -184,31 +177,40 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(Room room, const RoomServe
   for (const auto& service : impl->services) builder.RegisterService(service.get());
   impl->server = builder.BuildAndStart();
   if (!impl->server || port == 0) {
-    impl->host->stop();
     // gRPC does not say why; most likely the port was taken while the surface was made.
-    if (Result<void> usable = check_listen(options.listen); !usable) return tl::unexpected(usable.error());
-    return tl::unexpected(cannot_listen(options.listen, "the system refused"));
+    if (Result<void> usable = check_listen(listen); !usable) return tl::unexpected(usable.error());
+    return tl::unexpected(cannot_listen(listen, "the system refused"));
   }
-  impl->address = parse_listen(options.listen)->host + ":" + std::to_string(port);
+  impl->address = parse_listen(listen)->host + ":" + std::to_string(port);
   return std::unique_ptr<RoomServer>(new RoomServer(std::move(impl)));
 }
 
 const std::string& RoomServer::address() const { return impl_->address; }
-HostHealth RoomServer::health() const { return impl_->host->health(); }
+Rooms& RoomServer::rooms() { return *impl_->rooms; }
+HostHealth RoomServer::health() const {
+  const Result<std::shared_ptr<OpenRoom>> room = impl_->rooms->find("");
+  return room ? (*room)->host().health() : HostHealth{};
+}
 std::uint16_t RoomServer::link_port() const { return impl_->links ? impl_->links->port() : 0; }
 LinkServerHealth RoomServer::link_health() const { return impl_->links ? impl_->links->health() : LinkServerHealth{}; }
 
-RoomServerSummary RoomServer::stop() {
-  impl_->host->find_pieces();
+std::map<std::string, RoomSummary> RoomServer::stop_all() {
+  impl_->rooms->stop_upkeep();
   // Streams hear why first; those whose reader does not read are cut off after a moment.
-  impl_->host->end_streams("the server stops");
+  for (const std::shared_ptr<OpenRoom>& room : impl_->rooms->open_rooms()) room->end_streams("the server stops");
   impl_->server->Shutdown(std::chrono::system_clock::now() + std::chrono::milliseconds(500));
   impl_->server->Wait();
-  impl_->host->stop();
+  std::map<std::string, RoomSummary> summaries = impl_->rooms->close_all();
+  impl_->rooms->jobs.stop();
+  impl_->rooms->files.stop();
   impl_->server.reset();
-  if (impl_->keeper) impl_->close_journal();
-  return {impl_->host->bone_status(), impl_->host->health(), impl_->saves ? impl_->host->saved_fields() : SavedFields{},
-          impl_->host->surface_hash()};
+  return summaries;
+}
+
+RoomSummary RoomServer::stop() {
+  std::map<std::string, RoomSummary> all = stop_all();
+  OSTEON_CHECK(all.size() == 1);
+  return std::move(all.begin()->second);
 }
 
 }  // namespace osteon

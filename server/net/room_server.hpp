@@ -1,14 +1,16 @@
-// The room on the network: listens, serves proto/osteon/v1, stops cleanly.
+// Rooms on the network: listens, serves proto/osteon/v1, stops cleanly.
 #pragma once
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 
 #include "common/core/result.hpp"
-#include "server/net/room_host.hpp"
 #include "server/net/link_server.hpp"
+#include "server/net/room_host.hpp"
 #include "server/net/room_keeper.hpp"
+#include "server/net/rooms.hpp"
 
 namespace osteon {
 
@@ -20,20 +22,15 @@ struct RoomServerOptions {
   Detail detail = Detail::automatic;
 };
 
-struct RoomServerSummary {
-  BoneStatus bone;
-  HostHealth health;
-  SavedFields fields;   // of the bone; empty without RoomServerOptions::save
-  Digest surface_hash;  // equal to every viewer's that has shown room_seq
-};
-
 class RoomServer {
  public:
   // Whether start() could listen there now: told before a long preparation instead of after it. Errors as start().
   [[nodiscard]] static Result<void> check_listen(const std::string& listen);
   // Errors: invalid_input (`listen` is not HOST:PORT, or not of this machine alone), exists (the port is in use),
   // unavailable (the system refuses for another reason, which the message gives).
-  // `progress` hears how far the first surface is. `keeper`: of this room; without one it is lost when the process ends.
+  [[nodiscard]] static Result<std::unique_ptr<RoomServer>> start(std::unique_ptr<Rooms> rooms, const std::string& listen);
+  // Of one room, "room" or what `keeper` calls it. `progress` hears how far the first surface is. `keeper`: of this room;
+  // without one it is lost when the process ends.
   [[nodiscard]] static Result<std::unique_ptr<RoomServer>> start(Room room, const RoomServerOptions& options,
                                                                  const std::function<void(double)>& progress,
                                                                  std::unique_ptr<RoomKeeper> keeper = nullptr);
@@ -42,11 +39,13 @@ class RoomServer {
   RoomServer& operator=(const RoomServer&) = delete;
 
   [[nodiscard]] const std::string& address() const;  // HOST:PORT with the real port
-  [[nodiscard]] HostHealth health() const;
+  [[nodiscard]] Rooms& rooms();
+  [[nodiscard]] HostHealth health() const;           // of the only room
   [[nodiscard]] std::uint16_t link_port() const;     // UDP; 0: there is no fast path
   [[nodiscard]] LinkServerHealth link_health() const;
-  // Ends every stream with a status and joins all threads; the journal is closed cleanly, with a checkpoint. Once.
-  RoomServerSummary stop();
+  // Ends every stream with a status and joins all threads; the journals are closed cleanly, with a checkpoint. Once.
+  std::map<std::string, RoomSummary> stop_all();
+  RoomSummary stop();  // the same, of the only room
 
  private:
   struct Impl;

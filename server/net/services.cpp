@@ -13,25 +13,25 @@
 #include "common/link/random_bytes.hpp"
 #include "common/wire/convert.hpp"
 #include "osteon/v1/room.grpc.pb.h"
-#include "server/net/out_stream.inl"
+#include "server/net/called_room.inl"
 
 namespace osteon {
 namespace {
 
 
-// The case's files, read piece by piece on the host's thread for slow requests.
+// The case's files, read piece by piece on the thread for files.
 class CaseStream final : public OutStream<WriteReactor> {
  public:
   static constexpr std::size_t kPieceBytes = 1024 * 1024;
 
-  CaseStream(RoomHost& host, std::filesystem::path folder) : host_(host), folder_(std::move(folder)) {}
+  CaseStream(JobThread& files, std::filesystem::path folder) : files_(files), folder_(std::move(folder)) {}
   void start() { read_next_later(); }
 
  private:
   static constexpr std::array<const char*, 2> kFiles{"case.json", "bone.vdb"};
 
   void read_next_later() {
-    host_.run_slowly([this, keep = self()] { read_next(); });
+    files_.run([this, keep = self()] { read_next(); });
   }
   void read_next() {
     const std::filesystem::path path = folder_ / kFiles[file_index_];
@@ -68,7 +68,7 @@ class CaseStream final : public OutStream<WriteReactor> {
   }
   void leave() override {}
 
-  RoomHost& host_;
+  JobThread& files_;
   const std::filesystem::path folder_;
   Bytes waiting_;
   // Of the job that reads; the next job is queued only after it has left its piece.
@@ -95,32 +95,20 @@ Status judge(const v1::JoinRequest& request) {
   return Status::OK;
 }
 
-Status status_of(const Error& error) {
-  switch (error.code) {
-    case ErrorCode::invalid_input: return invalid(error.message);
-    case ErrorCode::not_found: return {StatusCode::NOT_FOUND, error.message};
-    case ErrorCode::exists: return {StatusCode::ALREADY_EXISTS, error.message};
-    case ErrorCode::unavailable:
-    case ErrorCode::unsupported: return {StatusCode::FAILED_PRECONDITION, error.message};
-    default: return {StatusCode::INTERNAL, error.message};
-  }
-}
-
 template <class Base>
 using WithTools = v1::RoomService::WithCallbackMethod_ListTools<
     v1::RoomService::WithCallbackMethod_GetTool<v1::RoomService::WithCallbackMethod_AddTool<Base>>>;
 template <class Base>
 using WithEvents = v1::RoomService::WithCallbackMethod_Undo<
-    v1::RoomService::WithCallbackMethod_Redo<v1::RoomService::WithCallbackMethod_RemoveBody<
+    v1::RoomService::WithCallbackMethod_Redo<v1::RoomService::WithCallbackMethod_Mark<v1::RoomService::WithCallbackMethod_RemoveBody<
         v1::RoomService::WithCallbackMethod_SetSceneItem<v1::RoomService::WithCallbackMethod_RemoveSceneItem<
-            v1::RoomService::WithCallbackMethod_SaveFields<Base>>>>>>;
+            v1::RoomService::WithCallbackMethod_SaveFields<Base>>>>>>>;
 using RoomBase = WithTools<WithEvents<v1::RoomService::WithCallbackMethod_Join<v1::RoomService::WithCallbackMethod_GetStatus<
     v1::RoomService::WithRawCallbackMethod_GetCase<v1::RoomService::Service>>>>>;
 
 class RoomServiceImpl final : public RoomBase {
  public:
-  RoomServiceImpl(RoomHost& host, RoomFiles files, std::uint64_t server_epoch)
-      : host_(host), files_(std::move(files)), server_epoch_(server_epoch) {}
+  explicit RoomServiceImpl(Rooms& rooms) : rooms_(rooms) {}
 
   grpc::ServerUnaryReactor* Join(grpc::CallbackServerContext* context, const v1::JoinRequest* request,
                                  v1::JoinResponse* response) override {
@@ -129,20 +117,25 @@ class RoomServiceImpl final : public RoomBase {
       reactor->Finish(status);
       return reactor;
     }
-    host_.run_slowly([this, reactor, request, response] {
-      const Case& bone = host_.bone();
-      const Result<AuthorId> author = request->resume_author() != 0 ? come_back(*request) : come(*request, *response);
+    const std::shared_ptr<OpenRoom> room = called(*context, reactor);
+    if (!room) return reactor;
+    room->host().run_slowly([room, reactor, request, response] {
+      RoomHost& host = room->host();
+      const Case& bone = host.bone();
+      const Result<AuthorId> author =
+          request->resume_author() != 0 ? come_back(host, *request) : come(host, *request, *response);
       if (!author) return reactor->Finish(status_of(author.error()));
       response->set_author(author->value);
-      response->set_server_epoch(server_epoch_);
-      response->set_lease_epoch(host_.lease_epoch(*author));
+      response->set_room(room->name);
+      response->set_server_epoch(room->server_epoch);
+      response->set_lease_epoch(host.lease_epoch(*author));
       response->set_case_hash(wire::to_wire(bone.hash()));
       response->set_case_title(bone.info().title);
       response->set_pitch_mm(bone.pitch_mm());
       const Box bounds = bone.bounds();
       *response->mutable_bounds_min_mm() = wire::to_wire(bounds.min_mm);
       *response->mutable_bounds_max_mm() = wire::to_wire(bounds.max_mm);
-      response->set_room_seq(host_.room_seq().value);
+      response->set_room_seq(host.room_seq().value);
       reactor->Finish(Status::OK);
     });
     return reactor;
@@ -151,16 +144,23 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* GetStatus(grpc::CallbackServerContext* context, const v1::GetStatusRequest*,
                                       v1::GetStatusResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-    host_.run_slowly([this, reactor, response] {
-      const BoneStatus status = host_.bone_status();
-      const HostHealth health = host_.health();
+    const std::shared_ptr<OpenRoom> room = called(*context, reactor);
+    if (!room) return reactor;
+    room->host().run_slowly([room, reactor, response] {
+      const BoneStatus status = room->host().bone_status();
+      const HostHealth health = room->host().health();
       response->set_room_seq(status.room_seq.value);
       response->set_field_hash(wire::to_wire(status.field_hash));
       response->set_removed_mm3(status.removed_mm3);
       response->set_rejected(status.counts.rejected);
       response->set_subscribers(static_cast<std::uint32_t>(health.mesh_streams + health.cutting_streams));
       for (const BodyId body : status.bodies) response->add_bodies(body.value);
-      for (const SceneItem& item : host_.items()) *response->add_items() = wire::to_wire(item);
+      for (const SceneItem& item : room->host().items()) *response->add_items() = wire::to_wire(item);
+      for (const auto& [place, label] : room->host().marks()) {
+        v1::RoomMark& mark = *response->add_marks();
+        mark.set_room_seq(place.value);
+        mark.set_label(label);
+      }
       v1::TickHealth& tick = *response->mutable_tick();
       tick.set_ticks(health.tick.work.count());
       tick.set_missed(health.tick.missed);
@@ -179,9 +179,9 @@ class RoomServiceImpl final : public RoomBase {
     if (!request) return refused(invalid("the GetCaseRequest could not be parsed"));
     const Result<Digest> hash = wire::digest_from_wire(request->case_hash());
     if (!hash) return refused(invalid("case_hash is not a digest of 32 bytes"));
-    if (*hash != host_.bone().hash())
-      return refused({StatusCode::NOT_FOUND, "this server has no case " + to_hex(*hash)});
-    CaseStream* stream = CaseStream::launch(std::make_shared<CaseStream>(host_, files_.case_folder));
+    const ServedCase* served = rooms_.find_case(*hash);
+    if (!served) return refused({StatusCode::NOT_FOUND, "this server has no case " + to_hex(*hash)});
+    CaseStream* stream = CaseStream::launch(std::make_shared<CaseStream>(rooms_.files, served->folder));
     stream->start();
     return stream;
   }
@@ -189,8 +189,9 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* ListTools(grpc::CallbackServerContext* context, const v1::ListToolsRequest* request,
                                       v1::ListToolsResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-    if (!known("ListToolsRequest", request->author(), reactor)) return reactor;
-    for (const ToolBox::Entry* entry : host_.tools().entries()) {
+    const std::shared_ptr<OpenRoom> room = known("ListToolsRequest", request->author(), *context, reactor);
+    if (!room) return reactor;
+    for (const ToolBox::Entry* entry : room->host().tools().entries()) {
       v1::KnownTool& tool = *response->add_tools();
       tool.set_tool_hash(wire::to_wire(entry->hash));
       tool.set_name(entry->tool.name);
@@ -204,10 +205,11 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* GetTool(grpc::CallbackServerContext* context, const v1::GetToolRequest* request,
                                     v1::GetToolResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-    if (!known("GetToolRequest", request->author(), reactor)) return reactor;
+    const std::shared_ptr<OpenRoom> room = known("GetToolRequest", request->author(), *context, reactor);
+    if (!room) return reactor;
     const Result<Digest> hash = wire::digest_from_wire(request->tool_hash());
     if (!hash) return refuse(reactor, invalid("tool_hash is not a digest of 32 bytes"));
-    const ToolBox::Entry* entry = host_.tools().find(*hash);
+    const ToolBox::Entry* entry = room->host().tools().find(*hash);
     if (!entry) return refuse(reactor, {StatusCode::NOT_FOUND, "the room knows no tool " + to_hex(*hash)});
     *response->mutable_tool() = wire::to_wire(entry->tool);
     reactor->Finish(Status::OK);
@@ -220,7 +222,7 @@ class RoomServiceImpl final : public RoomBase {
     Result<Tool> tool = wire::from_wire(request->tool());
     if (!tool) return refuse(reactor, invalid(tool.error().message));
     return change(
-        reactor, [by = AuthorId{request->author()}, tool = *tool](Room& room) { return room.add_tool(by, tool); },
+        *context, reactor, [by = AuthorId{request->author()}, tool = *tool](Room& room) { return room.add_tool(by, tool); },
         [response](const RoomEvent& event) {
           response->set_room_seq(event.room_seq.value);
           response->set_tool_hash(wire::to_wire(event.tool->hash));
@@ -232,11 +234,14 @@ class RoomServiceImpl final : public RoomBase {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     std::vector<RoomSeq> places;
     for (const std::uint64_t place : request->room_seqs()) places.push_back(RoomSeq{place});
-    if (!places.empty() && (request->count() != 0 || request->of_author() != 0))
-      return refuse(reactor, invalid("an UndoRequest has either count or room_seqs"));
+    const bool by_count = request->count() != 0 || request->of_author() != 0;
+    if (int{by_count} + int{!places.empty()} + int{request->to_mark() != 0} > 1)
+      return refuse(reactor, invalid("an UndoRequest has one of count, room_seqs and to_mark"));
     return change(
-        reactor,
-        [by = AuthorId{request->author()}, of = AuthorId{request->of_author()}, count = request->count(), places](Room& room) {
+        *context, reactor,
+        [by = AuthorId{request->author()}, of = AuthorId{request->of_author()}, count = request->count(), places,
+         mark = RoomSeq{request->to_mark()}](Room& room) {
+          if (mark) return room.undo_to(by, mark);
           return places.empty() ? room.undo_last(by, count, of) : room.undo(by, places);
         },
         [response](const RoomEvent& event) {
@@ -248,7 +253,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* Redo(grpc::CallbackServerContext* context, const v1::RedoRequest* request,
                                  v1::RedoResponse* response) override {
     return change(
-        context->DefaultReactor(),
+        *context, context->DefaultReactor(),
         [by = AuthorId{request->author()}, count = request->count()](Room& room) { return room.redo_last(by, count); },
         [response](const RoomEvent& event) {
           response->set_room_seq(event.room_seq.value);
@@ -256,10 +261,18 @@ class RoomServiceImpl final : public RoomBase {
         });
   }
 
+  grpc::ServerUnaryReactor* Mark(grpc::CallbackServerContext* context, const v1::MarkRequest* request,
+                                 v1::MarkResponse* response) override {
+    return change(
+        *context, context->DefaultReactor(),
+        [by = AuthorId{request->author()}, label = request->label()](Room& room) { return room.mark(by, label); },
+        [response](const RoomEvent& event) { response->set_room_seq(event.room_seq.value); });
+  }
+
   grpc::ServerUnaryReactor* RemoveBody(grpc::CallbackServerContext* context, const v1::RemoveBodyRequest* request,
                                        v1::RemoveBodyResponse* response) override {
     return change(
-        context->DefaultReactor(),
+        *context, context->DefaultReactor(),
         [by = AuthorId{request->author()}, body = BodyId{request->body()}](Room& room) { return room.remove_body(by, body); },
         [response](const RoomEvent& event) { response->set_room_seq(event.room_seq.value); });
   }
@@ -272,7 +285,7 @@ class RoomServiceImpl final : public RoomBase {
     const Result<Placing> placing = wire::placing_from_wire(*request);
     if (!placing) return refuse(reactor, invalid(placing.error().message));
     return change(
-        reactor,
+        *context, reactor,
         [by = AuthorId{request->author()}, item = *item, placing = *placing](Room& room) { return room.set_item(by, item, placing); },
         [response](const RoomEvent& event) {
           response->set_room_seq(event.room_seq.value);
@@ -285,7 +298,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* RemoveSceneItem(grpc::CallbackServerContext* context, const v1::RemoveSceneItemRequest* request,
                                             v1::RemoveSceneItemResponse* response) override {
     return change(
-        context->DefaultReactor(),
+        *context, context->DefaultReactor(),
         [by = AuthorId{request->author()}, item = request->item()](Room& room) { return room.remove_item(by, item); },
         [response](const RoomEvent& event) { response->set_room_seq(event.room_seq.value); });
   }
@@ -293,21 +306,22 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* SaveFields(grpc::CallbackServerContext* context, const v1::SaveFieldsRequest* request,
                                        v1::SaveFieldsResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-    if (!known("SaveFieldsRequest", request->author(), reactor)) return reactor;
-    if (files_.save.empty())
+    const std::shared_ptr<OpenRoom> room = known("SaveFieldsRequest", request->author(), *context, reactor);
+    if (!room) return reactor;
+    if (room->save.empty())
       return refuse(reactor, {StatusCode::FAILED_PRECONDITION, "this server saves nothing; start it with --save FILE.vdb"});
     // A client names no folder: it may not write elsewhere on the server's disk.
     const std::filesystem::path name = request->file_name();
     if (!name.empty() && (name != name.filename() || name.extension() != ".vdb" || request->file_name().front() == '.'))
       return refuse(reactor, invalid("file_name is not a plain name that ends in .vdb"));
-    const std::filesystem::path file = name.empty() ? files_.save : files_.save.parent_path() / name;
-    host_.run_slowly([this, reactor, response, file] {
-      host_.find_pieces();
-      const SavedFields saved = host_.saved_fields();
+    const std::filesystem::path file = name.empty() ? room->save : room->save.parent_path() / name;
+    room->host().run_slowly([room, reactor, response, file] {
+      room->host().find_pieces();
+      const SavedFields saved = room->host().saved_fields();
       if (const Result<void> written = save_fields(file, saved); !written)
         return reactor->Finish({StatusCode::INTERNAL, written.error().message});
       response->set_room_seq(saved.room_seq.value);
-      response->set_field_hash(wire::to_wire(field_hash(saved.leaves, host_.bone().pitch_mm())));
+      response->set_field_hash(wire::to_wire(field_hash(saved.leaves, room->host().bone().pitch_mm())));
       response->set_file(file.string());
       reactor->Finish(Status::OK);
     });
@@ -316,14 +330,14 @@ class RoomServiceImpl final : public RoomBase {
 
  private:
   // A new identity, and the secret that proves it.
-  Result<AuthorId> come(const v1::JoinRequest& request, v1::JoinResponse& response) {
+  static Result<AuthorId> come(RoomHost& host, const v1::JoinRequest& request, v1::JoinResponse& response) {
     const MemberKind kind = request.kind() == v1::CLIENT_KIND_HAPTIC ? MemberKind::surgeon : MemberKind::watcher;
     std::array<std::uint8_t, 32> secret{};
     system_random()(secret);
     response.set_secret(secret.data(), secret.size());
-    return host_.join(kind, request.name(), digest_of_secret(response.secret()));
+    return host.join(kind, request.name(), digest_of_secret(response.secret()));
   }
-  Result<AuthorId> come_back(const v1::JoinRequest& request) {
+  static Result<AuthorId> come_back(RoomHost& host, const v1::JoinRequest& request) {
     std::optional<JournalHead> kept;
     if (request.kept_room_seq() != 0) {
       const Result<Digest> chain = wire::digest_from_wire(request.kept_chain());
@@ -331,31 +345,42 @@ class RoomServiceImpl final : public RoomBase {
       kept = JournalHead{RoomSeq{request.kept_room_seq()}, *chain};
     }
     const AuthorId author{request.resume_author()};
-    if (Result<void> may = host_.resume(author, digest_of_secret(request.secret()), kept); !may) return tl::unexpected(may.error());
+    if (Result<void> may = host.resume(author, digest_of_secret(request.secret()), kept); !may) return tl::unexpected(may.error());
     return author;
   }
   static grpc::ServerUnaryReactor* refuse(grpc::ServerUnaryReactor* reactor, Status status) {
     reactor->Finish(std::move(status));
     return reactor;
   }
-  bool known(const char* message, std::uint64_t author, grpc::ServerUnaryReactor* reactor) {
-    if (host_.knows(AuthorId{author})) return true;
+  // The room that is called; null once `reactor` was told that there is none.
+  std::shared_ptr<OpenRoom> called(const grpc::CallbackServerContext& context, grpc::ServerUnaryReactor* reactor) {
+    Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, context);
+    if (room) return std::move(*room);
+    reactor->Finish(status_of(room.error()));
+    return nullptr;
+  }
+  // The same, of a caller who has joined it.
+  std::shared_ptr<OpenRoom> known(const char* message, std::uint64_t author, const grpc::CallbackServerContext& context,
+                                  grpc::ServerUnaryReactor* reactor) {
+    std::shared_ptr<OpenRoom> room = called(context, reactor);
+    if (!room || room->host().knows(AuthorId{author})) return room;
     reactor->Finish(not_joined(message, author));
-    return false;
+    return nullptr;
   }
   // An event of the room; answered when every session has been told.
   template <class Fill>
-  grpc::ServerUnaryReactor* change(grpc::ServerUnaryReactor* reactor, std::function<Result<RoomEvent>(Room&)> event, Fill fill) {
-    host_.queue_event(std::move(event), [reactor, fill](const Result<RoomEvent>& decided) {
+  grpc::ServerUnaryReactor* change(const grpc::CallbackServerContext& context, grpc::ServerUnaryReactor* reactor,
+                                   std::function<Result<RoomEvent>(Room&)> event, Fill fill) {
+    const std::shared_ptr<OpenRoom> room = called(context, reactor);
+    if (!room) return reactor;
+    room->host().queue_event(std::move(event), [reactor, fill](const Result<RoomEvent>& decided) {
       if (decided) fill(*decided);
       reactor->Finish(decided ? Status::OK : status_of(decided.error()));
     });
     return reactor;
   }
 
-  RoomHost& host_;
-  const RoomFiles files_;
-  const std::uint64_t server_epoch_;
+  Rooms& rooms_;
 };
 
 }  // namespace
@@ -366,8 +391,6 @@ Digest digest_of_secret(std::string_view secret) {
   return hasher.finish();
 }
 
-std::unique_ptr<grpc::Service> make_room_service(RoomHost& host, RoomFiles files, std::uint64_t server_epoch) {
-  return std::make_unique<RoomServiceImpl>(host, std::move(files), server_epoch);
-}
+std::unique_ptr<grpc::Service> make_room_service(Rooms& rooms) { return std::make_unique<RoomServiceImpl>(rooms); }
 
 }  // namespace osteon

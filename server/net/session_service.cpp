@@ -9,7 +9,7 @@
 #include "common/wire/convert.hpp"
 #include "osteon/v1/cutting.grpc.pb.h"
 #include "server/net/link_server.hpp"
-#include "server/net/out_stream.inl"
+#include "server/net/called_room.inl"
 #include "server/net/services.hpp"
 
 namespace osteon {
@@ -21,8 +21,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
  public:
   static constexpr int kMaxQueuedCuts = 256;
 
-  SessionStream(RoomHost& host, std::uint64_t server_epoch, LinkServer* links)
-      : host_(host), server_epoch_(server_epoch), links_(links) {}
+  SessionStream(std::shared_ptr<OpenRoom> room, LinkServer* links)
+      : room_(std::move(room)), host_(room_->host()), links_(links) {}
   void start() { StartRead(&request_); }
 
   AuthorId author() const override { return author_; }
@@ -115,10 +115,10 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
  private:
   void open(const v1::SessionOpen& request) {
     if (opened_) return close(invalid("open was sent before"));
-    if (request.server_epoch() != server_epoch_)
+    if (request.server_epoch() != room_->server_epoch)
       // It joined a server that was killed meanwhile: this one knows it, if it joins again.
       return close({StatusCode::UNAVAILABLE, "open.server_epoch is " + std::to_string(request.server_epoch()) + " and the server's " +
-                           std::to_string(server_epoch_) + "; join again"});
+                           std::to_string(room_->server_epoch) + "; join again"});
     opened_ = true;
     author_ = AuthorId{request.author()};
     const Digest secret = digest_of_secret(request.secret());
@@ -207,8 +207,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     if (link_) links_->remove(link_);
   }
 
-  RoomHost& host_;
-  const std::uint64_t server_epoch_;
+  const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
+  RoomHost& host_;                        // of room_
   LinkServer* const links_;
   std::shared_ptr<SessionLink> link_;  // with the link server; set before the host tells of rows
   ByteBuffer request_;
@@ -222,25 +222,25 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
 
 class CuttingServiceImpl final : public v1::CuttingService::WithRawCallbackMethod_Session<v1::CuttingService::Service> {
  public:
-  CuttingServiceImpl(RoomHost& host, std::uint64_t server_epoch, LinkServer* links)
-      : host_(host), server_epoch_(server_epoch), links_(links) {}
+  CuttingServiceImpl(Rooms& rooms, LinkServer* links) : rooms_(rooms), links_(links) {}
 
-  BidiReactor* Session(grpc::CallbackServerContext*) override {
-    SessionStream* stream = SessionStream::launch(std::make_shared<SessionStream>(host_, server_epoch_, links_));
+  BidiReactor* Session(grpc::CallbackServerContext* context) override {
+    Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context);
+    if (!room) return refused<BidiReactor>(status_of(room.error()));
+    SessionStream* stream = SessionStream::launch(std::make_shared<SessionStream>(std::move(*room), links_));
     stream->start();
     return stream;
   }
 
  private:
-  RoomHost& host_;
-  const std::uint64_t server_epoch_;
+  Rooms& rooms_;
   LinkServer* const links_;
 };
 
 }  // namespace
 
-std::unique_ptr<grpc::Service> make_cutting_service(RoomHost& host, std::uint64_t server_epoch, LinkServer* links) {
-  return std::make_unique<CuttingServiceImpl>(host, server_epoch, links);
+std::unique_ptr<grpc::Service> make_cutting_service(Rooms& rooms, LinkServer* links) {
+  return std::make_unique<CuttingServiceImpl>(rooms, links);
 }
 
 }  // namespace osteon

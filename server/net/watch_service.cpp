@@ -9,7 +9,7 @@
 
 #include "common/wire/convert.hpp"
 #include "osteon/v1/watch.grpc.pb.h"
-#include "server/net/out_stream.inl"
+#include "server/net/called_room.inl"
 #include "server/net/services.hpp"
 
 namespace osteon {
@@ -17,7 +17,7 @@ namespace {
 
 class MeshStream final : public OutStream<WriteReactor>, public MeshSink {
  public:
-  MeshStream(RoomHost& host, AuthorId author) : host_(host), author_(author) {}
+  MeshStream(std::shared_ptr<OpenRoom> room, AuthorId author) : room_(std::move(room)), author_(author) {}
 
   AuthorId author() const override { return author_; }
   void begin(MeshUpdate whole_surface) override {
@@ -47,16 +47,16 @@ class MeshStream final : public OutStream<WriteReactor>, public MeshSink {
     if (!parts.empty()) message = buffer_of(parts);
     return !parts.empty();
   }
-  void leave() override { host_.leave(*this); }
+  void leave() override { room_->host().leave(*this); }
 
-  RoomHost& host_;
+  const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
   const AuthorId author_;
   std::optional<MeshOutbox> outbox_;
 };
 
 class CuttingStream final : public OutStream<WriteReactor>, public CuttingSink {
  public:
-  CuttingStream(RoomHost& host, std::chrono::nanoseconds apart) : host_(host), apart_(apart) {}
+  CuttingStream(std::shared_ptr<OpenRoom> room, std::chrono::nanoseconds apart) : room_(std::move(room)), apart_(apart) {}
 
   std::chrono::nanoseconds apart() const override { return apart_; }
   void offer(const Bytes& message) override {
@@ -77,9 +77,9 @@ class CuttingStream final : public OutStream<WriteReactor>, public CuttingSink {
     message = buffer_of({std::exchange(waiting_, nullptr)});
     return true;
   }
-  void leave() override { host_.leave(*this); }
+  void leave() override { room_->host().leave(*this); }
 
-  RoomHost& host_;
+  const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
   const std::chrono::nanoseconds apart_;
   Bytes waiting_;
 };
@@ -89,20 +89,22 @@ using WatchBase = v1::WatchService::WithRawCallbackMethod_WatchMesh<v1::WatchSer
 
 class WatchServiceImpl final : public WatchBase {
  public:
-  explicit WatchServiceImpl(RoomHost& host) : host_(host) {}
+  explicit WatchServiceImpl(Rooms& rooms) : rooms_(rooms) {}
 
-  WriteReactor* WatchMesh(grpc::CallbackServerContext*, const ByteBuffer* bytes) override {
+  WriteReactor* WatchMesh(grpc::CallbackServerContext* context, const ByteBuffer* bytes) override {
     const auto request = parse<v1::WatchMeshRequest>(*bytes);
     if (!request) return refused(invalid("the WatchMeshRequest could not be parsed"));
-    if (!host_.knows(AuthorId{request->author()})) return refused(not_joined("WatchMeshRequest", request->author()));
+    const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context);
+    if (!room) return refused(status_of(room.error()));
+    if (!(*room)->host().knows(AuthorId{request->author()})) return refused(not_joined("WatchMeshRequest", request->author()));
     std::optional<Look> look;
     if (request->has_look()) {
       const Result<Look> stated = wire::from_wire(request->look());
       if (!stated) return refused(invalid(stated.error().message));
       look = *stated;
     }
-    MeshStream* stream = MeshStream::launch(std::make_shared<MeshStream>(host_, AuthorId{request->author()}));
-    host_.watch_mesh(*stream, look);
+    MeshStream* stream = MeshStream::launch(std::make_shared<MeshStream>(*room, AuthorId{request->author()}));
+    (*room)->host().watch_mesh(*stream, look);
     return stream;
   }
 
@@ -110,33 +112,38 @@ class WatchServiceImpl final : public WatchBase {
                                      v1::LookFromResponse*) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     const Result<Look> look = wire::from_wire(request->look());
-    if (!host_.knows(AuthorId{request->author()})) {
+    const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context);
+    if (!room) {
+      reactor->Finish(status_of(room.error()));
+    } else if (!(*room)->host().knows(AuthorId{request->author()})) {
       reactor->Finish(not_joined("LookFromRequest", request->author()));
     } else if (!look) {
       reactor->Finish(invalid(look.error().message));
     } else {
-      host_.look(AuthorId{request->author()}, *look);
+      (*room)->host().look(AuthorId{request->author()}, *look);
       reactor->Finish(Status::OK);
     }
     return reactor;
   }
 
-  WriteReactor* WatchCutting(grpc::CallbackServerContext*, const ByteBuffer* bytes) override {
+  WriteReactor* WatchCutting(grpc::CallbackServerContext* context, const ByteBuffer* bytes) override {
     const auto request = parse<v1::WatchCuttingRequest>(*bytes);
     if (!request) return refused(invalid("the WatchCuttingRequest could not be parsed"));
-    if (!host_.knows(AuthorId{request->author()})) return refused(not_joined("WatchCuttingRequest", request->author()));
+    const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context);
+    if (!room) return refused(status_of(room.error()));
+    if (!(*room)->host().knows(AuthorId{request->author()})) return refused(not_joined("WatchCuttingRequest", request->author()));
     const std::chrono::nanoseconds apart{request->most_hz() == 0 ? 0 : 1'000'000'000 / request->most_hz()};
-    CuttingStream* stream = CuttingStream::launch(std::make_shared<CuttingStream>(host_, apart));
-    host_.watch_cutting(*stream);
+    CuttingStream* stream = CuttingStream::launch(std::make_shared<CuttingStream>(*room, apart));
+    (*room)->host().watch_cutting(*stream);
     return stream;
   }
 
  private:
-  RoomHost& host_;
+  Rooms& rooms_;
 };
 
 }  // namespace
 
-std::unique_ptr<grpc::Service> make_watch_service(RoomHost& host) { return std::make_unique<WatchServiceImpl>(host); }
+std::unique_ptr<grpc::Service> make_watch_service(Rooms& rooms) { return std::make_unique<WatchServiceImpl>(rooms); }
 
 }  // namespace osteon

@@ -166,6 +166,8 @@ class Room {
   [[nodiscard]] const std::shared_ptr<ToolBox>& tools() const { return tools_; }
   [[nodiscard]] std::vector<BodyId> bodies() const;  // that exist, in order
   [[nodiscard]] const CutField* find_field(BodyId body) const;  // null: no such body
+  [[nodiscard]] std::vector<BodyId> all_bodies() const;         // those that were taken away too
+  [[nodiscard]] const CutField* any_field(BodyId body) const;   // of one of these
   [[nodiscard]] const CutField& field() const { return bodies_.at(BodyId{0}).field; }  // of the case's bone
   [[nodiscard]] Digest field_hash() const;           // of all bodies
   [[nodiscard]] std::vector<SceneItem> items() const;

@@ -111,6 +111,17 @@ std::vector<BodyId> Room::bodies() const {
 
 const CutField* Room::find_field(BodyId body) const { return exists(body) ? &bodies_.at(body).field : nullptr; }
 
+std::vector<BodyId> Room::all_bodies() const {
+  std::vector<BodyId> all;
+  for (const auto& [id, body] : bodies_) all.push_back(id);
+  return all;
+}
+
+const CutField* Room::any_field(BodyId body) const {
+  const auto found = bodies_.find(body);
+  return found == bodies_.end() ? nullptr : &found->second.field;
+}
+
 Digest Room::field_hash() const {
   std::vector<FieldLeaf> leaves;
   for (const BodyId id : bodies()) {

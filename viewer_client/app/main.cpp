@@ -27,6 +27,8 @@ constexpr const char* kScriptHelp =
     "  wait bodies N                         until the room has so many bodies\n"
     "  wait items N                          until so many guides, pins, screws and implants stand\n"
     "  undo N, redo N                        the newest N events of all; N undo events; says how many there were\n"
+    "  mark LABEL                            gives this moment a name; says its number\n"
+    "  undo to MARK                          all that came after the mark of that number\n"
     "  take-away BODY                        a sawn-off piece\n"
     "  place TOOL near X Y Z [WAY] [on BODY] a guide, pin, screw or implant, on the surface nearest to there\n"
     "  place TOOL at X Y Z WAY [on BODY]     the same, just there; WAY: along X Y Z (into the bone) [across X Y Z]\n"
@@ -49,7 +51,7 @@ constexpr const char* kScriptHelp =
     "SpaceMouse (--spacemouse): the bone follows the cap; first button overview, second tool.";
 
 struct Arguments {
-  std::string server, size = "1280x720", script, screenshot, frame_log, summary;
+  std::string server, room, size = "1280x720", script, screenshot, frame_log, summary;
   double patience_s = 5.0;
   bool space_mouse = false;
 };
@@ -91,6 +93,7 @@ Result<void> run(const Arguments& arguments) {
   Inbox inbox;
   RoomWatchOptions watch_options;
   watch_options.address = arguments.server;
+  watch_options.room = arguments.room;
   watch_options.patience = std::chrono::milliseconds(static_cast<long>(1000.0 * arguments.patience_s));
   watch_options.keep_trying = !scripted;
   const auto seen_from = [size = *window_size](const CameraView& view) { return look_of(view, size.width_px, size.height_px); };
@@ -111,6 +114,8 @@ Result<void> run(const Arguments& arguments) {
           using Asked = std::decay_t<decltype(asked)>;
           if constexpr (std::is_same_v<Asked, UndoLast>) return watch.undo(asked.count);
           if constexpr (std::is_same_v<Asked, RedoLast>) return watch.redo(asked.count);
+          if constexpr (std::is_same_v<Asked, UndoTo>) return watch.undo_to(asked.mark);
+          if constexpr (std::is_same_v<Asked, MarkMoment>) return watch.mark(asked.label);
           if constexpr (std::is_same_v<Asked, TakeAway>) return watch.remove_body(asked.body);
           if constexpr (std::is_same_v<Asked, PlaceTool>) return watch.place(asked.tool, asked.where, asked.body);
           if constexpr (std::is_same_v<Asked, MoveItem>) return watch.move_item(asked.item, asked.where);
@@ -163,6 +168,7 @@ int main(int argc, char** argv) {
   CLI::App app{"Shows the bone of an Osteon server and the tools that work on it.", kProgram};
   app.footer(kScriptHelp);
   app.add_option("--server", arguments.server, "Address of the server, HOST:PORT")->required();
+  app.add_option("--room", arguments.room, "Name of the room; not needed where the server has one");
   app.add_option("--size", arguments.size, "Size of the window in pixels")->capture_default_str();
   app.add_option("--script", arguments.script, "File of commands, - for standard input; its end closes the viewer");
   app.add_option("--screenshot", arguments.screenshot,

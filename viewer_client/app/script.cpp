@@ -192,6 +192,16 @@ Parsed parse_command(std::string_view line) {
     if (verb == "status") return Command(SaveStatus{file});
     return Command(SaveScreenshot{file});
   }
+  if (verb == "mark") {
+    const std::string label = rest_of(line, verb);
+    if (label.empty()) return expected("mark LABEL");
+    return Command(RoomRequest(MarkMoment{label}));
+  }
+  if (verb == "undo" && words.size() == 3 && words[1] == "to") {
+    const auto mark = number<std::uint64_t>(words[2]);
+    if (!mark || *mark == 0) return expected("undo to MARK");
+    return Command(RoomRequest(UndoTo{RoomSeq{*mark}}));
+  }
   if (verb == "undo") return parse_number(words, "undo NUMBER", 1, [](std::uint32_t n) { return UndoLast{n}; });
   if (verb == "redo") return parse_number(words, "redo NUMBER", 1, [](std::uint32_t n) { return RedoLast{n}; });
   if (verb == "take-away") return parse_number(words, "take-away BODY", 0, [](std::uint32_t n) { return TakeAway{BodyId{n}}; });
@@ -200,7 +210,7 @@ Parsed parse_command(std::string_view line) {
   if (verb == "save") return Command(RoomRequest(SaveBone{rest_of(line, verb)}));
   if (verb == "quit" && words.size() == 1) return Command(Quit{});
   return failure(ErrorCode::invalid_input, "there is no command `" + std::string(verb) +
-                                               "`; the commands are wait, look, tool, undo, redo, take-away, place, move, turn, seat, "
+                                               "`; the commands are wait, look, tool, mark, undo, redo, take-away, place, move, turn, seat, "
                                                "remove, save, screenshot, status and quit");
 }
 

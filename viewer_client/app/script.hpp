@@ -50,6 +50,12 @@ struct UndoLast {
 struct RedoLast {
   std::uint32_t count = 1;
 };
+struct UndoTo {
+  RoomSeq mark;
+};
+struct MarkMoment {
+  std::string label;
+};
 struct TakeAway {
   BodyId body;
 };
@@ -77,7 +83,7 @@ struct RemoveItem {
 struct SaveBone {
   std::string file_name;  // empty: the server's own
 };
-using RoomRequest = std::variant<UndoLast, RedoLast, TakeAway, PlaceTool, MoveItem, TurnItem, SeatItem, RemoveItem, SaveBone>;
+using RoomRequest = std::variant<UndoLast, RedoLast, UndoTo, MarkMoment, TakeAway, PlaceTool, MoveItem, TurnItem, SeatItem, RemoveItem, SaveBone>;
 
 using Command = std::variant<WaitForSurface, WaitForSeq, WaitForBodies, WaitForItems, LookAtWhole, LookFrom, LookAtTool,
                              ShowTool, SaveScreenshot, SaveStatus, RoomRequest, Quit>;

@@ -271,6 +271,10 @@ std::optional<Result<void>> Viewer::obey_room(const RoomRequest& request) {
         options_.ask ? options_.ask(request) : failure(ErrorCode::unavailable, "this viewer has no room to ask");
     if (!answer) return Result<void>(tl::unexpected(answer.error()));
     if (std::holds_alternative<SaveBone>(request)) return Result<void>{};
+    if (std::holds_alternative<MarkMoment>(request)) {  // of which nothing is to be seen
+      pending_->line += ": " + answer->said;
+      return Result<void>{};
+    }
     asked_ = *answer;
   }
   if (!surface_shown_ || shown_seq_ < asked_->place) return std::nullopt;

@@ -182,7 +182,7 @@ struct RoomWatch::Impl {
 
 Result<void> RoomWatch::Impl::join(std::chrono::milliseconds patience) {
   auto answer =
-      wire::join_room(options.address, wire::ClientKind::viewer, options.name, patience, [this] { return stopping(); });
+      wire::join_room(options.address, wire::ClientKind::viewer, options.name, patience, [this] { return stopping(); }, options.room);
   if (!answer) return tl::unexpected(answer.error());
   const std::lock_guard lock(mutex);
   joined = std::move(*answer);
@@ -430,6 +430,25 @@ Result<RoomAnswer> RoomWatch::undo(std::uint32_t count) {
   request.set_count(count);
   const auto answer = ask(channel, &v1::RoomService::Stub::Undo, request);
   return answer ? answered(*answer, answer->undone_size()) : tl::unexpected(answer.error());
+}
+
+Result<RoomAnswer> RoomWatch::undo_to(RoomSeq mark) {
+  const auto [channel, author] = impl_->line();
+  v1::UndoRequest request;
+  request.set_author(author);
+  request.set_to_mark(mark.value);
+  const auto answer = ask(channel, &v1::RoomService::Stub::Undo, request);
+  return answer ? answered(*answer, answer->undone_size()) : tl::unexpected(answer.error());
+}
+
+Result<RoomAnswer> RoomWatch::mark(const std::string& label) {
+  const auto [channel, author] = impl_->line();
+  v1::MarkRequest request;
+  request.set_author(author);
+  request.set_label(label);
+  const auto answer = ask(channel, &v1::RoomService::Stub::Mark, request);
+  if (!answer) return tl::unexpected(answer.error());
+  return RoomAnswer{RoomSeq{answer->room_seq()}, {}, "mark " + std::to_string(answer->room_seq())};
 }
 
 Result<RoomAnswer> RoomWatch::redo(std::uint32_t count) {

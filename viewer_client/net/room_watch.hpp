@@ -18,6 +18,7 @@ namespace osteon {
 
 struct RoomWatchOptions {
   std::string address;          // host:port
+  std::string room{};           // which of the server's; empty: the only one that is open
   std::string name = "viewer";  // shown to others
   std::chrono::milliseconds patience{5000};
   // From where the window looks at a bone with these bounds at first; none: it wants all of the bone in full.
@@ -52,6 +53,8 @@ class RoomWatch {
   // What a viewer may ask of the room. They wait for the answer. Errors:
   // invalid_input, not_found (no such tool or item), unavailable (nothing to undo, no answer).
   [[nodiscard]] Result<RoomAnswer> undo(std::uint32_t count);
+  [[nodiscard]] Result<RoomAnswer> undo_to(RoomSeq mark);
+  [[nodiscard]] Result<RoomAnswer> mark(const std::string& label);
   [[nodiscard]] Result<RoomAnswer> redo(std::uint32_t count);
   [[nodiscard]] Result<RoomAnswer> remove_body(BodyId body);
   [[nodiscard]] Result<RoomAnswer> place(const std::string& tool, const ItemPlace& where, BodyId body);

@@ -43,8 +43,8 @@ inline v1::GetStatusResponse status_of(const wire::JoinedRoom& room) {
 class Surgeon {
  public:
   Surgeon(const std::string& address, const std::filesystem::path& cache, const std::string& fast_path = {},
-          const std::string& room = {}) {
-    auto joined = RoomSession::join({.address = address, .room = room, .cache = cache, .fast_path = fast_path}, {});
+          const std::string& in_room = {}) {
+    auto joined = RoomSession::join({.address = address, .room = in_room, .cache = cache, .fast_path = fast_path}, {});
     EXPECT_TRUE(joined.has_value()) << joined.error().message;
     session_.emplace(std::move(*joined));
     replica_.emplace(session_->bone(), BodyId{0}, session_->tools());
@@ -159,7 +159,7 @@ inline bool settled(const std::vector<Surgeon*>& holders) {
 // What a viewer holds of the surface.
 class MeshReader {
  public:
-  explicit MeshReader(const std::string& address) : room_(join(address, wire::ClientKind::viewer)) {
+  explicit MeshReader(const std::string& address, const std::string& room = {}) : room_(join(address, wire::ClientKind::viewer, room)) {
     v1::WatchMeshRequest request;
     request.set_author(room_.author.value);
     stream_ = v1::WatchService::NewStub(room_.channel)->WatchMesh(&context_, request);

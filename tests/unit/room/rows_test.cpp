@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <limits>
 #include <random>
 
 #include "server/net/journal_rows.hpp"
@@ -192,8 +193,16 @@ TEST(RoomReplay, RefusesARowThatNamesWhatIsNotThere) {
   SceneItem item;
   item.id = 1;
   item.tool = tool_named("guide-1").hash();
-  SceneItem of_gone_body = item;
+  item.set_at = 3;
+  SceneItem of_gone_body = item, of_another_number = item, of_another_place = item;
   of_gone_body.body = BodyId{3};
+  of_another_number.id = 2;
+  of_another_place.set_at = 2;
+  const auto mask_at = [](int level, Coord origin) {
+    return std::make_shared<const std::vector<FieldLeaf>>(std::vector<FieldLeaf>{{BodyId{0}, level, origin, {5}}});
+  };
+  constexpr std::int32_t kFurthest = std::numeric_limits<std::int32_t>::max() - 7;
+  const CoordBox everywhere{{INT32_MIN, INT32_MIN, INT32_MIN}, {INT32_MAX, INT32_MAX, INT32_MAX}};
   const decltype(RoomRow::what) impossible[] = {
       CutRow{of_nobody}, CutRow{of_no_tool}, CutRow{of_no_body}, CutRow{too_early}, CutRow{far},
       JoinRow{hand, MemberKind::surgeon, 0, {}}, JoinRow{AuthorId{7}, MemberKind::watcher, 0, {}},
@@ -201,16 +210,65 @@ TEST(RoomReplay, RefusesARowThatNamesWhatIsNotThere) {
       RejectionRow{hand, 2, {}, static_cast<Rejection>(kRejections)},
       SplitRow{BodyId{3}, whole, {}}, SplitRow{BodyId{0}, torn, {}}, SplitRow{BodyId{0}, nullptr, {}},
       SplitRow{BodyId{0}, whole, {{BodyId{5}, {}, whole}}},
+      SplitRow{BodyId{0}, mask_at(0, {kFurthest, 0, 0}), {}}, SplitRow{BodyId{0}, mask_at(2, {0, -4096, 0}), {}},
+      SplitRow{BodyId{0}, whole, {{BodyId{1}, {}, mask_at(1, {0, 0, kFurthest})}}},
+      SplitRow{BodyId{0}, whole, {{BodyId{1}, everywhere, whole}}},
       UndoRow{{}}, UndoRow{{RoomSeq{1}}}, UndoRow{{RoomSeq{9}}}, UndoRow{{RoomSeq{2}, RoomSeq{2}}},
       RedoRow{{}, {}}, RedoRow{{RoomSeq{2}}, {}}, RedoRow{{RoomSeq{8}}, {}},
       RemoveBodyRow{BodyId{0}}, RemoveBodyRow{BodyId{6}},
       ItemRow{1, std::nullopt}, ItemRow{2, item}, ItemRow{1, of_gone_body},
+      ItemRow{1, of_another_number}, ItemRow{1, of_another_place},
       ToolRow{tool_named("guide-1")}, MarkRow{""}, MarkRow{std::string(kMostLabelBytes + 1, 'x')}};
   for (std::size_t i = 0; i < std::size(impossible); ++i) {
     EXPECT_FALSE(room.replay({RoomSeq{3}, 1s, hand, impossible[i]})) << "row " << i;
     EXPECT_EQ(room.room_hash(), before) << "row " << i;
   }
   EXPECT_TRUE(room.replay({RoomSeq{3}, 1s, hand, CutRow{cuts[1]}}));
+}
+
+// Not only where the sum of two times would overflow.
+TEST(RoomReplay, RefusesATimeBeforeTheLastRowsOrBeyondAnyRooms) {
+  Room room(test_block());
+  const AuthorId hand = room.join(MemberKind::surgeon);
+  ASSERT_TRUE(room.replay({RoomSeq{2}, 2s, hand, MarkRow{"here"}}));
+  const Digest before = room.room_hash();
+  for (const std::chrono::nanoseconds at : {std::chrono::nanoseconds::min(), std::chrono::nanoseconds(-1s), std::chrono::nanoseconds(1999ms),
+                                            std::chrono::nanoseconds::max()}) {
+    EXPECT_FALSE(room.replay({RoomSeq{3}, at, hand, MarkRow{"there"}})) << at.count();
+    EXPECT_EQ(room.room_hash(), before);
+    EXPECT_EQ(room.time(), 2s);
+  }
+  EXPECT_TRUE(room.replay({RoomSeq{3}, 2s, hand, MarkRow{"there"}})) << "two rows of one moment";
+}
+
+TEST(RoomReplay, RefusesARedoThatNamesOneEventTwice) {
+  Room room(test_block());
+  const AuthorId hand = room.join(MemberKind::surgeon);
+  const auto cuts = strokes(hand, 2, 4);
+  ASSERT_TRUE(room.submit(cuts[0]) && room.submit(cuts[1]));
+  ASSERT_TRUE(room.undo_last(hand, 1, {}) && room.undo_last(hand, 1, {}));
+  const RoomSeq first{2}, second{3}, undo{4}, next_undo{5};
+  const Digest before = room.room_hash();
+  for (const RedoRow& redo : {RedoRow{{undo, undo}, {second}}, RedoRow{{undo, next_undo}, {first, second}}, RedoRow{{undo}, {second, second}},
+                              RedoRow{{next_undo, undo}, {second, first}}}) {
+    EXPECT_FALSE(room.replay({RoomSeq{6}, 1s, hand, redo}));
+    EXPECT_EQ(room.room_hash(), before);
+  }
+  EXPECT_TRUE(room.replay({RoomSeq{6}, 1s, hand, RedoRow{{next_undo, undo}, {first, second}}}));
+}
+
+TEST(RoomReplay, TakesNoMoreItemsThanTheRoomGives) {
+  Room room(test_block());
+  SceneItem item;
+  item.tool = tool_named("guide-1").hash();
+  for (item.id = 1; item.id <= kMostItems; ++item.id) {
+    item.set_at = item.id;
+    ASSERT_TRUE(room.replay({RoomSeq{item.id}, 1s, {}, ItemRow{item.id, item}})) << item.id;
+  }
+  item.set_at = item.id;
+  EXPECT_FALSE(room.replay({RoomSeq{item.id}, 1s, {}, ItemRow{item.id, item}}));
+  --item.id;
+  EXPECT_TRUE(room.replay({RoomSeq{kMostItems + 1}, 1s, {}, ItemRow{item.id, item}})) << "one that is there moves";
 }
 
 TEST(RoomLease, FallsWithARejectionForItsAuthorAlone) {

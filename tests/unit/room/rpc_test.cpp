@@ -178,7 +178,7 @@ TEST_F(RoomRpc, SavesOnRequestAndAtTheEnd) {
     EXPECT_EQ(call(&v1::RoomService::Stub::SaveFields, request, saved).error_code(), grpc::StatusCode::INVALID_ARGUMENT) << name;
   }
   const Digest hash = hand->hash();
-  const RoomServerSummary summary = server_->stop();
+  const RoomSummary summary = server_->stop();
   server_.reset();
   EXPECT_EQ(field_hash(summary.fields.leaves, test_block().pitch_mm()), hash);
 }
@@ -300,7 +300,7 @@ TEST_F(RoomRpc, ThePieceOfTheLastCutIsFoundBeforeTheBoneIsSaved) {
   redo.set_count(1);
   v1::RedoResponse redone;
   ASSERT_TRUE(call(&v1::RoomService::Stub::Redo, redo, redone).ok());
-  const RoomServerSummary summary = server_->stop();
+  const RoomSummary summary = server_->stop();
   server_.reset();
   EXPECT_EQ(summary.bone.bodies.size(), 2u);
   EXPECT_EQ(summary.fields.bodies.size(), 2u);

@@ -1,0 +1,469 @@
+#include "server/net/rooms.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <deque>
+#include <future>
+#include <system_error>
+#include <utility>
+
+#include "common/core/check.hpp"
+#include "common/runtime/files.hpp"
+#include "common/runtime/log.hpp"
+#include "server/net/journal_rows.hpp"
+#include "server/net/room_files.hpp"
+
+namespace osteon {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kEnding = ".journal";
+constexpr const char* kOpenList = "open-rooms";  // in the folder: the names of those that are open, a line each
+constexpr std::chrono::seconds kUpkeepEvery{5};
+// Rows that a playback reads ahead.
+constexpr std::uint64_t kRowsAhead = 256;
+
+bool is_name(const std::string& name) {
+  const auto fits = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
+  };
+  return !name.empty() && name.size() <= 64 && std::ranges::all_of(name, fits) && name.front() != '-';
+}
+
+Error no_such_room(const std::string& name) {
+  return {ErrorCode::not_found, "there is no room " + name + "; osteon-server rooms list shows which there are"};
+}
+Error not_open(const std::string& name) {
+  return {ErrorCode::unavailable, "the room " + name + " is closed; osteon-server rooms resume " + name + " opens it"};
+}
+Error not_kept(const std::string& name) {
+  return {ErrorCode::unavailable, "the room " + name + " is not kept in a journal; start osteon-server with --rooms FOLDER"};
+}
+
+std::uint64_t new_server_epoch() {
+  // Without a journal that counts, the calendar is what rises from one opening to the next.
+  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
+  return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(since_1970).count());
+}
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    if (end > at) lines.push_back(text.substr(at, end - at));
+    at = end + 1;
+  }
+  return lines;
+}
+
+// Reads ahead in a room's journal. The room stays in memory as long as it is shown.
+class RowsAgain {
+ public:
+  RowsAgain(std::shared_ptr<OpenRoom> room, RoomSeq from, RoomSeq to) : room_(std::move(room)), next_(from), to_(to) {}
+  std::optional<RoomRow> operator()() {
+    if (ahead_.empty() && next_ <= to_) {
+      const RoomSeq last{std::min(to_.value, next_.value + kRowsAhead - 1)};
+      const Result<void> read = room_->keeper()->read(next_, last, [&](const RoomRow& row) {
+        ahead_.push_back(row);
+        return true;
+      });
+      if (!read) log::error("a room's rows cannot be shown", {{"room", room_->name}, {"reason", read.error().message}});
+      next_ = read ? RoomSeq{last.value + 1} : RoomSeq{to_.value + 1};
+    }
+    if (ahead_.empty()) return std::nullopt;
+    RoomRow row = std::move(ahead_.front());
+    ahead_.pop_front();
+    return row;
+  }
+
+ private:
+  std::shared_ptr<OpenRoom> room_;
+  RoomSeq next_;
+  const RoomSeq to_;
+  std::deque<RoomRow> ahead_;
+};
+
+}  // namespace
+
+OpenRoom::OpenRoom(std::string n, ServedCase served, Room room, const RoomsOptions& options,
+                   const std::function<void(double)>& progress, std::unique_ptr<RoomKeeper> keeper, std::optional<Playback> playback)
+    : name(std::move(n)),
+      case_folder(std::move(served.folder)),
+      server_epoch(keeper ? keeper->server_epoch() : new_server_epoch()),
+      keeper_(std::move(keeper)) {
+  // What took long to make again should not take so long the next time.
+  constexpr std::uint64_t kLongReplay = 5000;
+  if (keeper_ && keeper_->evaluated() > kLongReplay)
+    if (const Result<void> kept = keeper_->checkpoint(room.room_seq(), room.all_leaves()); !kept)
+      log::warn("no checkpoint", {{"room", name}, {"reason", kept.error().message}});
+  host_ = std::make_unique<RoomHost>(std::move(room), options.rates, progress, options.detail, keeper_.get(), std::move(playback));
+}
+
+void OpenRoom::end_streams(const std::string& why) {
+  host_->find_pieces();
+  host_->end_streams(why);
+}
+
+RoomSummary OpenRoom::close() {
+  host_->stop();
+  if (keeper_) {
+    // Nothing is lost where this fails: the next opening takes longer.
+    Result<void> done = keeper_->checkpoint(host_->room_seq(), host_->all_leaves());
+    if (done) done = keeper_->close();
+    if (!done) log::warn("the journal was not closed cleanly", {{"room", name}, {"reason", done.error().message}});
+  }
+  return {host_->bone_status(), host_->health(), save.empty() ? SavedFields{} : host_->saved_fields(), host_->surface_hash()};
+}
+
+void OpenRoom::keep_up() {
+  if (!keeper_) return;
+  if (Clock::now() - forgotten_ > std::chrono::hours(24)) {
+    forgotten_ = Clock::now();
+    if (const Result<std::size_t> gone = keeper_->forget_old(); !gone)
+      log::warn("nobody was forgotten", {{"room", name}, {"reason", gone.error().message}});
+  }
+  const bool due = CheckpointPolicy{}.is_due(keeper_->changes_since_checkpoint(), Clock::now() - newest_checkpoint_);
+  if (!due || checkpointing_.exchange(true)) return;
+  newest_checkpoint_ = Clock::now();
+  host_->run_slowly([this] {
+    const RoomHost::Leaves now = host_->leaves_now();
+    if (const Result<void> kept = keeper_->checkpoint(now.place, now.leaves); !kept)
+      log::warn("no checkpoint", {{"room", name}, {"reason", kept.error().message}});
+    checkpointing_ = false;
+  });
+}
+
+Rooms::Rooms(RoomsOptions options) : options_(std::move(options)) {
+  OSTEON_CHECK(!options_.cases.empty());
+  jobs.start();
+  files.start();
+  upkeep_ = std::thread([this] { run_upkeep(); });
+}
+
+Rooms::~Rooms() {
+  stop_upkeep();
+  (void)close_all();
+}
+
+void Rooms::run_upkeep() {
+  std::unique_lock lock(mutex_);
+  while (!upkeep_wake_.wait_for(lock, kUpkeepEvery, [&] { return upkeep_end_; })) {
+    lock.unlock();
+    for (const std::shared_ptr<OpenRoom>& room : open_rooms()) room->keep_up();
+    lock.lock();
+  }
+}
+
+void Rooms::stop_upkeep() {
+  {
+    const std::lock_guard lock(mutex_);
+    upkeep_end_ = true;
+    upkeep_wake_.notify_all();
+  }
+  if (upkeep_.joinable()) upkeep_.join();
+}
+
+Result<std::shared_ptr<OpenRoom>> Rooms::find(const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  if (const auto found = open_.find(name); found != open_.end()) return found->second;
+  if (!name.empty()) return kept_file(name) ? tl::unexpected(not_open(name)) : tl::unexpected(no_such_room(name));
+  if (open_.size() == 1) return open_.begin()->second;
+  if (open_.empty()) return failure(ErrorCode::unavailable, "no room is open here; osteon-server rooms create NAME makes one");
+  std::string names;
+  for (const auto& [one, room] : open_) names += (names.empty() ? "" : ", ") + one;
+  return failure(ErrorCode::unavailable, "several rooms are open here: " + names + "; name one with --room");
+}
+
+std::vector<std::shared_ptr<OpenRoom>> Rooms::open_rooms() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::shared_ptr<OpenRoom>> rooms;
+  for (const auto& [name, room] : open_) rooms.push_back(room);
+  return rooms;
+}
+
+const ServedCase* Rooms::find_case(const Digest& hash) const {
+  const auto found = std::ranges::find_if(options_.cases, [&](const ServedCase& one) { return one.bone.hash() == hash; });
+  return found == options_.cases.end() ? nullptr : &*found;
+}
+
+fs::path Rooms::journal_of(const std::string& name) const { return options_.folder / (name + kEnding); }
+
+Result<fs::path> Rooms::kept_file(const std::string& name) const {
+  std::error_code ignored;
+  if (is_name(name) && !options_.folder.empty() && fs::exists(journal_of(name), ignored)) return journal_of(name);
+  return tl::unexpected(no_such_room(name));
+}
+
+std::vector<RoomListing> Rooms::list() const {
+  std::map<std::string, RoomListing> all;
+  const auto tell_origin = [&](RoomListing& listing, const RoomGenesis& genesis) {
+    listing.case_hash = genesis.case_hash;
+    listing.parent = genesis.parent;
+    listing.parent_room_seq = genesis.parent_room_seq;
+    if (const ServedCase* served = find_case(genesis.case_hash)) listing.case_title = served->bone.info().title;
+  };
+  for (const std::shared_ptr<OpenRoom>& room : open_rooms()) {
+    RoomListing& listing = all[room->name];
+    const HostHealth health = room->host().health();
+    if (room->keeper()) tell_origin(listing, room->keeper()->genesis());
+    listing.name = room->name;
+    listing.open = true;
+    listing.kept = room->keeper() != nullptr;
+    listing.case_hash = room->host().bone().hash();
+    listing.case_title = room->host().bone().info().title;
+    listing.room_seq = health.room_seq;
+    listing.sessions = health.sessions;
+    listing.watchers = health.mesh_streams + health.cutting_streams;
+    if (room->shows) {
+      listing.replay = true;
+      listing.parent = room->shows->first;
+      listing.parent_room_seq = room->shows->second;
+    }
+  }
+  std::error_code ignored;
+  if (!options_.folder.empty())
+    for (const auto& entry : fs::directory_iterator(options_.folder, ignored)) {
+      const std::string name = entry.path().stem().string();
+      if (entry.path().extension() != kEnding || !is_name(name) || all.contains(name)) continue;
+      RoomListing& listing = all[name];
+      listing.name = name;
+      listing.kept = true;
+      if (const Result<RoomGenesis> genesis = peek_genesis(entry.path())) tell_origin(listing, *genesis);
+    }
+  std::vector<RoomListing> listed;
+  for (auto& [name, listing] : all) listed.push_back(std::move(listing));
+  return listed;
+}
+
+Result<void> Rooms::check_new(const std::string& name) const {
+  if (!is_name(name))
+    return failure(ErrorCode::invalid_input, "\"" + name + "\" is no name of a room; use letters, digits, - and _, at most 64");
+  const std::lock_guard lock(mutex_);
+  if (open_.contains(name) || kept_file(name)) return failure(ErrorCode::exists, "there is a room " + name + "; choose another name");
+  return {};
+}
+
+std::shared_ptr<OpenRoom> Rooms::take_in(std::shared_ptr<OpenRoom> room) {
+  {
+    const std::lock_guard lock(mutex_);
+    open_[room->name] = room;
+  }
+  note_open();
+  log::info("room open", {{"room", room->name}, {"room_seq", room->host().room_seq().value}, {"kept", room->keeper() != nullptr}});
+  return room;
+}
+
+std::shared_ptr<OpenRoom> Rooms::take_out(const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  const auto found = open_.find(name);
+  if (found == open_.end()) return nullptr;
+  std::shared_ptr<OpenRoom> room = std::move(found->second);
+  open_.erase(found);
+  return room;
+}
+
+void Rooms::note_open() const {
+  if (options_.folder.empty()) return;
+  std::string names;
+  for (const std::shared_ptr<OpenRoom>& room : open_rooms())
+    if (room->keeper() && kept_file(room->name)) names += room->name + "\n";
+  if (const Result<void> written = write_file(options_.folder / kOpenList, names); !written)
+    log::warn("which rooms are open was not noted", {{"reason", written.error().message}});
+}
+
+Result<std::shared_ptr<OpenRoom>> Rooms::add(const std::string& name, Room room, std::unique_ptr<RoomKeeper> keeper, fs::path save,
+                                             const std::function<void(double)>& progress) {
+  const std::lock_guard changing(changing_);
+  if (Result<void> may = check_new(name); !may) return tl::unexpected(may.error());
+  const ServedCase* served = find_case(room.bone().hash());
+  OSTEON_CHECK(served);
+  auto made = std::make_shared<OpenRoom>(name, *served, std::move(room), options_, progress, std::move(keeper));
+  made->save = std::move(save);
+  return take_in(std::move(made));
+}
+
+void Rooms::resume_all(const std::function<void(double)>& progress) {
+  const Result<std::string> noted = read_file(options_.folder / kOpenList);
+  if (!noted) return;
+  const std::vector<std::string> names = lines_of(*noted);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const auto part = [&](double fraction) { progress((static_cast<double>(i) + fraction) / static_cast<double>(names.size())); };
+    const Result<std::shared_ptr<OpenRoom>> room = resume(names[i], part);
+    if (!room) log::error("a room cannot be opened", {{"room", names[i]}, {"reason", room.error().message}});
+  }
+}
+
+Result<std::shared_ptr<OpenRoom>> Rooms::create(const std::string& name, const Digest* case_hash) {
+  const std::lock_guard changing(changing_);
+  if (Result<void> may = check_new(name); !may) return tl::unexpected(may.error());
+  if (!case_hash && options_.cases.size() > 1)
+    return failure(ErrorCode::invalid_input, "the server has several cases; say which with --case-hash");
+  const ServedCase* served = case_hash ? find_case(*case_hash) : &options_.cases.front();
+  if (!served) return failure(ErrorCode::not_found, "the server has no case " + to_hex(*case_hash));
+  if (!options_.folder.empty()) return open(name, *served, true, {});
+  return take_in(std::make_shared<OpenRoom>(name, *served, Room(served->bone, options_.limits, options_.tools()), options_,
+                                            std::function<void(double)>{}, nullptr));
+}
+
+Result<std::shared_ptr<OpenRoom>> Rooms::resume(const std::string& name, const std::function<void(double)>& progress) {
+  const std::lock_guard changing(changing_);
+  if (const Result<std::shared_ptr<OpenRoom>> already = find(name); already && !name.empty()) return already;
+  const Result<fs::path> file = kept_file(name);
+  if (!file) return tl::unexpected(file.error());
+  const Result<RoomGenesis> genesis = peek_genesis(*file);
+  if (!genesis) return tl::unexpected(genesis.error());
+  const ServedCase* served = find_case(genesis->case_hash);
+  if (!served)
+    return failure(ErrorCode::unsupported, "the room " + name + " is of the case " + to_hex(genesis->case_hash) +
+                                               ", which the server was not given with --case");
+  return open(name, *served, false, progress);
+}
+
+// [with changing_]
+Result<std::shared_ptr<OpenRoom>> Rooms::open(const std::string& name, const ServedCase& served, bool is_new,
+                                              const std::function<void(double)>& progress) {
+  RoomKeeper::Options keeping{.name = name, .limits = options_.limits, .tools = {}, .journal = {}, .today = {}};
+  keeping.retention_days = options_.retention_days;
+  if (is_new) keeping.tools = options_.tools();
+  // Half of the work is the events, half the surface, more or less.
+  const auto half = [&](double begin) {
+    return [&progress, begin](double fraction) {
+      if (progress) progress(begin + fraction / 2);
+    };
+  };
+  Result<KeptRoom> kept = RoomKeeper::open(journal_of(name), served.bone, keeping, half(0));
+  if (!kept) return tl::unexpected(kept.error());
+  return take_in(std::make_shared<OpenRoom>(name, served, std::move(kept->room), options_, half(0.5), std::move(kept->keeper)));
+}
+
+Result<RoomSummary> Rooms::close(const std::string& name) {
+  const std::lock_guard changing(changing_);
+  const std::shared_ptr<OpenRoom> room = take_out(name);
+  if (!room) return kept_file(name) ? tl::unexpected(not_open(name)) : tl::unexpected(no_such_room(name));
+  room->end_streams("the room " + name + " was closed");
+  RoomSummary summary = room->close();
+  note_open();
+  log::info("room closed", {{"room", name}, {"room_seq", summary.bone.room_seq.value}});
+  return summary;
+}
+
+Result<std::shared_ptr<OpenRoom>> Rooms::branch(const std::string& name, const std::string& new_name, RoomSeq to) {
+  {
+    const std::lock_guard changing(changing_);
+    if (Result<void> may = check_new(new_name); !may) return tl::unexpected(may.error());
+    if (options_.folder.empty()) return tl::unexpected(not_kept(name));
+    const Result<std::shared_ptr<OpenRoom>> from = find(name);
+    if (from && !(*from)->keeper()) return tl::unexpected(not_kept(name));
+    const Result<fs::path> file = from ? Result<fs::path>(fs::path{}) : kept_file(name);
+    if (!file) return tl::unexpected(file.error());
+    const Result<JournalHead> made = from ? (*from)->keeper()->branch(journal_of(new_name), to, new_name)
+                                          : branch_journal(*file, journal_of(new_name), to, new_name);
+    if (!made) return tl::unexpected(made.error());
+  }
+  return resume(new_name);
+}
+
+Result<std::shared_ptr<OpenRoom>> Rooms::replay(const std::string& name, const std::string& new_name, RoomSeq from, RoomSeq to,
+                                                double speed) {
+  const std::lock_guard changing(changing_);
+  if (Result<void> may = check_new(new_name); !may) return tl::unexpected(may.error());
+  if (!(speed >= 0 && speed <= 1e6)) return failure(ErrorCode::invalid_input, "the speed is not between 0 and 1000000");
+  const Result<std::shared_ptr<OpenRoom>> source = find(name);
+  if (!source) return tl::unexpected(source.error());
+  RoomKeeper* keeper = (*source)->keeper();
+  if (!keeper) return tl::unexpected(not_kept(name));
+  const RoomSeq head = keeper->head().place;
+  const RoomSeq last = to ? to : head;
+  if (last > head || from > last)
+    return failure(ErrorCode::invalid_input, "events " + std::to_string(from.value) + " to " + std::to_string(last.value) +
+                                                 " are not among the " + std::to_string(head.value) + " of room " + name);
+  const ServedCase* served = find_case(keeper->genesis().case_hash);
+  OSTEON_CHECK(served);
+  Result<Room> room = begin_room(served->bone, keeper->genesis(), options_.limits);
+  if (!room) return tl::unexpected(room.error());
+  Result<void> happened;
+  const Result<void> read = !from ? Result<void>{} : keeper->read(RoomSeq{1}, from, [&](const RoomRow& row) {
+    happened = room->replay(row);
+    return happened.has_value();
+  });
+  if (!happened) return tl::unexpected(happened.error());
+  if (!read) return tl::unexpected(read.error());
+  (void)room->take_changes();
+  Playback playback{RowsAgain(*source, RoomSeq{from.value + 1}, last), speed};
+  auto shown = std::make_shared<OpenRoom>(new_name, *served, std::move(*room), options_, std::function<void(double)>{}, nullptr,
+                                          std::move(playback));
+  shown->shows = {name, last};
+  return take_in(std::move(shown));
+}
+
+Result<std::vector<std::string>> Rooms::remove(const std::string& name, bool with_branches) {
+  std::vector<std::string> names{name};
+  if (const Result<fs::path> file = kept_file(name)) {
+    // Only a room's own keeper can look into a journal that is in use.
+    const auto has = [this](const fs::path& of, const JournalHead& head) {
+      const Result<std::shared_ptr<OpenRoom>> in_use = find(of.stem().string());
+      return in_use ? (*in_use)->keeper()->has_head(head) : has_head(of, head);
+    };
+    const Result<std::vector<RoomFile>> branches = branches_of(options_.folder, *file, has);
+    if (!branches) return tl::unexpected(branches.error());
+    for (const RoomFile& branch : *branches) names.push_back(branch.file.stem().string());
+    if (names.size() > 1 && !with_branches) {
+      std::string list;
+      for (std::size_t i = 1; i < names.size(); ++i) list += (i > 1 ? ", " : "") + names[i];
+      return failure(ErrorCode::unavailable, "the room " + name + " has branches, which hold what it was: " + list +
+                                                 "; say --with-branches to delete them too");
+    }
+  } else if (!find(name)) {
+    return tl::unexpected(file.error());
+  }
+  std::vector<std::string> deleted;
+  // Those that hang on others first: where this is interrupted, what is left is still known as a branch.
+  for (auto one = names.rbegin(); one != names.rend(); ++one) {
+    if (find(*one))
+      if (const Result<RoomSummary> closed = close(*one); !closed) return tl::unexpected(closed.error());
+    const std::lock_guard changing(changing_);
+    if (const Result<fs::path> file = kept_file(*one))
+      if (const auto gone = delete_room(*file, false); !gone) return tl::unexpected(gone.error());
+    deleted.push_back(*one);
+    log::info("room deleted", {{"room", *one}});
+  }
+  return deleted;
+}
+
+Result<RoomReport> Rooms::verify(const std::string& name) {
+  const Result<std::shared_ptr<OpenRoom>> room = find(name);
+  if (!room) return tl::unexpected(room.error());
+  if (!(*room)->keeper()) return tl::unexpected(not_kept(name));
+  std::promise<BoneStatus> bone;
+  (*room)->host().run_slowly([&] { bone.set_value((*room)->host().bone_status()); });
+  const BoneStatus status = bone.get_future().get();
+  // What is decided is kept a moment later.
+  while ((*room)->keeper()->head().place < status.room_seq && !(*room)->host().stopped())
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  return (*room)->keeper()->verify((*room)->host().bone(), BoneAt{status.room_seq, status.field_hash});
+}
+
+Result<JournalHead> Rooms::back_up(const std::string& name, const std::string& file_name, fs::path& file) {
+  const Result<std::shared_ptr<OpenRoom>> room = find(name);
+  if (!room) return tl::unexpected(room.error());
+  if (!(*room)->keeper() || options_.folder.empty()) return tl::unexpected(not_kept(name));
+  // A client names no folder: it may not write elsewhere on the server's disk.
+  const fs::path plain = file_name;
+  if (plain != plain.filename() || plain.extension() != ".backup" || !is_name(plain.stem().string()))
+    return failure(ErrorCode::invalid_input, "\"" + file_name + "\" is not a plain name that ends in .backup");
+  file = options_.folder / plain;
+  return (*room)->keeper()->backup(file);
+}
+
+std::map<std::string, RoomSummary> Rooms::close_all() {
+  const std::lock_guard changing(changing_);
+  std::map<std::string, RoomSummary> summaries;
+  for (const std::shared_ptr<OpenRoom>& room : open_rooms()) {
+    (void)take_out(room->name);
+    summaries.emplace(room->name, room->close());
+  }
+  return summaries;
+}
+
+}  // namespace osteon

@@ -1,0 +1,153 @@
+// The rooms of one server process: made, opened, closed, branched, shown again, checked, copied and deleted by name.
+#pragma once
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "common/core/result.hpp"
+#include "common/tools/tool_box.hpp"
+#include "common/volume/case.hpp"
+#include "server/net/job_thread.hpp"
+#include "server/net/room_files.hpp"
+#include "server/net/room_host.hpp"
+#include "server/net/room_keeper.hpp"
+
+namespace osteon {
+
+struct RoomSummary {
+  BoneStatus bone;
+  HostHealth health;
+  SavedFields fields;   // of the bone; empty where the room is not to be saved
+  Digest surface_hash;  // equal to every viewer's that has shown room_seq
+};
+
+struct ServedCase {
+  Case bone;
+  std::filesystem::path folder;  // that clients are sent
+};
+
+struct RoomsOptions {
+  std::vector<ServedCase> cases;      // at least one
+  std::filesystem::path folder{};     // of the journals NAME.journal; empty: rooms made here end with the process
+  CutLimits limits{};
+  std::function<std::shared_ptr<ToolBox>()> tools = builtin_tool_box;  // that a new room begins with: a box of its own
+  HostRates rates{};
+  Detail detail = Detail::automatic;
+  int retention_days = 0;             // after which it is forgotten who somebody was; 0: never
+};
+
+// A room that is open. Streams and calls hold it, so that it is there until the last of them is over.
+class OpenRoom {
+ public:
+  OpenRoom(std::string name, ServedCase served, Room room, const RoomsOptions& options,
+           const std::function<void(double)>& progress, std::unique_ptr<RoomKeeper> keeper, std::optional<Playback> playback = {});
+
+  const std::string name;
+  const std::filesystem::path case_folder;
+  std::filesystem::path save;         // where the cut fields are written on request; empty: nowhere
+  const std::uint64_t server_epoch;   // rises with every opening
+  std::optional<std::pair<std::string, RoomSeq>> shows;  // of a playback: which room, up to where
+
+  [[nodiscard]] RoomHost& host() { return *host_; }
+  [[nodiscard]] RoomKeeper* keeper() { return keeper_.get(); }  // null: it is lost when it is closed
+  // Tells every stream why it ends.
+  void end_streams(const std::string& why);
+  // Afterwards nothing changes any more; the journal is closed cleanly, with a checkpoint.
+  RoomSummary close();
+  // [upkeep] Writes a checkpoint where the next opening would take long without, and forgets whom it is time to forget.
+  void keep_up();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  std::unique_ptr<RoomKeeper> keeper_;  // outlives the host, which writes to it
+  std::unique_ptr<RoomHost> host_;
+  std::atomic<bool> checkpointing_{false};
+  Clock::time_point newest_checkpoint_ = Clock::now(), forgotten_ = Clock::now();  // of upkeep
+};
+
+struct RoomListing {
+  std::string name;
+  bool open = false, kept = false, replay = false;
+  Digest case_hash;
+  std::string case_title;     // empty: the server has no such case
+  RoomSeq room_seq;           // of an open one, as the next two
+  std::size_t sessions = 0, watchers = 0;
+  std::string parent;         // of a branch or a playback
+  RoomSeq parent_room_seq;
+};
+
+// Any thread. What makes, opens, closes, copies or deletes takes long and runs one at a time. Errors: not_found (no such
+// room), exists (there is one of that name), invalid_input (not a name; a place that the room has not reached), unavailable
+// (closed, or not kept), and those of RoomKeeper.
+class Rooms {
+ public:
+  explicit Rooms(RoomsOptions options);
+  ~Rooms();
+  Rooms(const Rooms&) = delete;
+  Rooms& operator=(const Rooms&) = delete;
+
+  // The open room of that name; without a name the only one that is open. The error says which there are.
+  [[nodiscard]] Result<std::shared_ptr<OpenRoom>> find(const std::string& name) const;
+  [[nodiscard]] std::vector<std::shared_ptr<OpenRoom>> open_rooms() const;  // in the order of their names
+  [[nodiscard]] const ServedCase* find_case(const Digest& hash) const;
+  [[nodiscard]] std::vector<RoomListing> list() const;
+
+  // A room that was made elsewhere, with its keeper. `save`: see OpenRoom. `progress` hears how far its first surface is.
+  Result<std::shared_ptr<OpenRoom>> add(const std::string& name, Room room, std::unique_ptr<RoomKeeper> keeper,
+                                        std::filesystem::path save, const std::function<void(double)>& progress);
+  // All that were open when the folder was last left, however that was. Those that cannot be opened are logged.
+  void resume_all(const std::function<void(double)>& progress);
+  // `case_hash` null: of the only case.
+  Result<std::shared_ptr<OpenRoom>> create(const std::string& name, const Digest* case_hash);
+  Result<std::shared_ptr<OpenRoom>> resume(const std::string& name, const std::function<void(double)>& progress = {});
+  Result<RoomSummary> close(const std::string& name);
+  // All that `name` was up to that event, null for all.
+  Result<std::shared_ptr<OpenRoom>> branch(const std::string& name, const std::string& new_name, RoomSeq to);
+  // Shows `name`, open or closed, from one event, null for its beginning, to another, null for its last.
+  Result<std::shared_ptr<OpenRoom>> replay(const std::string& name, const std::string& new_name, RoomSeq from, RoomSeq to,
+                                           double speed);
+  // The names of those that are gone. Error unavailable: it has branches, and they are not to go too.
+  Result<std::vector<std::string>> remove(const std::string& name, bool with_branches);
+  // Of an open room, while it is cut.
+  Result<RoomReport> verify(const std::string& name);
+  Result<JournalHead> back_up(const std::string& name, const std::string& file_name, std::filesystem::path& file);
+
+  void stop_upkeep();                               // no checkpoint is written any more
+  [[nodiscard]] std::map<std::string, RoomSummary> close_all();  // those that are open stay so in the folder's list
+
+  // For calls that take long.
+  JobThread jobs;   // whatever changes the rooms
+  JobThread files;  // what only reads a case's files
+
+ private:
+  [[nodiscard]] std::filesystem::path journal_of(const std::string& name) const;
+  [[nodiscard]] Result<void> check_new(const std::string& name) const;
+  [[nodiscard]] Result<std::filesystem::path> kept_file(const std::string& name) const;
+  Result<std::shared_ptr<OpenRoom>> open(const std::string& name, const ServedCase& served, bool is_new,
+                                         const std::function<void(double)>& progress);
+  std::shared_ptr<OpenRoom> take_in(std::shared_ptr<OpenRoom> room);
+  [[nodiscard]] std::shared_ptr<OpenRoom> take_out(const std::string& name);
+  void note_open() const;  // writes the list of those that are open
+  void run_upkeep();
+
+  const RoomsOptions options_;
+  mutable std::mutex changing_;  // held by whatever changes the rooms; never waits for mutex_'s holder
+  mutable std::mutex mutex_;
+  std::map<std::string, std::shared_ptr<OpenRoom>> open_;
+  std::condition_variable upkeep_wake_;
+  bool upkeep_end_ = false;
+  std::thread upkeep_;
+};
+
+}  // namespace osteon
