@@ -1,5 +1,7 @@
 // What a room's rows do to it: the same for one that was just decided and for one of a journal, years later.
 #include <algorithm>
+#include <chrono>
+#include <functional>
 #include <map>
 #include <string>
 
@@ -11,6 +13,9 @@ namespace {
 
 // Key in a piece's history of the mask that leaves it of its parent: no event of its own. Places of events stay below.
 constexpr std::uint64_t kLeftOfSplit = std::uint64_t{1} << 63;
+
+// No room lives longer; far from where times overflow.
+constexpr std::chrono::nanoseconds kLongest = std::chrono::hours(24 * 365 * 100);
 
 tl::unexpected<Error> impossible(const RoomRow& row, const std::string& why) {
   return failure(ErrorCode::invalid_input, "row " + std::to_string(row.place.value) + " cannot follow: " + why);
@@ -25,15 +30,18 @@ bool meet(const CoordBox& a, const CoordBox& b) {
          b.min.z <= a.max.z;
 }
 
-// A mask as a split may have it: sorted leaves of the lattice that hold values.
-bool is_mask(const Mask& mask) {
+// Where anything of a bone can be, in samples of level 0: a piece's masks reach a leaf and the band beyond it.
+CoordBox about(const Case& bone) { return bone.bounds_samples().grown(2 * kLeafSize); }
+
+// A mask as a split may have it: sorted leaves of the lattice, about the bone, that hold values.
+bool is_mask(const Mask& mask, const CoordBox& about) {
   if (!mask) return false;
   const auto place_of = [](const FieldLeaf& leaf) { return std::pair(leaf.level, leaf.origin); };
   for (std::size_t i = 0; i < mask->size(); ++i) {
     const FieldLeaf& leaf = (*mask)[i];
     const auto off_lattice = [](std::int32_t at) { return at % kLeafSize != 0; };
     if (leaf.level < 0 || leaf.level >= kLevels || !leaf.holds_values() || off_lattice(leaf.origin.x) ||
-        off_lattice(leaf.origin.y) || off_lattice(leaf.origin.z))
+        off_lattice(leaf.origin.y) || off_lattice(leaf.origin.z) || !about.contains(shift_down(leaf.origin, leaf.level)))
       return false;
     if (i > 0 && !(place_of((*mask)[i - 1]) < place_of(leaf))) return false;
   }
@@ -61,6 +69,7 @@ Result<void> Room::can_follow(const RoomRow& row) const {
   };
   if (row.place.value != room_seq_.value + 1)
     return impossible(row, "row " + std::to_string(room_seq_.value + 1) + " comes next");
+  if (row.at < now_ || row.at > kLongest) return impossible(row, "its time does not follow that of the row before it");
   struct Judge {
     const Room& room;
     const RoomRow& row;
@@ -82,9 +91,12 @@ Result<void> Room::can_follow(const RoomRow& row) const {
       return require(one.reason > Rejection::none && static_cast<int>(one.reason) < kRejections, "its reason is none");
     }
     Result<void> operator()(const SplitRow& split) const {
-      bool whole = room.exists(split.parent) && is_mask(split.taken);
+      const CoordBox place = about(room.bone());
+      bool whole = room.exists(split.parent) && is_mask(split.taken, place);
       std::uint32_t next = room.last_body_;
-      for (const SplitPiece& piece : split.pieces) whole = whole && piece.body.value == ++next && is_mask(piece.left);
+      for (const SplitPiece& piece : split.pieces)
+        whole = whole && piece.body.value == ++next && is_mask(piece.left, place) && place.contains(piece.reach.min) &&
+                place.contains(piece.reach.max);
       return require(whole && room.bodies().size() + split.pieces.size() <= kMostBodies, "the split is incomplete");
     }
     Result<void> operator()(const UndoRow& undo) const {
@@ -97,7 +109,9 @@ Result<void> Room::can_follow(const RoomRow& row) const {
         const auto found = room.events_.find(place);
         return found != room.events_.end() && found->second.kind == EventKind::undo && !found->second.undone;
       };
-      bool all = !redo.undos.empty() && std::ranges::all_of(redo.undos, stands);
+      // Newest undo first, oldest event first, none twice.
+      bool all = !redo.undos.empty() && std::ranges::all_of(redo.undos, stands) &&
+                 std::ranges::is_sorted(redo.undos, std::greater_equal{}) && std::ranges::is_sorted(redo.places, std::less_equal{});
       for (const RoomSeq place : redo.places) all = all && room.can_be_undone(place) && room.events_.at(place).undone;
       return require(all, "it does again what was not undone");
     }
@@ -107,8 +121,9 @@ Result<void> Room::can_follow(const RoomRow& row) const {
     Result<void> operator()(const ItemRow& item) const {
       const bool known = room.items_.contains(item.item);
       if (!item.set) return require(known, "there is no such item");
-      return require((known || item.item == room.last_item_ + 1) && room.exists(item.set->body) &&
-                         room.tools_->find(item.set->tool) && room.items_.size() < kMostItems + 1,
+      const bool room_for_it = known || (item.item == room.last_item_ + 1 && room.items_.size() < kMostItems);
+      return require(room_for_it && item.set->id == item.item && item.set->set_at == row.place.value &&
+                         room.exists(item.set->body) && room.tools_->find(item.set->tool),
                      "the item cannot stand there");
     }
     Result<void> operator()(const ToolRow& tool) const {
