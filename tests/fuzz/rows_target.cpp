@@ -60,6 +60,8 @@ Room begun() {
 void expect_same(const Room& one, const Room& other) {
   OSTEON_CHECK(one.room_hash() == other.room_hash());
   OSTEON_CHECK(one.items() == other.items() && one.bodies() == other.bodies() && one.marks() == other.marks());
+  const std::vector<SceneItem> items = one.items();
+  OSTEON_CHECK(items.size() <= kMostItems && std::ranges::is_sorted(items, std::less_equal{}, &SceneItem::id));
 }
 
 // As the surface's thread asks it after any event: the work is bounded by the bone, whatever the rows said.
