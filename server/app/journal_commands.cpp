@@ -127,7 +127,7 @@ Result<void> branch(const Arguments& given) {
   return {};
 }
 
-// The room, and with it what was made of it: asked twice, since nothing brings it back.
+// What is to become of its branches has to be said: nothing brings a room back.
 Result<void> remove(const Arguments& given) {
   const Result<std::vector<RoomFile>> branches = branches_of(folder_of(given.file), given.file);
   if (!branches && branches.error().code != ErrorCode::not_found) return tl::unexpected(branches.error());
