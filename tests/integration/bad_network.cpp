@@ -1,5 +1,7 @@
 #include "tests/integration/bad_network.hpp"
 
+#include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <thread>
@@ -16,20 +18,58 @@ using Clock = std::chrono::steady_clock;
 
 namespace {
 
-// What a hand has of the bone under its tool, as a client's thread makes it: here the tool is where the other has cut.
+// What a hand has of the bone under its tool, made by a thread of its own as in a client; here the tool is where the other has
+// cut last.
 class Felt {
  public:
-  explicit Felt(const Case& bone) : model_(*haptic::ToolModel::make(*find_tool("burr-round-5"), bone.pitch_mm(), 1.0, "")) {}
-  void feel(const Cut& cut, haptic::Replica& replica) {
-    for (const haptic::ChangedLeaves& change : replica.take_changes())
-      builder_.changed(replica.predicted().bone().pitch_mm(), change.level, change.origins);
-    builder_.build(replica.bodies(), model_, dequantise(cut.path.back()), patch_);
+  // `in_patch`: called on that thread for every cut that the patch has.
+  Felt(const Case& bone, std::function<void(const Cut&)> in_patch)
+      : in_patch_(std::move(in_patch)), replica_(bone, BodyId{}),
+        model_(*haptic::ToolModel::make(*find_tool("burr-round-5"), bone.pitch_mm(), 1.0, "")), thread_([this] { run(); }) {}
+  ~Felt() {
+    {
+      const std::lock_guard lock(mutex_);
+      over_ = true;
+      wake_.notify_one();
+    }
+    thread_.join();
+  }
+  void hear(const Cut& cut) {
+    const std::lock_guard lock(mutex_);
+    came_.push_back(cut);
+    wake_.notify_one();
   }
 
  private:
+  void run() {
+    std::vector<Cut> cuts;
+    while (true) {
+      cuts.clear();
+      {
+        std::unique_lock lock(mutex_);
+        wake_.wait(lock, [&] { return over_ || !came_.empty(); });
+        if (over_) return;
+        cuts.swap(came_);
+      }
+      for (const Cut& cut : cuts) replica_.commit(RoomSeq{replica_.room_seq().value + 1}, cut, false);
+      replica_.settle();
+      for (const haptic::ChangedLeaves& change : replica_.take_changes())
+        builder_.changed(replica_.predicted().bone().pitch_mm(), change.level, change.origins);
+      builder_.build(replica_.bodies(), model_, dequantise(cuts.back().path.back()), patch_);
+      for (const Cut& cut : cuts) in_patch_(cut);
+    }
+  }
+
+  const std::function<void(const Cut&)> in_patch_;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::vector<Cut> came_;
+  bool over_ = false;
+  haptic::Replica replica_;  // of its thread, as what follows
   const haptic::ToolModel model_;
   haptic::PatchBuilder builder_;
   haptic::Patch patch_;
+  std::thread thread_;
 };
 
 }  // namespace
@@ -68,15 +108,15 @@ BadNetworkRun run_on(const BadNetwork& network, std::uint64_t seed) {
     for (const std::string& command : network.impairment) (void)relay->command(command);
     std::this_thread::sleep_for(300ms);
   }
+  std::vector<std::unique_ptr<Felt>> felt;
   for (std::size_t i = 0; i < 2; ++i)
-    hands[i]->surgeon().on_cut(
-        [&, i, felt = std::make_shared<Felt>(hands[i]->surgeon().session().bone())](const Cut& cut, haptic::Replica& replica) {
-          const Hand& other = *hands[1 - i];
-          if (cut.author != hands[1 - i]->surgeon().session().room().author) return;
-          felt->feel(cut, replica);
-          const std::lock_guard lock(felt_mutex);
-          run.felt_ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - other.sent_at(cut.author_seq)).count());
-        });
+    felt.push_back(std::make_unique<Felt>(hands[i]->surgeon().session().bone(), [&, i](const Cut& cut) {
+      if (cut.author != hands[1 - i]->surgeon().session().room().author) return;
+      const std::lock_guard lock(felt_mutex);
+      run.felt_ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - hands[1 - i]->sent_at(cut.author_seq)).count());
+    }));
+  for (std::size_t i = 0; i < 2; ++i)
+    hands[i]->surgeon().on_cut([&felt = *felt[i]](const Cut& cut) { felt.hear(cut); });
   const std::size_t parts = network.meanwhile.size() + 1;
   for (std::size_t part = 0; part < parts; ++part) {
     std::this_thread::sleep_for(network.work / parts);
@@ -103,6 +143,7 @@ BadNetworkRun run_on(const BadNetwork& network, std::uint64_t seed) {
     run.kept += hand->surgeon().own();
     hand->surgeon().on_cut({});
   }
+  felt.clear();
   return run;
 }
 

@@ -1,27 +1,69 @@
 // osteon-bad-network [RUNS]: real processes and sockets, good and bad networks between them: how soon all hold one bone once it
 // is quiet, and how soon what one hand cuts is in the patch that another feels. A fifth as many runs without a bad network.
 // The hands are simulated. JSON.
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <thread>
 #include <vector>
 
 #include "tests/integration/bad_network.hpp"
 #include "tests/perf/percentiles.hpp"
+#include "tests/support/temp_dir.hpp"
 
 namespace {
 
 using namespace osteon::test;
+using Clock = std::chrono::steady_clock;
+
+// What the machine does to whoever waits for his time and for the disk: now and then a few bytes synced.
+class Machine {
+ public:
+  Machine() : thread_([this] { run(); }) {}
+  ~Machine() { (void)stop(); }
+  // How long after its time each was done.
+  std::vector<double> stop() {
+    over_ = true;
+    if (thread_.joinable()) thread_.join();
+    return std::move(late_ms_);
+  }
+
+ private:
+  void run() {
+    constexpr std::chrono::milliseconds kTick{50};  // so rarely that it does not keep the disk from the server
+    const TempDir folder;
+    const int file = ::open((folder / "probe").c_str(), O_RDWR | O_CREAT, 0600);
+    const std::vector<char> bytes(4096, 'x');
+    for (auto due = Clock::now() + kTick; !over_; due = std::max(due + kTick, Clock::now())) {
+      std::this_thread::sleep_until(due);
+      if (::pwrite(file, bytes.data(), bytes.size(), 0) < 0 || ::fdatasync(file) != 0) break;
+      late_ms_.push_back(std::chrono::duration<double, std::milli>(Clock::now() - due).count());
+    }
+    ::close(file);
+  }
+
+  std::atomic<bool> over_{false};
+  std::vector<double> late_ms_;
+  std::thread thread_;
+};
 
 // All runs on one kind of network.
 nlohmann::json runs_on(const BadNetwork& network, int runs, std::uint64_t first_seed) {
-  std::vector<double> converged_s, felt_ms, p50_ms, p99_ms;  // felt_ms: of all cuts of all runs
+  std::vector<double> converged_s, felt_ms, machine_ms, p50_ms, p99_ms;  // felt_ms: of all cuts of all runs
   std::uint64_t sent = 0, kept = 0;
   int faults = 0, alive = 0;
   nlohmann::json said = nlohmann::json::array();
   for (int i = 0; i < runs; ++i) {
+    Machine machine;
     BadNetworkRun run = run_on(network, first_seed + static_cast<std::uint64_t>(i));
+    std::ranges::move(machine.stop(), std::back_inserter(machine_ms));
     if (!run.fault.empty()) {
       ++faults;
       said.push_back({{"seed", first_seed + static_cast<std::uint64_t>(i)}, {"fault", run.fault}});
@@ -43,6 +85,7 @@ nlohmann::json runs_on(const BadNetwork& network, int runs, std::uint64_t first_
           {"kept", kept},
           {"fast_path_alive", alive},
           {"converged_s", {{"p50", percentile(converged_s, 50)}, {"max", converged_s.back()}}},
+          {"machine_ms", spread(machine_ms)},
           {"felt_ms",
            {{"cuts", felt_ms.size()},
             {"p50", percentile(felt_ms, 50)},

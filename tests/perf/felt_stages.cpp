@@ -225,6 +225,7 @@ json run_stages(const Case& bone, const std::vector<Cut>& stroke, const std::vec
   std::this_thread::sleep_for(500ms);
 
   const HostHealth before = host.health();
+  const FastPathHealth path_before = lines[0]->health();
   std::vector<std::thread> hands;
   for (std::size_t hand = 0; hand < 2; ++hand)
     hands.emplace_back([&, hand] {
@@ -260,6 +261,13 @@ json run_stages(const Case& bone, const std::vector<Cut>& stroke, const std::vec
   const DurationHistogram commit = after.commit.since(before.commit);
   json out{{"cuts", 2 * cuts}, {"all_felt", there}, {"streamed", lines[0]->streamed + lines[1]->streamed}, {"whole", spread(whole)},
            {"stages", stages}, {"round_trip_ms", rounded(path.round_trip_ms)}, {"loss", rounded(path.loss)}};
+  // Of one client; those that came, where some are lost on the way down.
+  const auto line = [&](std::uint64_t packets, std::uint64_t bytes) -> json {
+    return {{"packets_per_s", rounded(static_cast<double>(packets) / seconds)},
+            {"kbit_per_s", rounded(8e-3 * static_cast<double>(bytes + 28 * packets) / seconds)}};
+  };
+  out["up"] = line(path.packets_sent - path_before.packets_sent, path.bytes_sent - path_before.bytes_sent);
+  out["down"] = line(path.packets_received - path_before.packets_received, path.bytes_received - path_before.bytes_received);
   out["tick_late_ms"] = {{"p50", rounded(1e-3 * tick.lateness.percentile_us(50))}, {"p99", rounded(1e-3 * tick.lateness.percentile_us(99))}};
   out["transaction_ms"] = {{"p50", rounded(1e-3 * commit.percentile_us(50))}, {"p99", rounded(1e-3 * commit.percentile_us(99))}};
   out["cut_closes_after_ms"] = {{"most", kCutsApart.count()}};
@@ -276,7 +284,10 @@ int main(int argc, char** argv) {
   const osteon::Case bone = osteon::haptic::test::block_case(40);
   const std::vector<osteon::Cut> stroke = burred_stroke(seconds);
   OSTEON_CHECK(!stroke.empty());
-  const nlohmann::json out{{"loopback", run_stages(bone, stroke, {}, seconds)},
+  std::size_t knots = 0;
+  for (const osteon::Cut& cut : stroke) knots += cut.path.size();
+  const nlohmann::json out{{"knots_per_cut", rounded(static_cast<double>(knots) / static_cast<double>(stroke.size()))},
+                           {"loopback", run_stages(bone, stroke, {}, seconds)},
                            {"bad", run_stages(bone, stroke, {"delay 40 10", "loss 0.3", "reorder 0.1", "duplicate 0.05"}, seconds)}};
   std::printf("%s\n", out.dump(1).c_str());
   return 0;

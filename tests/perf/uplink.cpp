@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "common/core/check.hpp"
+#include "common/runtime/log.hpp"
 #include "haptic_client/app/client.hpp"
 #include "tests/integration/bad_network.hpp"
 #include "tests/integration/stage.hpp"
@@ -197,6 +198,7 @@ json run_tool(const BadNetwork& network, double seconds) {
 
 int main(int argc, char** argv) {
   using namespace osteon::test;
+  osteon::log::open("osteon-uplink");
   const double seconds = argc > 1 ? std::max(5.0, std::atof(argv[1])) : 30.0;
   const BadNetwork bad{.impairment = {"delay 40 10", "loss 0.3", "reorder 0.1", "duplicate 0.05"}};
   const nlohmann::json out{{"clean", run_tool({}, seconds)}, {"bad", run_tool(bad, seconds)}};

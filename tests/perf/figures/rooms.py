@@ -8,6 +8,7 @@ BREAKAGES = ("dedup", "ordering", "skipping", "replica", "forgetful")
 PROTOCOL_SEED_MS = 50.0
 CONVERGED_S = 2.0
 FELT_LOOPBACK_MS, FELT_BAD_MS = 25.0, 150.0
+FELT_STAGES = ("uplink", "wait_for_tick", "decide", "commit", "downlink", "replica_and_patch")
 OBSERVERS_MS, OBSERVERS_HZ = 40.0, 30.0
 
 
@@ -87,15 +88,81 @@ def bad_network(run):
     out = json.loads(run.output("osteon-bad-network", 50))
     run.tables.append(("Bad networks", [(name, json.dumps(kind)) for name, kind in out.items()]))
     good, bad = out["loopback"], out["bad"]
+
+    # Of all cuts of all runs together; beside it what the machine itself does to whoever waits, wakes and syncs.
+    def felt(kind, bound_ms):
+        of = kind["felt_ms"]
+        return Measured(of["p99_pooled"] / bound_ms, kind["machine_ms"]["p99"] / bound_ms, low=of["p99_median_run"] / bound_ms,
+                        high=of["p99_worst_run"] / bound_ms)
+
     return {
         "bad_network_runs": (bad["runs"], None),
         "bad_network_faults": (bad["faults"] + good["faults"] + bad["sent"] - bad["kept"], None),
         "bad_network_converged": (bad["converged_s"]["max"] / CONVERGED_S, None),
-        "felt_loopback_p99": Measured(good["felt_ms"]["p99_median_run"] / FELT_LOOPBACK_MS,
-                                      high=good["felt_ms"]["p99_worst_run"] / FELT_LOOPBACK_MS),
-        "felt_bad_p99": Measured(bad["felt_ms"]["p99_median_run"] / FELT_BAD_MS,
-                                      high=bad["felt_ms"]["p99_worst_run"] / FELT_BAD_MS),
+        "felt_loopback_p99": felt(good, FELT_LOOPBACK_MS),
+        "felt_bad_p99": felt(bad, FELT_BAD_MS),
     }
+
+
+def felt_stages(run):
+    run.say("stages of a felt cut")
+    out = json.loads(run.output("osteon-felt-stages", 30 if run.soak else 10))
+    good, bad = out["loopback"], out["bad"]
+    rows = [("stage, ms", "loopback p50", "p99", "bad network p50", "p99")]
+    rows.append(("close the cut", "at most", f"{good['cut_closes_after_ms']['most']}", "at most",
+                 f"{bad['cut_closes_after_ms']['most']}"))
+    for stage, of_good, of_bad in [(stage, good["stages"][stage], bad["stages"][stage]) for stage in FELT_STAGES] + [
+            ("sent to felt", good["whole"], bad["whole"])]:
+        rows.append((stage.replace("_", " "), of_good["p50"], of_good["p99"], of_bad["p50"], of_bad["p99"]))
+    for name, key in (("lateness of ticks", "tick_late_ms"), ("transactions", "transaction_ms")):
+        rows.append((name, good[key]["p50"], good[key]["p99"], bad[key]["p50"], bad[key]["p99"]))
+    run.tables.append(("Stages of a felt cut; hands and the bad network are simulated", rows))
+    values = {f"felt_stage_{stage}": (good["stages"][stage]["p50"], bad["stages"][stage]["p50"]) for stage in FELT_STAGES}
+    values["felt_stage_close"] = (good["cut_closes_after_ms"]["most"], bad["cut_closes_after_ms"]["most"])
+    values["felt_stage_all"] = (good["whole"]["p50"], bad["whole"]["p50"])
+    return values
+
+
+def uplink(run):
+    run.say("what one tool sends and keeps")
+    out = json.loads(run.output("osteon-uplink", 60 if run.soak else 20))
+    rows = [("line and work", "kbit/s", "datagrams", "stream", "busiest second")]
+    for name, kind in out.items():
+        for work in ("cutting", "idle"):
+            rate = kind[work]
+            rows.append((f"{name}, {work}", rate["kbit_per_s"], rate["of_them_datagrams"], rate["of_them_stream"],
+                         rate["busiest_second"]))
+    run.tables.append(("Uplink of a simulated hand's tool, headers and acknowledgements included", rows))
+    clean, bad = out["clean"], out["bad"]
+    kept = clean["journal_bytes"]
+    hour = 3600.0 * (kept["database"]["at_last"] - kept["database"]["at_first"]) / clean["cutting_s"]
+    run.tables.append(("Journal of that tool", [
+        ("rows, MB in an hour of cutting", f"{1e-6 * hour:.1f}"),
+        ("a checkpoint, at a clean end, MB", f"{1e-6 * kept['checkpoints']['at_last']:.2f}"),
+        ("log beside it, used again and again, at most, MB", f"{1e-6 * kept['log_most']:.2f}")]))
+    return {
+        "uplink_cutting": (clean["cutting"]["kbit_per_s"], None),
+        "uplink_cutting_loss": (bad["cutting"]["kbit_per_s"], clean["cutting"]["kbit_per_s"]),
+        "uplink_idle_share": (max(kind["idle"]["kbit_per_s"] / kind["cutting"]["kbit_per_s"] for kind in (clean, bad)), None),
+        "journal_mb_per_hour": (1e-6 * (hour + kept["checkpoints"]["at_last"]), None),
+    }
+
+
+# A room that misses more ticks than this is one too many.
+MOST_MISSED = 0.05
+
+
+def rooms_per_core(run):
+    run.say("rooms in one process")
+    out = json.loads(run.output("osteon-rooms-per-core", 30 if run.soak else 10))
+    rows = [("rooms", "cores", "rooms per core", "ticks missed", "late p99 ms", "transaction p99 ms", "behind s")]
+    for kind in [*out["cutting"], out["not_kept"], out["idle"]]:
+        worst = kind["worst_room_ms"]
+        rows.append((kind["rooms"], kind["cores"], kind["rooms_per_core"], kind["tick_missed_share"], worst["tick_late_p99"],
+                     worst["commit_p99"], kind["behind_at_the_end_s"]))
+    run.tables.append(("Rooms in one process, a simulated tool in each; the last two without journals, and without work", rows))
+    held = [kind for kind in out["cutting"] if kind["tick_missed_share"] <= MOST_MISSED] or out["cutting"][:1]
+    return {"rooms_per_core": (held[-1]["rooms_per_core"], out["not_kept"]["rooms_per_core"])}
 
 
 def forgery(run):
@@ -128,4 +195,5 @@ def observers(run):
 
 
 GROUPS = {"simulated": simulated, "simulated_full": simulated_full, "simulated_broken": simulated_broken, "journal": journal,
-          "server_kills": server_kills, "bad_network": bad_network, "forgery": forgery, "observers": observers}
+          "server_kills": server_kills, "bad_network": bad_network, "felt_stages": felt_stages, "uplink": uplink,
+          "rooms_per_core": rooms_per_core, "forgery": forgery, "observers": observers}

@@ -65,8 +65,8 @@ class Surgeon {
                           on([&] {
                             EXPECT_TRUE(complete_);
                             EXPECT_GT(seq, seq_) << "committed cuts come in order";
+                            if (heard_) heard_(cut);
                             replica_->commit(seq, cut, false);
-                            if (heard_) heard_(cut, *replica_);
                             seq_ = seq;
                             if (cut.author != session_->room().author) return;
                             ++own_;
@@ -99,8 +99,8 @@ class Surgeon {
   bool complete() { return read(complete_); }
   RoomSeq seq() { return read(seq_); }
   std::uint64_t own() { return read(own_); }
-  // Called for every cut that has come and is in the replica, with a lock held.
-  void on_cut(std::function<void(const Cut&, haptic::Replica&)> heard) {
+  // Called for every cut that comes, with a lock held.
+  void on_cut(std::function<void(const Cut&)> heard) {
     on([&] { heard_ = std::move(heard); });
   }
   // Of own cuts: their places in the order, as the room said them.
@@ -136,7 +136,7 @@ class Surgeon {
   int interruptions_ = 0;
   std::vector<FieldLeaf> renewed_;
   std::map<std::uint64_t, RoomSeq> acknowledged_;
-  std::function<void(const Cut&, haptic::Replica&)> heard_;
+  std::function<void(const Cut&)> heard_;
   RoomSeq seq_;
   std::uint64_t own_ = 0, lease_ = 0;
   std::vector<BodyId> bodies_;
