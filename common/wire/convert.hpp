@@ -16,7 +16,7 @@
 namespace osteon::wire {
 
 // Version of the protocol that this build speaks.
-inline constexpr std::uint32_t kProtocolVersion = 2;
+inline constexpr std::uint32_t kProtocolVersion = 3;
 
 [[nodiscard]] v1::Vector3 to_wire(const Vec3& v);
 [[nodiscard]] Vec3 from_wire(const v1::Vector3& v);

@@ -124,7 +124,9 @@ def main():
 
 
 def same_bone(numbers):
-    return numbers["agreement"]["field_hash_equal"] and numbers["agreement"]["mesh_differences"] == 0
+    journal, held = numbers["journal"], numbers["agreement"]
+    kept = journal["sound"] and journal["field_hash"] == held["field_hash_server"]
+    return kept and held["field_hash_equal"] and held["mesh_differences"] == 0
 
 
 def summarise(numbers, out, seconds):
@@ -137,6 +139,9 @@ def summarise(numbers, out, seconds):
             say(f"{name}: median {latency[key]['p50']:.1f} ms, 99 % {latency[key]['p99']:.1f} ms")
     say("Server, haptic client and viewer hold " + ("the same bone" if same_bone(numbers) else "DIFFERENT bones") +
         " at the end.")
+    journal = numbers["journal"]
+    say(f"The room's journal, {journal['events']} events in {journal['bytes'] / 1e6:.1f} MB, makes " +
+        ("the same bone" if journal["field_hash"] == numbers["agreement"]["field_hash_server"] else "ANOTHER bone") + " again.")
     say(f"Session of {seconds:.0f} s. Report: {out / 'report.html'}")
 
 

@@ -114,12 +114,15 @@ def write(folder: Path, numbers, title):
     latency, agreement = numbers["latency_ms"], numbers["agreement"]
     removed = numbers["programs"]["server"].get("removed_mm3")
     same = "identical" if agreement["field_hash_equal"] and not agreement["mesh_differences"] else "NOT identical"
+    journal = numbers["journal"]
+    kept = "the same bone" if journal["sound"] and journal["field_hash"] == agreement["field_hash_server"] else "NOT the same bone"
     facts = [
         fact(f"{removed:.0f} mm³" if isinstance(removed, (int, float)) else "–", "bone removed"),
         fact(f"{max((step['peak_force_n'] for step in cutting_steps(numbers)), default=0):.1f} N", "largest force of the bone on a tool"),
         fact(ms(latency.get("cut_to_picture", {}).get("p50")), "from a cut to its picture (median)"),
         fact(ms(latency.get("cut_to_sound", {}).get("p50")), "from the cutting to its sound (median)"),
         fact(same, "bone in server, haptic client and viewer at the end (hashes)"),
+        fact(kept, f"made again from the room's journal, {journal['events']} events"),
     ]
     machine = numbers["machine"]
     virtual = numbers["picture"].startswith("a virtual screen")
@@ -171,7 +174,8 @@ Picture: {text(numbers['picture'])}{drawn_by}.</p>
 <code>{text((agreement['field_hash_haptic'] or '–')[:16])}…</code>. The complete numbers are in
 <a href="session.json">session.json</a>; the 1 kHz record is
 <a href="session.h5">session.h5</a> (HDF5, which <code>--device recorded:session.h5</code> plays again), and as a shorter
-table <a href="session.csv">session.csv</a>.</p>
+table <a href="session.csv">session.csv</a>. The room itself is kept in <code>session.journal</code>: <code>osteon-server
+--case CASE --journal session.journal</code> goes on with it.</p>
 {program_tables(numbers)}
 <details><summary>What the surgeon was told to do</summary><pre>{text(json.dumps(numbers['plan'], indent=2))}</pre></details>
 </main></body></html>

@@ -87,10 +87,16 @@ class Session:
         address_file.unlink(missing_ok=True)
         self.household.start("osteon-server", [
             self.programs / "osteon-server", "--case", self.case, "--listen", "127.0.0.1:0",
-            "--address-file", address_file, "--summary", self.out / "server.json"])
+            "--address-file", address_file, "--summary", self.out / "server.json", "--journal", self._new_journal()])
         address = self.household.wait_for_file(address_file, "osteon-server", patience_s=60.0)
         self.say(f"Server: {self.case.name} at {address}.")
         return address
+
+    def _new_journal(self):
+        """Of this session: one of the session before would be gone on with."""
+        for file in self.out.glob("session.journal*"):
+            file.unlink()
+        return self.out / "session.journal"
 
     def _start_viewer(self, address, name, *options):
         child = self.household.start(name, [self.programs / "osteon-viewer", "--server", address, "--size", self.size,
@@ -199,6 +205,7 @@ class Session:
             "plan": self.plan,
         }
         numbers["agreement"] = agreement(numbers)
+        numbers["journal"] = check_journal(self.programs, self.out / "session.journal", self.case)
         save(numbers, self.out)
         return numbers
 
@@ -221,6 +228,17 @@ def close_up(step):
     aside = np.cross(axis, [0.0, 0.0, 1.0])
     aside = unit(aside) if np.linalg.norm(aside) > 0.1 else np.array([1.0, 0.0, 0.0])
     return look(target, target - 36.0 * axis + 16.0 * aside, np.cross(aside, axis))
+
+
+def check_journal(programs, journal, case):
+    """What osteon-server says of a journal that no server has open, and of the bone that its events make again."""
+    result = subprocess.run([programs / "osteon-server", "verify", journal, "--case", case], capture_output=True, text=True,
+                            check=False)
+    said = dict(line.split(":", 1) for line in result.stdout.splitlines() if ":" in line)
+    return {"sound": result.returncode == 0 and said.get("verdict", "").strip() == "sound",
+            "field_hash": said.get("field hash", "").strip(),
+            "events": said.get("events", "").split(",")[0].strip(),
+            "bytes": sum(file.stat().st_size for file in journal.parent.glob(journal.name + "*"))}
 
 
 def case_info(programs, case):

@@ -66,6 +66,51 @@ TEST(Kept, ARoomGoesOnWithAllThatCanBeUndone) {
   EXPECT_EQ(status_of(late.session().room()).field_hash(), uncut);
 }
 
+// What osteon-server rooms prints; empty where it fails.
+std::string rooms(const Stage& stage, std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "rooms");
+  arguments.insert(arguments.end(), {"--server", stage.address()});
+  const RunResult result = run(program("osteon-server"), arguments, 60s);
+  return result.exit_code == 0 ? result.out : "";
+}
+
+// As a person at the command line makes them, with hands in two of them at the moment of the kill.
+TEST(Kept, TheRoomsOfAKilledServerAreOpenAgain) {
+  TempDir folder;
+  const std::string kept = (folder / "rooms").string();
+  Stage stage(12.0, {"--rooms", kept});
+  EXPECT_NE(rooms(stage, {"list"}).find("no rooms"), std::string::npos);
+  for (const char* name : {"anna", "berta", "closed"}) ASSERT_NE(rooms(stage, {"create", name}).find(name), std::string::npos);
+  ASSERT_NE(rooms(stage, {"close", "closed"}), "");
+  std::map<std::string, std::string> hashes;
+  for (const char* name : {"anna", "berta"}) {
+    Surgeon hand(stage.address(), folder / "cache", "", name);
+    ASSERT_TRUE(wait_until([&] { return hand.complete(); }, kPatience));
+    for (std::uint64_t i = 1; i <= 5; ++i) {
+      const Vec3 at{-4.0 + static_cast<double>(i), name[0] == 'a' ? 0.0 : 1.0, 0};
+      Cut cut = straight_cut(find_tool("burr-round-5").value(), at, at, {0, 0, -1}, i);
+      cut.author = hand.author();
+      ASSERT_TRUE(hand.session().send(cut));
+    }
+    ASSERT_TRUE(wait_until([&] { return hand.own() == 5; }, kPatience));
+    hashes[name] = status_of(hand.session().room()).field_hash();
+  }
+  ASSERT_NE(hashes["anna"], hashes["berta"]);
+  stage.server().signal(SIGKILL);
+  ASSERT_TRUE(stage.server().wait(10s).has_value());
+  stage.start_server({"--rooms", kept});
+  const std::string list = rooms(stage, {"list"});
+  for (const std::string name : {"anna", "berta"}) {
+    EXPECT_NE(list.find(name + std::string(20 - name.size(), ' ') + " open, at event"), std::string::npos) << list;
+    EXPECT_EQ(status_of(join(stage.address(), wire::ClientKind::viewer, name)).field_hash(), hashes[name]);
+    EXPECT_NE(rooms(stage, {"verify", name}).find("sound"), std::string::npos);
+  }
+  EXPECT_NE(list.find("closed               closed"), std::string::npos) << list;
+  ASSERT_EQ(stage.server().terminate(), 0) << stage.server().err();
+  const nlohmann::json summary = read_json(stage / "server.json");
+  EXPECT_EQ(summary.at("rooms").size(), 2u);
+}
+
 void expect_refused(const std::vector<std::string>& arguments, const std::vector<std::string>& words) {
   const RunResult server = run(program("osteon-server"), arguments, 30s);
   EXPECT_FALSE(server.timed_out);
@@ -80,6 +125,9 @@ TEST(Kept, SaysWhatIsWrongWithAJournal) {
   const std::string bone = (stage / "case").string();
   expect_refused({"--case", bone, "--journal", file}, {"room.journal", "in use"});
   expect_refused({"--case", bone, "--journal", file, "--resume", "x.vdb"}, {"--journal", "--resume"});
+  expect_refused({"--case", bone, "--journal", file, "--rooms", "y"}, {"--journal", "--rooms"});
+  expect_refused({"--case", bone, "--case", bone}, {"--case", "--rooms"});
+  expect_refused({"--case", bone, "--rooms", (stage / "case" / "case.json").string()}, {"--rooms", "case.json"});
   ASSERT_EQ(stage.server().terminate(), 0);
   expect_refused({"--case", (other / "case").string(), "--journal", file}, {"room.journal", "case", "start the server with that case"});
   const std::string text = (folder / "notes.txt").string();
