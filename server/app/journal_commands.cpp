@@ -205,7 +205,7 @@ Result<void> forget(const Arguments& given) {
                                             ? journal->forget_people_before(static_cast<std::int32_t>(today.count()) - given.days)
                                             : journal->forget_person(std::to_string(given.person));
   if (!forgotten) return tl::unexpected(forgotten.error());
-  say("forgotten", std::to_string(*forgotten) + " (what they did stays, under a number)");
+  say("forgotten", std::to_string(*forgotten) + " (what they did stays, under a number; backups made before have the names)");
   return journal->close();
 }
 

@@ -75,7 +75,7 @@ Result<std::vector<RoomFile>> branches_of(const fs::path& folder, const fs::path
   std::vector<RoomFile> others;
   for (const std::string& name : *names) {
     const bool may_be = std::ranges::none_of(kNoJournals, [&](std::string_view end) { return name.ends_with(end); });
-    if (!may_be || folder / name == file) continue;
+    if (!may_be || (folder / name).lexically_normal() == file.lexically_normal()) continue;
     if (Result<RoomGenesis> genesis = peek_genesis(folder / name, given); genesis && !genesis->parent.empty())
       others.push_back({folder / name, std::move(*genesis)});
   }

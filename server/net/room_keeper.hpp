@@ -45,8 +45,9 @@ struct BoneAt {
   Digest field_hash{};
 };
 
-// Whether it is time for the next checkpoint. A cut takes a millisecond or two to evaluate again: so much is asked that the
-// next opening takes a few seconds at most, and so long is waited that not the same leaves are written all the time.
+// Whether it is time for the next checkpoint. To evaluate a cut again takes a tenth of a millisecond, with a large tool a
+// whole one or two: the next opening has a few seconds of that at most. And so long is waited that a bone that is cut fast
+// is not written all the time: every checkpoint has all its leaves.
 struct CheckpointPolicy {
   std::uint64_t changes = 2000;
   std::chrono::nanoseconds apart = std::chrono::seconds(60);

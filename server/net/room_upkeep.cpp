@@ -1,5 +1,6 @@
 // What a RoomKeeper does beside the commits of a room in use.
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "common/field/field_hash.hpp"
@@ -73,8 +74,12 @@ Result<JournalHead> RoomKeeper::branch(const std::filesystem::path& to, RoomSeq 
 }
 
 Result<RoomReport> RoomKeeper::verify(const Case& bone, const std::optional<BoneAt>& live, const UpkeepCalls& calls) {
-  Result<Room> room = begin_room(bone, genesis_, {});
-  if (!room) return tl::unexpected(room.error());
+  std::optional<Room> room;
+  if (live) {
+    Result<Room> begun = begin_room(bone, genesis_, {});
+    if (!begun) return tl::unexpected(begun.error());
+    room.emplace(std::move(*begun));
+  }
   RoomReport report;
   RoomSeq last;
   const auto checkpoints = with_journal([&](Journal& journal) -> Result<std::vector<Checkpoint>> {
@@ -101,7 +106,7 @@ Result<RoomReport> RoomKeeper::verify(const Case& bone, const std::optional<Bone
     if (!outcome) return true;  // what follows is still held against the chain
     const Result<RoomRow> row = row_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
     if (!row) outcome = tl::unexpected(row.error());
-    if (!row || one.place > replayed_to) return true;
+    if (!row || !room || one.place > replayed_to) return true;
     outcome = room->replay(*row);
     (void)room->take_changes();
     for (const Checkpoint& point : *checkpoints)
@@ -117,7 +122,7 @@ Result<RoomReport> RoomKeeper::verify(const Case& bone, const std::optional<Bone
     report.faults.push_back(read.error().message);
   }
   if (!outcome) report.faults.push_back(file_.string() + ": " + outcome.error().message);
-  if (live && outcome && room->room_seq() == live->place) {
+  if (room && outcome && room->room_seq() == live->place) {
     report.replayed = {live->place, room->field_hash()};
     if (report.replayed.field_hash != live->field_hash)
       report.faults.push_back("the rows of the room " + genesis_.room + " up to " + std::to_string(live->place.value) +

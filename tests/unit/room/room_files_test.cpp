@@ -243,9 +243,10 @@ TEST_F(RoomFilesTest, CutShortADeletionLeavesAWholeRoomOrNone) {
   }
   const MemoryDisk::Image before = disk_.image();
   int whole = 0, none = 0, cases = 0;
+  // What the power leaves of what was not synced is drawn: so each place several times.
   for (bool failed = true; failed; ++cases) {
     disk_.load(before);
-    disk_.fail_power_at(static_cast<std::uint64_t>(cases + 1));
+    disk_.fail_power_at(static_cast<std::uint64_t>(cases / 5 + 1));
     const bool done = delete_room(kFile, true, &disk_).has_value();
     failed = disk_.has_failed();
     EXPECT_EQ(done, !failed);
@@ -265,7 +266,7 @@ TEST_F(RoomFilesTest, CutShortADeletionLeavesAWholeRoomOrNone) {
     EXPECT_TRUE(again || again.error().code == ErrorCode::not_found) << again.error().message;
     EXPECT_TRUE(Journal::create(kFile, "bone", {.disk = &disk_})) << "nothing is in its way";
   }
-  std::printf("%d places to fail at: %d journals whole, %d gone\n", cases - 1, whole, none);
+  std::printf("%d places to fail at: %d journals whole, %d gone\n", cases / 5, whole, none);
   EXPECT_GT(whole, 2);
   EXPECT_GT(none, 2);
 }
