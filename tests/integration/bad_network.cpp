@@ -113,7 +113,8 @@ BadNetworkRun run_on(const BadNetwork& network, std::uint64_t seed) {
     felt.push_back(std::make_unique<Felt>(hands[i]->surgeon().session().bone(), [&, i](const Cut& cut) {
       if (cut.author != hands[1 - i]->surgeon().session().room().author) return;
       const std::lock_guard lock(felt_mutex);
-      run.felt_ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - hands[1 - i]->sent_at(cut.author_seq)).count());
+      const auto since = Clock::now() - hands[1 - i]->sent_at(cut.author_seq);
+      run.felt_ms.push_back(std::chrono::duration<double, std::milli>(since).count());
     }));
   for (std::size_t i = 0; i < 2; ++i)
     hands[i]->surgeon().on_cut([&felt = *felt[i]](const Cut& cut) { felt.hear(cut); });

@@ -35,7 +35,8 @@ using Clock = std::chrono::steady_clock;
 
 // What happens to a cut of one hand until the other feels it.
 enum Moment { sent, at_server, tick_began, decided, told, came, felt, kMoments };
-constexpr std::array<const char*, kMoments> kStages{"", "uplink", "wait_for_tick", "decide", "commit", "downlink", "replica_and_patch"};
+constexpr std::array<const char*, kMoments> kStages{"",       "uplink",   "wait_for_tick", "decide",
+                                                    "commit", "downlink", "replica_and_patch"};
 
 // Of one hand's cuts, by author_seq - 1.
 struct Times {
@@ -96,7 +97,8 @@ class Line final : public SessionSink, private SessionLink::Sink, public std::en
   AuthorId author() const override { return author_; }
   void begin(RoomSeq, MessageParts, Bytes) override {
     link_ = links_.add(author_, 1, *this);
-    auto opened = FastPath::open("127.0.0.1", port_, link_->keys(), 1, [this](wire::IndexedRow row) { hear(std::move(row)); }, [] {});
+    auto opened = FastPath::open(
+        "127.0.0.1", port_, link_->keys(), 1, [this](wire::IndexedRow row) { hear(std::move(row)); }, [] {});
     OSTEON_CHECK(opened.has_value());
     path_ = std::move(*opened);
   }
@@ -251,16 +253,15 @@ json run_stages(const Case& bone, const std::vector<Cut>& stroke, const std::vec
   for (const auto& line : lines)
     for (const auto& moments : line->times.of) {
       if (moments[felt] == 0) continue;
-      for (int i = 1; i < kMoments; ++i)
-        took[static_cast<std::size_t>(i)].push_back(1e-6 * static_cast<double>(moments[static_cast<std::size_t>(i)] - moments[static_cast<std::size_t>(i - 1)]));
+      for (std::size_t i = 1; i < kMoments; ++i) took[i].push_back(1e-6 * static_cast<double>(moments[i] - moments[i - 1]));
       whole.push_back(1e-6 * static_cast<double>(moments[felt] - moments[sent]));
     }
   json stages;
   for (std::size_t i = 1; i < kMoments; ++i) stages[kStages[i]] = spread(took[i]);
   const TickStats tick = after.tick.since(before.tick);
   const DurationHistogram commit = after.commit.since(before.commit);
-  json out{{"cuts", 2 * cuts}, {"all_felt", there}, {"streamed", lines[0]->streamed + lines[1]->streamed}, {"whole", spread(whole)},
-           {"stages", stages}, {"round_trip_ms", rounded(path.round_trip_ms)}, {"loss", rounded(path.loss)}};
+  json out{{"cuts", 2 * cuts}, {"all_felt", there}, {"streamed", lines[0]->streamed + lines[1]->streamed},
+           {"whole", spread(whole)}, {"stages", stages}, {"round_trip_ms", rounded(path.round_trip_ms)}, {"loss", rounded(path.loss)}};
   // Of one client; those that came, where some are lost on the way down.
   const auto line = [&](std::uint64_t packets, std::uint64_t bytes) -> json {
     return {{"packets_per_s", rounded(static_cast<double>(packets) / seconds)},
@@ -268,8 +269,11 @@ json run_stages(const Case& bone, const std::vector<Cut>& stroke, const std::vec
   };
   out["up"] = line(path.packets_sent - path_before.packets_sent, path.bytes_sent - path_before.bytes_sent);
   out["down"] = line(path.packets_received - path_before.packets_received, path.bytes_received - path_before.bytes_received);
-  out["tick_late_ms"] = {{"p50", rounded(1e-3 * tick.lateness.percentile_us(50))}, {"p99", rounded(1e-3 * tick.lateness.percentile_us(99))}};
-  out["transaction_ms"] = {{"p50", rounded(1e-3 * commit.percentile_us(50))}, {"p99", rounded(1e-3 * commit.percentile_us(99))}};
+  const auto in_ms = [](const DurationHistogram& times) -> json {
+    return {{"p50", rounded(1e-3 * times.percentile_us(50))}, {"p99", rounded(1e-3 * times.percentile_us(99))}};
+  };
+  out["tick_late_ms"] = in_ms(tick.lateness);
+  out["transaction_ms"] = in_ms(commit);
   out["cut_closes_after_ms"] = {{"most", kCutsApart.count()}};
   host.stop();  // it holds no line any more
   return out;
@@ -286,9 +290,10 @@ int main(int argc, char** argv) {
   OSTEON_CHECK(!stroke.empty());
   std::size_t knots = 0;
   for (const osteon::Cut& cut : stroke) knots += cut.path.size();
+  const std::vector<std::string> bad{"delay 40 10", "loss 0.3", "reorder 0.1", "duplicate 0.05"};
   const nlohmann::json out{{"knots_per_cut", rounded(static_cast<double>(knots) / static_cast<double>(stroke.size()))},
                            {"loopback", run_stages(bone, stroke, {}, seconds)},
-                           {"bad", run_stages(bone, stroke, {"delay 40 10", "loss 0.3", "reorder 0.1", "duplicate 0.05"}, seconds)}};
+                           {"bad", run_stages(bone, stroke, bad, seconds)}};
   std::printf("%s\n", out.dump(1).c_str());
   return 0;
 }

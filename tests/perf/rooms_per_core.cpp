@@ -89,7 +89,8 @@ HeldRoom make_room(const Case& bone, const std::filesystem::path& file, bool kep
 json run_rooms(const Case& bone, const std::vector<Cut>& stroke, std::size_t count, double seconds, bool kept, bool cutting) {
   const TempDir folder;
   std::vector<HeldRoom> rooms;
-  for (std::size_t i = 0; i < count; ++i) rooms.push_back(make_room(bone, folder / ("room" + std::to_string(i) + ".journal"), kept));
+  for (std::size_t i = 0; i < count; ++i)
+    rooms.push_back(make_room(bone, folder / ("room" + std::to_string(i) + ".journal"), kept));
   std::this_thread::sleep_for(300ms);
   std::vector<HostHealth> before;
   for (const HeldRoom& room : rooms) before.push_back(room.host->health());
@@ -135,7 +136,8 @@ json run_rooms(const Case& bone, const std::vector<Cut>& stroke, std::size_t cou
           {"rooms_per_core", rounded(wall * static_cast<double>(count) / cpu)},
           {"behind_at_the_end_s", rounded(behind)},
           {"tick_missed_share", rounded(missed / (ticks + missed))},
-          {"worst_room_ms", {{"tick_late_p99", rounded(late_p99)}, {"tick_work_p99", rounded(work_p99)}, {"commit_p99", rounded(commit_p99)}}}};
+          {"worst_room_ms",
+           {{"tick_late_p99", rounded(late_p99)}, {"tick_work_p99", rounded(work_p99)}, {"commit_p99", rounded(commit_p99)}}}};
 }
 
 }  // namespace

@@ -23,7 +23,8 @@ inline constexpr std::chrono::milliseconds kCutsApart{haptic::CutRecorder::kTick
   step.entry.point_mm = Vec3(0, 0, 0);
   step.entry.axis = Vec3(0, 0, 1);
   haptic::test::Bench bench(haptic::test::block_case(40), {step});
-  while (!bench.session().done() && static_cast<double>(bench.cuts().size()) * 1e-3 * static_cast<double>(kCutsApart.count()) < seconds) {
+  const auto enough = static_cast<std::size_t>(seconds / std::chrono::duration<double>(kCutsApart).count());
+  while (!bench.session().done() && bench.cuts().size() < enough) {
     (void)bench.tick();
     bench.follow();
   }

@@ -122,7 +122,10 @@ json run_tool(const BadNetwork& network, double seconds) {
   fs::create_directories(folder / "kept");
   Stage stage(40.0, {"--journal", (folder / "kept" / "room.journal").string()});
   std::optional<ImpairProcess> relay;
-  RoomSessionOptions options{.address = stage.address(), .name = "uplink", .patience = 20s, .cache = folder / "cache", .fast_path = ""};
+  RoomSessionOptions options;
+  options.address = stage.address();
+  options.patience = 20s;
+  options.cache = folder / "cache";
   if (!network.impairment.empty()) {
     relay.emplace(std::vector<std::string>{"--tcp", stage.address(), "--udp", "127.0.0.1:" + udp_port_of(stage.server())});
     options.address = relay->tcp();
@@ -166,14 +169,16 @@ json run_tool(const BadNetwork& network, double seconds) {
   Clock::time_point last_cut{};
   for (const haptic::CutRow& cut : done.cuts)
     last_cut = std::max(last_cut, Clock::time_point(std::chrono::nanoseconds(cut.closed_mono_ns)));
-  const auto idle_from = samples.back().at - std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(kIdle_s - 1.5));
+  const std::chrono::duration<double> resting(kIdle_s - 1.5);
+  const auto idle_from = samples.back().at - std::chrono::duration_cast<Clock::duration>(resting);
   auto cut = done.cuts.begin();
   for (std::size_t i = 1; i < samples.size(); ++i) {
     std::uint64_t closed = 0;
     for (; cut != done.cuts.end() && cut->closed_mono_ns < samples[i].at.time_since_epoch().count(); ++cut) ++closed;
     // The line of the fast path is gone with the session.
-    if (samples[i].sent.datagrams < samples[i - 1].sent.datagrams || samples[i].sent.stream < samples[i - 1].sent.stream) continue;
-    const Sent sent{samples[i].sent.datagrams - samples[i - 1].sent.datagrams, samples[i].sent.stream - samples[i - 1].sent.stream};
+    const Sent &before = samples[i - 1].sent, &after = samples[i].sent;
+    if (after.datagrams < before.datagrams || after.stream < before.stream) continue;
+    const Sent sent{after.datagrams - before.datagrams, after.stream - before.stream};
     if (closed >= kCutsInBin) cutting.push_back(sent);
     if (samples[i - 1].at >= std::max(idle_from, last_cut + 500ms)) idle.push_back(sent);
   }
