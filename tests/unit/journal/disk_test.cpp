@@ -1,7 +1,12 @@
 // The disk in memory: what it may forget, and what it must not. And that the computer's own keeps the same promises.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
+#include <cstdio>
 #include <map>
+#include <thread>
+#include <vector>
 
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/support/temp_dir.hpp"
@@ -152,6 +157,30 @@ TEST(Disks, KeepTheSamePromises) {
   keep_promises(memory, "/a");
   const test::TempDir folder;
   keep_promises(system_disk(), folder.path());
+}
+
+// As whoever deletes a journal does, while others try to open it.
+TEST(Disks, ALockWhoseFileIsRemovedByItsHolderIsStillHeldByOneAlone) {
+  const test::TempDir folder;
+  const std::filesystem::path file = folder.path() / "lock";
+  std::atomic<int> holders = 0, most = 0, held = 0;
+  const auto take_turns = [&] {
+    for (int i = 0; i < 5000; ++i) {
+      const auto lock = system_disk().lock(file);
+      if (!lock) continue;
+      most = std::max<int>(most, ++holders);
+      ++held;
+      std::this_thread::yield();  // who else has one now?
+      --holders;
+      ASSERT_TRUE(system_disk().remove(file));  // from here on the name is anybody's
+    }
+  };
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 4; ++i) threads.emplace_back(take_turns);
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(most, 1);
+  EXPECT_GT(held, 0);
+  std::printf("%d locks held, never more than %d at a time\n", held.load(), most.load());
 }
 
 }  // namespace
