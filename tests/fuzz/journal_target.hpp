@@ -5,8 +5,10 @@
 namespace osteon::fuzz {
 
 // Any bytes as a sequence of rows, each with its place and time: what is refused changes nothing, what is taken makes the
-// same room again, from the beginning and from a checkpoint, and can be gone on with.
+// same room again. Without the bone's fields, ten times as fast as with them.
 [[nodiscard]] Target rows_target();
+// The same with them: from a checkpoint too, and gone on with.
+[[nodiscard]] Target evaluated_rows_target();
 [[nodiscard]] Target genesis_target();
 // Any bytes as a list of damages to a small journal: what is read or recovered is what was written, up to some row.
 [[nodiscard]] Target journal_file_target();

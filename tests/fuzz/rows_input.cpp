@@ -61,12 +61,13 @@ class Changes {
         break;
       }
       default:
-        if (below(4) == 0) leaf.values.resize(leaf.values.size() == 1 ? kLeafVoxels : 1, leaf.values.empty() ? std::int16_t{} : leaf.values[0]);
-        if (!leaf.values.empty()) number(leaf.values[below(leaf.values.size())]);
+        if (below(4) == 0) leaf.values.resize(leaf.is_constant() ? kLeafVoxels : 1, leaf.values[0]);
+        number(leaf.values[below(leaf.values.size())]);
     }
   }
   void change(Mask& mask) {
     std::vector<FieldLeaf> leaves = *mask;
+    if (leaves.empty()) leaves.push_back({BodyId{0}, 0, {}, {0}});
     one_of(leaves);
     if (below(4)) std::ranges::sort(leaves, {}, [](const FieldLeaf& leaf) { return std::pair(leaf.level, leaf.origin); });
     mask = std::make_shared<const std::vector<FieldLeaf>>(std::move(leaves));

@@ -19,8 +19,8 @@ struct Record {
   std::string bytes;
 };
 
-// What is done with the rows: bits of `how`. That the fields are evaluated takes all three of its own, for it takes longest.
-inline constexpr unsigned kFromCheckpoint = 1, kAsText = 2, kGoOn = 4, kDraw = 8, kEvaluate = 16 + 32 + 64;
+// What else is done with the rows: bits of `how`.
+inline constexpr unsigned kFromCheckpoint = 1, kAsText = 2, kGoOn = 4, kDraw = 8;
 
 // Two bytes, then of each row four and its own.
 struct RowsInput {

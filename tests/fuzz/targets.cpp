@@ -196,6 +196,7 @@ std::vector<Target> targets() {
           named("down_packet", datagram_target(as_down_packet, {a_down_packet()})),
           {"mesh_block", decode_any_block, {a_block().bytes, a_seamed_block().bytes}},
           rows_target(),
+          evaluated_rows_target(),
           genesis_target(),
           journal_file_target()};
 }
