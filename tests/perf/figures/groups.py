@@ -75,6 +75,8 @@ class Run:
     def outcome(self, program, *arguments):
         """What a program prints and its exit code, where another than 0 says something too."""
         result = subprocess.run([self.programs / program, *map(str, arguments)], capture_output=True, text=True, check=False)
+        if not result.stdout:
+            raise Failure(f"{program} ended with {result.returncode} and says nothing: {result.stderr.strip()[-400:]}")
         return result.stdout, result.returncode
 
     def phantom(self):
