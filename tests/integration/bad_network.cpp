@@ -106,7 +106,7 @@ BadNetworkRun run_on(const BadNetwork& network, std::uint64_t seed) {
   if (!wait_until([&] { return both([](Hand& hand) { return hand.surgeon().stands(); }); }, 30s)) run.fault = "a hand did not join";
   if (relay) {
     for (const std::string& command : network.impairment) (void)relay->command(command);
-    std::this_thread::sleep_for(300ms);
+    std::this_thread::sleep_for(1500ms);  // in some hundred packets both ends learn what is lost
   }
   std::vector<std::unique_ptr<Felt>> felt;
   for (std::size_t i = 0; i < 2; ++i)
