@@ -423,6 +423,10 @@ std::vector<FieldLeaf> Room::all_leaves() const {
 }
 
 Result<void> Room::set_fields(std::span<const FieldLeaf> leaves) {
+  const CoordBox near = about(bone());
+  for (const FieldLeaf& leaf : leaves)
+    if (leaf.level < 0 || leaf.level >= kLevels || !leaf.holds_values() || !near.contains(shift_down(leaf.origin, leaf.level)))
+      return failure(ErrorCode::invalid_input, "the fields hold a leaf that is none of this bone's");
   for (const FieldLeaf& leaf : leaves)
     if (!bodies_.contains(leaf.body))
       return failure(ErrorCode::invalid_input, "the fields hold leaves of body " + std::to_string(leaf.body.value) +

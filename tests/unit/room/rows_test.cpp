@@ -257,6 +257,17 @@ TEST(RoomReplay, RefusesARedoThatNamesOneEventTwice) {
   EXPECT_TRUE(room.replay({RoomSeq{6}, 1s, hand, RedoRow{{next_undo, undo}, {first, second}}}));
 }
 
+TEST(RoomReplay, RefusesFieldsThatAreNoneOfTheBones) {
+  Room room(test_block());
+  const Digest before = room.room_hash();
+  const std::int32_t furthest = std::numeric_limits<std::int32_t>::max() - 7;
+  for (const FieldLeaf& leaf : {FieldLeaf{BodyId{0}, 0, {furthest, 0, 0}, {5}}, FieldLeaf{BodyId{0}, 2, {0, 0, -4096}, {5}},
+                                FieldLeaf{BodyId{0}, kLevels, {}, {5}}, FieldLeaf{BodyId{0}, 0, {}, {}}, FieldLeaf{BodyId{1}, 0, {}, {5}}}) {
+    EXPECT_FALSE(room.set_fields({&leaf, 1}));
+    EXPECT_EQ(room.room_hash(), before);
+  }
+}
+
 TEST(RoomReplay, TakesNoMoreItemsThanTheRoomGives) {
   Room room(test_block());
   SceneItem item;
