@@ -111,7 +111,8 @@ Result<void> Room::can_follow(const RoomRow& row) const {
       };
       // Newest undo first, oldest event first, none twice.
       bool all = !redo.undos.empty() && std::ranges::all_of(redo.undos, stands) &&
-                 std::ranges::is_sorted(redo.undos, std::greater_equal{}) && std::ranges::is_sorted(redo.places, std::less_equal{});
+                 std::ranges::is_sorted(redo.undos, std::greater_equal{}) &&
+                 std::ranges::is_sorted(redo.places, std::less_equal{});
       for (const RoomSeq place : redo.places) all = all && room.can_be_undone(place) && room.events_.at(place).undone;
       return require(all, "it does again what was not undone");
     }

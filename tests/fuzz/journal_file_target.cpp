@@ -116,7 +116,10 @@ void open_any_journal(std::span<const std::uint8_t> data) {
 }  // namespace
 
 Target journal_file_target() {
-  return {"journal_file", open_any_journal, {{0}, {1, 0, 40, 2, 0, 3}, {0, 33, 0, 9, 0, 0, 18, 0, 1, 0, 7}, {1, 48, 200, 4, 99, 0}}, 500};
+  return {"journal_file",
+          open_any_journal,
+          {{0}, {1, 0, 40, 2, 0, 3}, {0, 33, 0, 9, 0, 0, 18, 0, 1, 0, 7}, {1, 48, 200, 4, 99, 0}},
+          500};
 }
 
 }  // namespace osteon::fuzz

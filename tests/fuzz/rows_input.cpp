@@ -22,7 +22,8 @@ class Changes {
   template <class T>
   void number(T& value) {
     if constexpr (std::is_floating_point_v<T>) {
-      constexpr std::array<T, 8> kOdd{0, 1, -1, T(1e-300), T(1e30), T(-1e308), std::numeric_limits<T>::infinity(), std::numeric_limits<T>::quiet_NaN()};
+      using Limits = std::numeric_limits<T>;
+      constexpr std::array<T, 8> kOdd{0, 1, -1, T(1e-300), T(1e30), T(-1e308), Limits::infinity(), Limits::quiet_NaN()};
       value = below(2) ? kOdd[below(kOdd.size())] : value + T(0.1) * (static_cast<T>(below(200)) - T(100));
     } else {
       switch (below(6)) {
@@ -30,14 +31,18 @@ class Changes {
         case 1: value = std::numeric_limits<T>::min(); break;
         case 2: value = static_cast<T>(T{1} << below(8 * sizeof(T) - 1)); break;
         case 3: value = static_cast<T>(below(20)); break;
-        default: value = static_cast<T>(static_cast<std::uint64_t>(value) + (below(2) ? 1 : std::uint64_t(-1)) * (1 + below(9))); break;
+        default: {
+          const std::uint64_t step = 1 + below(9), before = static_cast<std::uint64_t>(value);
+          value = static_cast<T>(below(2) ? before + step : before - step);
+        }
       }
     }
   }
   template <class T>
   void one_of(std::vector<T>& list) {
     if (list.empty() || below(8) == 0) {
-      list.insert(list.begin() + static_cast<std::ptrdiff_t>(below(list.size() + 1)), list.empty() ? T{} : list[below(list.size())]);
+      const T one = list.empty() ? T{} : list[below(list.size())];
+      list.insert(list.begin() + static_cast<std::ptrdiff_t>(below(list.size() + 1)), one);
     } else if (below(8) == 0) {
       list.erase(list.begin() + static_cast<std::ptrdiff_t>(below(list.size())));
     } else {

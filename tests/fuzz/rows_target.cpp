@@ -139,8 +139,8 @@ RowsInput as_input(Room& room, unsigned how, std::uint8_t checkpoint) {
 
 void cut_down(Room& room, AuthorId hand, double x_mm) {
   room.set_time(room.time() + kStep);
-  Cut cut = test::straight_cut(drill(), {kMiddle_mm + x_mm, kMiddle_mm, kLast_mm}, {kMiddle_mm + x_mm, kMiddle_mm, kLast_mm - 1}, {0, 0, -1},
-                              room.decided(hand) + 1);
+  const Vec3 from{kMiddle_mm + x_mm, kMiddle_mm, kLast_mm}, down{0, 0, -1};
+  Cut cut = test::straight_cut(drill(), from, from + down, down, room.decided(hand) + 1);
   cut.author = hand;
   cut.lease_epoch = room.lease_epoch(hand);
   cut.path_us = 8000;
@@ -226,11 +226,13 @@ std::vector<Bytes> rooms() {
 }  // namespace
 
 Target rows_target() {
-  return {"journal_rows", [](std::span<const std::uint8_t> data) { replay_any_rows(data, false); }, rooms(), 2000, change_rows};
+  const auto run = [](std::span<const std::uint8_t> data) { replay_any_rows(data, false); };
+  return {"journal_rows", run, rooms(), 2000, change_rows};
 }
 
 Target evaluated_rows_target() {
-  return {"journal_rows_evaluated", [](std::span<const std::uint8_t> data) { replay_any_rows(data, true); }, rooms(), 1000, change_rows};
+  const auto run = [](std::span<const std::uint8_t> data) { replay_any_rows(data, true); };
+  return {"journal_rows_evaluated", run, rooms(), 1000, change_rows};
 }
 
 Target genesis_target() {
