@@ -199,6 +199,11 @@ std::set<RoomSeq> Room::with_what_falls_too(std::set<RoomSeq> places) const {
           falls |= fallen < place && parent != bodies_.end() && parent->second.history.contains(fallen);
       } else if (event.kind == EventKind::remove_body) {
         falls = pieces_gone.contains(event.body);
+        // Whoever took the rest away had the piece in view: without it, the room would have no bone at all.
+        for (const RoomSeq fallen : places) {
+          const Event& split = events_.at(fallen);
+          falls |= fallen < place && split.kind == EventKind::split && split.body == event.body;
+        }
       }
       if (falls) more = places.insert(place).second;
     }

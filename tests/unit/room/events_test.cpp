@@ -304,6 +304,24 @@ TEST(RoomSplit, OfTwoPiecesOfABodyTheLaterFallsWithTheEarlier) {
   EXPECT_EQ(room.bodies().size(), 2u);
 }
 
+TEST(RoomSplit, UndoneItBringsBackTheBodyThatWasTakenAwayFromItsPiece) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  const Digest whole = room.field_hash();
+  const auto split = room.split(BodyId{0}, {half(room.bone(), true)}, room.bone_epoch());
+  ASSERT_TRUE(split);
+  const auto away = room.remove_body(surgeon, BodyId{0});
+  ASSERT_TRUE(away) << away.error().message;
+  const RoomSeq parting[] = {split->room_seq};
+  const auto undone = room.undo(surgeon, parting);
+  ASSERT_TRUE(undone) << undone.error().message;
+  EXPECT_EQ(undone->places, (std::vector<RoomSeq>{split->room_seq, away->room_seq}));
+  EXPECT_EQ(room.bodies(), std::vector<BodyId>{BodyId{0}});
+  EXPECT_EQ(room.field_hash(), whole);
+  ASSERT_TRUE(room.redo_last(surgeon, 1));
+  EXPECT_EQ(room.bodies(), std::vector<BodyId>{BodyId{1}});
+}
+
 TEST(RoomSplit, ABodyThatIsAwayMissesNoCut) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
