@@ -47,8 +47,15 @@ class ReceiveWindow {
     return item;
   }
 
-  // Every item up to this number was taken. To be acknowledged at once, or later where taking is not yet keeping: a cut when
-  // it is committed.
+  // All up to this number have come some other way: none of them comes out any more.
+  void skip(std::uint64_t upto) {
+    if (upto < next_) return;
+    held_.erase(held_.begin(), held_.upper_bound(upto));
+    next_ = upto + 1;
+  }
+
+  // Every item up to this number was taken, or skipped. To be acknowledged at once, or later where taking is not yet keeping:
+  // a cut when it is committed.
   [[nodiscard]] std::uint64_t acknowledged() const { return next_ - 1; }
   // Of the 64 items from upto + 2 on those that have come, taken or not, the lowest bit for upto + 2: what need not be sent
   // again. `upto`: what is acknowledged in the same packet.

@@ -79,6 +79,9 @@ void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
   }
   half_.is_alive(now);
   half_.heard(packet, *opened, now);
+  // A later time than now is no time of this client's.
+  if (packet.times().echo_sent_us() != 0 && packet.times().echo_sent_us() <= static_cast<std::uint64_t>(now / 1us))
+    arrived_at_ = std::max(arrived_at_, Time(std::chrono::microseconds(packet.times().echo_sent_us())));
   if (opened->newest) {
     lease_epoch_ = packet.lease_epoch();
     frozen_ = packet.frozen();

@@ -30,7 +30,8 @@ class ClientLink {
   // As the room has told them over the stream.
   [[nodiscard]] ToolNumbers& tools() { return tools_; }
 
-  // Every cut of this author, in order. False: it goes over the stream, since it is too long for a packet or too much is
+  // Every cut of this author, in order, but for those that are decided before it is their turn: an earlier session has
+  // brought them. False: it goes over the stream, since it is too long for a packet or too much is
   // unacknowledged. While the link is not alive(), every cut above acknowledged() goes over the stream too.
   [[nodiscard]] bool push(const Cut& cut);
   // The stream's word: cuts up to here are decided and kept.
@@ -43,6 +44,8 @@ class ClientLink {
   void receive(std::span<const std::uint8_t> datagram, Time now);
   // The stream's copy of a row. False: it has come before, or is too far ahead of what was taken.
   bool offer(const IndexedRow& row) { return rows_.offer(row.index, row.row); }
+  // The stream has brought this row, and before it all that had not been taken here: none of them comes out any more.
+  void heard(std::uint64_t index) { rows_.skip(index); }
   // Rows in order of their index, each once. A row of kind streamed comes only after its copy was offered.
   [[nodiscard]] std::optional<IndexedRow> take_row();
 
@@ -51,8 +54,9 @@ class ClientLink {
   // The datagram that is due, to the server, within `into` (kMostDatagramBytes); empty: none.
   [[nodiscard]] std::span<const std::uint8_t> send(Time now, std::span<std::uint8_t> into);
 
-  // Datagrams get through both ways: one has come lately that a server sends only where it knows the client to be.
-  [[nodiscard]] bool alive(Time now) const { return half_.alive(now); }
+  // Datagrams get through both ways: one has come lately that a server sends only where it knows the client to be, and it
+  // was said that one that went not long ago has arrived.
+  [[nodiscard]] bool alive(Time now) const { return half_.alive(now) && now - arrived_at_ < 2 * half_.options().alive_for; }
   // Cuts up to this one are decided and kept.
   [[nodiscard]] std::uint64_t acknowledged() const { return half_.acknowledged(); }
   // Rows up to this one have come, and were taken.
@@ -85,6 +89,7 @@ class ClientLink {
   std::map<std::uint64_t, Partner> partners_;  // by author
   std::uint64_t lease_epoch_ = 0;
   bool frozen_ = false;
+  Time arrived_at_ = -std::chrono::hours(1);   // when the newest packet went of which the server says that it has arrived
 
   std::optional<HeardState> state_, said_;  // newest, and last sent
   bool moved_ = false;                      // from the one to the other, by more than the deadband

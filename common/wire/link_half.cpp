@@ -85,7 +85,7 @@ bool LinkHalf::acknowledge(std::uint64_t upto, std::uint64_t beyond) {
 }
 
 bool LinkHalf::begin(std::uint64_t number) {
-  OSTEON_CHECK(number == last_ + 1);
+  OSTEON_CHECK(number > last_);
   last_ = number;
   if (window_.empty() && window_.next() != number) {
     // All before went over the stream.

@@ -71,7 +71,7 @@ class LinkHalf {
 
   // --- what goes
   // The next item is this one, and the window is ready for it. False where it has to go over the stream. Every item is
-  // announced here, in order.
+  // announced here, in order, but for those that the other end is known to have.
   [[nodiscard]] bool begin(std::uint64_t number);
   void goes_over_stream() { ++counts_.streamed; }
   // An acknowledgement has something to say, and goes with the next packet.

@@ -67,9 +67,10 @@ void ServerLink::receive(const Endpoint& from, std::span<const std::uint8_t> dat
 }
 
 void ServerLink::decided(std::uint64_t author_seq) {
-  OSTEON_CHECK(author_seq >= decided_ && author_seq <= cuts_.acknowledged());
-  if (author_seq != decided_) half_.answer();
+  if (author_seq <= decided_) return;
+  cuts_.skip(author_seq);
   decided_ = author_seq;
+  half_.answer();
 }
 
 std::optional<HeardState> ServerLink::take_state() {

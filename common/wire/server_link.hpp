@@ -34,7 +34,8 @@ class ServerLink {
   bool offer(const Cut& cut) { return cuts_.offer(cut.author_seq, cut); }
   // Cuts in order of their author_seq, each once.
   [[nodiscard]] std::optional<Cut> take_cut() { return cuts_.take(); }
-  // Cuts up to here were decided, and what was decided is kept: they are acknowledged.
+  // Cuts up to here were decided, and what was decided is kept: they are acknowledged. Also cuts that came by an earlier
+  // session of this author, and are decided only now.
   void decided(std::uint64_t author_seq);
   // Newest state of the tool, once.
   [[nodiscard]] std::optional<HeardState> take_state();

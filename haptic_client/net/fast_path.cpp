@@ -74,7 +74,7 @@ bool FastPath::send(const CuttingState& state) {
 
 void FastPath::heard(std::uint64_t index) {
   const std::lock_guard lock(mutex_);
-  link_.offer({index, {}});
+  link_.heard(index);
 }
 
 void FastPath::decided(std::uint64_t author_seq) {

@@ -90,5 +90,25 @@ TEST(ReceiveWindow, AnyOrderAndRepetitionGivesTheSameSequence) {
   std::printf("%llu items offered\n", static_cast<unsigned long long>(offers));
 }
 
+// Items that came some other way do not come out, nor hold up those behind them.
+TEST(ReceiveWindow, WhatIsSkippedIsPassedOver) {
+  ReceiveWindow<int> window(1, 8);
+  EXPECT_TRUE(window.offer(2, 2));
+  EXPECT_TRUE(window.offer(5, 5));
+  window.skip(3);
+  EXPECT_EQ(window.acknowledged(), 3u);
+  EXPECT_EQ(window.held(), 1u);
+  EXPECT_EQ(window.beyond(3), 1u);
+  EXPECT_FALSE(window.offer(3, 3));
+  EXPECT_FALSE(window.take());
+  window.skip(2);
+  EXPECT_TRUE(window.offer(4, 4));
+  EXPECT_EQ(window.take(), 4);
+  EXPECT_EQ(window.take(), 5);
+  window.skip(1'000'000);
+  EXPECT_TRUE(window.offer(1'000'001, 6));
+  EXPECT_EQ(window.take(), 6);
+}
+
 }  // namespace
 }  // namespace osteon

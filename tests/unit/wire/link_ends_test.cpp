@@ -408,6 +408,63 @@ TEST(LinkEnds, AliveIsWhoGetsThroughBothWays) {
   EXPECT_FALSE(pair.server.alive(pair.now));
 }
 
+// A client that hears its server, and is not heard, would put its cuts into datagrams for ever.
+TEST(LinkEnds, WhoIsNotHeardIsNotAliveThoughHeHears) {
+  Pair pair;
+  pair.run(300ms);
+  ASSERT_TRUE(pair.client.alive(pair.now));
+  pair.lost = [](const v1::UpPacket&) { return true; };
+  const std::size_t heard = pair.downs.size();
+  pair.run(1500ms);
+  EXPECT_GT(pair.downs.size(), heard);
+  EXPECT_FALSE(pair.client.alive(pair.now));
+  pair.lost = {};
+  pair.run(700ms);
+  EXPECT_TRUE(pair.client.alive(pair.now));
+}
+
+// Both ends meet cuts that an earlier session of the author has brought, and that are decided only now.
+TEST(LinkEnds, CutsOfAnEarlierSessionAreLeftOut) {
+  Pair pair;
+  pair.run(300ms);
+  pair.server.decided(2);
+  pair.server.decided(1);
+  EXPECT_FALSE(pair.server.offer(pair.cut(2)));
+  ASSERT_TRUE(pair.client.push(pair.cut(3)));
+  ASSERT_TRUE(pair.client.push(pair.cut(4)));
+  pair.run(100ms);
+  EXPECT_EQ(pair.client.acknowledged(), 2u);
+  EXPECT_EQ(pair.server.take_cut(), pair.cut(3));
+  EXPECT_EQ(pair.server.take_cut(), pair.cut(4));
+  pair.server.decided(4);
+  pair.run(100ms);
+  EXPECT_EQ(pair.client.acknowledged(), 4u);
+  EXPECT_TRUE(pair.client.half().window().empty());
+}
+
+// After a long stop the stream brings thousands of rows in a moment.
+TEST(LinkEnds, RowsGoOnBehindAnyNumberThatTheStreamBrought) {
+  constexpr std::uint64_t kRows = 5000;
+  Pair pair;
+  pair.run(300ms);
+  const auto row = [&](std::uint64_t n) {
+    return wire::IndexedRow{n, {.room_seq = {n}, .kind = wire::SessionRowKind::committed, .cut = pair.cut(n)}};
+  };
+  for (std::uint64_t n = 1; n <= kRows; ++n) {
+    (void)pair.server.push(row(n));
+    pair.client.heard(n);
+  }
+  EXPECT_FALSE(pair.client.take_row());
+  pair.run(500ms);
+  EXPECT_EQ(pair.server.acknowledged(), kRows);
+  EXPECT_TRUE(pair.server.push(row(kRows + 1)));
+  pair.run(100ms);
+  const auto taken = pair.client.take_row();
+  ASSERT_TRUE(taken);
+  EXPECT_EQ(taken->index, kRows + 1);
+  EXPECT_EQ(taken->row.cut, pair.cut(kRows + 1));
+}
+
 // What is known to have come ahead of its turn is not sent again.
 TEST(LinkEnds, OnlyWhatIsMissingIsRepeated) {
   wire::LinkOptions up, down = wire::server_link_options();
