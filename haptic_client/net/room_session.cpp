@@ -173,7 +173,7 @@ struct RoomSession::Impl {
   // Reads until the stream ends; why it did.
   grpc::Status serve(Line& line, std::optional<Error>& broken);
   void write(Line& line);
-  // What a stream brings for the session itself.
+  // What a stream brings for the session itself; under read_mutex.
   void follow(const v1::SessionResponse& response);
   void open_fast_path(std::uint64_t decided);
   void close_fast_path();
@@ -312,9 +312,11 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
       const std::lock_guard lock(mutex);
       if (over) break;
     }
-    follow(response);
     const Result<void> delivered = [&] {
+      // As one, so that no row of a datagram comes between: it may name a tool that only its path knows yet, or follow leaves
+      // that are not all there.
       const std::lock_guard lock(read_mutex);
+      follow(response);
       return reader->take(std::move(response));
     }();
     if (!delivered) {
