@@ -43,6 +43,8 @@ std::string_view name(Invariant invariant) {
     case Invariant::felt: return "felt";
     case Invariant::decided: return "decided";
     case Invariant::served: return "served";
+    case Invariant::datagrams: return "datagrams";
+    case Invariant::settled: return "settled";
   }
   return "unknown";
 }
@@ -52,7 +54,16 @@ void Ledger::fault(Invariant invariant, std::string sentence) {
   if (faults_.size() < kEnough) faults_.push_back({invariant, std::move(sentence)});
 }
 
-void Ledger::made(const Cut& cut) { made_[cut.author].push_back(cut); }
+void Ledger::made(const Cut& cut, std::chrono::nanoseconds now) {
+  made_[cut.author].push_back(cut);
+  made_at_[cut.author].push_back(now);
+}
+
+std::optional<std::chrono::nanoseconds> Ledger::age(const Cut& cut, std::chrono::nanoseconds now) const {
+  const auto made = made_at_.find(cut.author);
+  if (made == made_at_.end() || cut.author_seq == 0 || cut.author_seq > made->second.size()) return {};
+  return now - made->second[cut.author_seq - 1];
+}
 
 void Ledger::told(RoomSeq place, const Told& what) {
   told_up_to(place);

@@ -1,5 +1,6 @@
 // What a simulated room has promised, noted where it was heard, and what is wrong with its journal in the light of that.
 #pragma once
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -23,6 +24,8 @@ enum class Invariant {
   felt,            // a hand feels those of its cuts that may still be taken, and no others
   decided,         // every cut of a client that is there is decided
   served,          // nobody is turned away, and what must work works
+  datagrams,       // only what a peer has sealed is taken, once, and it says what the stream says
+  settled,         // after quiet all is decided and told within two seconds
 };
 [[nodiscard]] std::string_view name(Invariant invariant);
 
@@ -39,7 +42,9 @@ class Ledger {
   }
 
   // An author's cuts as he made them; numbered from 1.
-  void made(const Cut& cut);
+  void made(const Cut& cut, std::chrono::nanoseconds now);
+  // So long ago; none where there is no such cut.
+  [[nodiscard]] std::optional<std::chrono::nanoseconds> age(const Cut& cut, std::chrono::nanoseconds now) const;
   // What a client heard, or was answered.
   void told_committed(RoomSeq place, const Cut& cut);
   void told_rejected(RoomSeq place, AuthorId author, std::uint64_t author_seq);
@@ -69,6 +74,7 @@ class Ledger {
                     std::map<AuthorId, std::uint64_t>& newest);
 
   std::map<AuthorId, std::vector<Cut>> made_;
+  std::map<AuthorId, std::vector<std::chrono::nanoseconds>> made_at_;
   std::map<RoomSeq, Told> told_;
   std::map<AuthorId, std::uint64_t> decided_;
   RoomSeq furthest_;

@@ -22,7 +22,7 @@ inline SimulationReport simulate_quietly(std::uint64_t seed, const SimulationOpt
 inline void expect_no_faults(const SimulationReport& report, const char* option) {
   for (const Fault& fault : report.faults)
     ADD_FAILURE() << "seed " << report.seed << ": " << name(fault.invariant) << ": " << fault.sentence
-                  << "\nagain: osteon-simulate --verbose --seeds " << report.seed << option;
+                  << "\n  again: osteon-simulate --verbose --seeds " << report.seed << option;
 }
 
 // In how many of the first seeds something so broken is found.

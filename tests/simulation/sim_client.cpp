@@ -25,10 +25,51 @@ bool may_be_told(const std::string& why) {
 
 }  // namespace
 
-SimClient::SimClient(VirtualTime& time, Ledger& ledger, SimServer& server, std::uint64_t seed, const Case& bone,
-                     const HandPlan& hand, Breakage breakage)
-    : time_(time), ledger_(ledger), server_(server), random_(seed), path_(time, seed + 1, {}), bone_(bone), hand_(hand),
-      breakage_(breakage), cuts_left_(hand.cuts) {}
+SimClient::SimClient(VirtualTime& time, Ledger& ledger, SimServer& server, Datagrams& datagrams, std::uint64_t number,
+                     std::uint64_t seed, const Case& bone, const HandPlan& hand, const DatagramPlan& plan, Breakage breakage)
+    : time_(time), ledger_(ledger), server_(server), datagrams_(datagrams), number_(number), random_(seed),
+      path_(time, seed + 1, {}), plan_(plan), bone_(bone), hand_(hand), breakage_(breakage), cuts_left_(hand.cuts) {}
+
+void SimClient::set_ways() {
+  const Endpoint own = node(number_, port_), room = node(Datagrams::kServer);
+  PathQuality up = plan_.quality, down = plan_.quality;
+  if (plan_.up_blocked || up_stopped_ > 0) up.loss = 1;
+  if (plan_.down_blocked || down_stopped_ > 0) down.loss = 1;
+  datagrams_.network().set_quality(own, room, up);
+  datagrams_.network().set_quality(room, own, down);
+}
+
+void SimClient::move() {
+  if (!fast_) return;
+  ++port_;
+  set_ways();
+  fast_->move(node(number_, port_));
+}
+
+void SimClient::stop_datagrams(bool up, bool down, Time from, Time until) {
+  const auto add = [this, up, down](int one) {
+    up_stopped_ += up ? one : 0;
+    down_stopped_ += down ? one : 0;
+    set_ways();
+  };
+  time_.post(from, [add] { add(1); });
+  time_.post(until, [add] { add(-1); });
+}
+
+void SimClient::block_datagrams(bool up, bool down) {
+  plan_.up_blocked |= up;
+  plan_.down_blocked |= down;
+  set_ways();
+}
+
+void SimClient::heal() {
+  path_.set({});
+  path_.heal();
+  plan_.quality = {.delay = 1ms};
+  up_stopped_ = down_stopped_ = 0;
+  set_ways();
+  if (stream_ && stream_->delayed_until() != Time::max()) held_back_until_ = stream_->delayed_until();
+}
 
 template <class Call>
 void SimClient::later(Time in, Call call) {
@@ -80,6 +121,7 @@ void SimClient::start() {
 
 void SimClient::start_anew() {
   if (stream_) stream_->leave(SimStream::client);
+  fast_.reset();
   ++life_;
   later(drawn(random_, 300ms, 2s), [this] { start(); });
 }
@@ -92,6 +134,7 @@ void SimClient::lost(const std::string& why) {
 void SimClient::leave() {
   if (stream_) stream_->leave(SimStream::client);
   stream_.reset();
+  fast_.reset();
   gone_ = true;
   ++life_;
 }
@@ -114,12 +157,13 @@ void SimClient::joined(const SimServer::Joined& room) {
       room.author, tools_, events(),
       [this](std::uint64_t author_seq) {
         ledger_.told_decided(room_->author, author_seq);
+        if (fast_) fast_->decided(author_seq);
         underway_->decided(author_seq);
       },
       [this](std::uint64_t author_seq) {
         ledger_.told_decided(room_->author, author_seq);
         underway_->go_on(author_seq);
-        send();
+        later(drawn(random_, 0ns, 1ms), [this] { send(); });  // its writer wakes up
       });
   open_line();
   later(drawn(random_, 0ns, 100ms), [this] { move_hand(); });
@@ -129,6 +173,10 @@ void SimClient::open_line() {
   stream_ = std::make_shared<SimStream>(path_, random_.unit() < 0.2 ? 2048 : kWindowBytes);
   underway_->stop();
   reader_->begin();
+  offer_.reset();
+  numbered_tools_.clear();
+  fast_.reset();
+  said_.clear();
   const auto on_line = [this, life = life_, line = stream_.get()](auto call) {
     if (life == life_ && stream_.get() == line) call();
   };
@@ -150,6 +198,7 @@ void SimClient::open_line() {
 }
 
 void SimClient::line_ended(const Ending& ending) {
+  fast_.reset();
   if (ending.stands) return lost(ending.why);
   pass(Interrupted{});
   come_again();
@@ -176,15 +225,80 @@ void SimClient::send() {
   while (stream_->writable(SimStream::client)) {
     const std::optional<Cut> cut = underway_->take_cut();
     if (!cut) return;
+    if (fast_ && fast_->send(*cut)) continue;
     v1::SessionRequest request;
     *request.mutable_cut() = wire::to_wire(*cut);
     stream_->write(SimStream::client, request.SerializeAsString());
   }
 }
 
+// What a stream brings for the session itself.
+void SimClient::follow(const v1::SessionResponse& response) {
+  if (response.has_link()) offer_ = response.link();
+  if (response.has_tool() && response.tool().tool_number() != 0)
+    if (const Result<Digest> tool = wire::digest_from_wire(response.tool().tool().tool_hash())) {
+      numbered_tools_.emplace_back(response.tool().tool_number(), *tool);
+      if (fast_) fast_->know_tool(response.tool().tool_number(), *tool);
+    }
+  if (response.has_complete()) open_fast_path(response.complete().decided_author_seq());
+  if (fast_ && response.index() != 0) fast_->heard(response.index());
+}
+
+void SimClient::open_fast_path(std::uint64_t decided) {
+  if (!offer_ || !plan_.wanted) return;
+  const auto bytes_of = [](const std::string& text) {
+    return std::span<const std::uint8_t>(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
+  };
+  const std::optional<SealKey> up = key_of(bytes_of(offer_->key_up())), down = key_of(bytes_of(offer_->key_down()));
+  ledger_.check(up && down, Invariant::served, "the room offers a fast path without keys");
+  if (!up || !down) return;
+  ++port_;
+  set_ways();
+  fast_ = std::make_unique<SimFastPath>(datagrams_, random_.index(1 << 30), node(number_, port_),
+                                        SessionKeys{offer_->session(), *up, *down}, decided + 1, plan_.link, plan_.clock_ahead,
+                                        SimFastPath::Hears{.row = [this](wire::IndexedRow row) { hear_row(std::move(row)); },
+                                                           .dead = [this] {
+                                                             underway_->again();
+                                                             send();
+                                                           }});
+  for (const auto& [number, tool] : numbered_tools_) fast_->know_tool(number, tool);
+}
+
+void SimClient::hear_row(wire::IndexedRow row) {
+  if (row.row.kind != wire::SessionRowKind::streamed) {
+    ++datagrams_.counts().rows;
+    said_.emplace(row.index, row.row);
+  }
+  by_datagram_ = true;
+  const Result<void> taken = reader_->take(std::move(row));
+  by_datagram_ = false;
+  ledger_.check(taken.has_value(), Invariant::datagrams, "a row that came in a datagram is not taken");
+}
+
+void SimClient::compare(const v1::SessionResponse& response) {
+  const auto said = said_.find(response.index());
+  if (response.index() == 0 || said == said_.end()) return;
+  const wire::SessionRow& row = said->second;
+  const bool same = [&] {
+    if (response.has_committed()) {
+      const Result<Cut> cut = wire::from_wire(response.committed().cut());
+      return row.kind == wire::SessionRowKind::committed && row.room_seq.value == response.committed().room_seq() && cut &&
+             *cut == row.cut;
+    }
+    if (response.has_rejected())
+      return row.kind == wire::SessionRowKind::rejected && row.room_seq.value == response.rejected().room_seq() &&
+             row.author_seq == response.rejected().author_seq() && row.lease_epoch == response.rejected().lease_epoch();
+    return false;
+  }();
+  ledger_.check(same, Invariant::datagrams,
+                "the stream says another row " + std::to_string(response.index()) + " than datagrams did");
+}
+
 void SimClient::hear(const std::string& bytes) {
   v1::SessionResponse response;
   ledger_.check(response.ParseFromString(bytes), Invariant::served, "a message cannot be parsed");
+  compare(response);
+  follow(response);
   if (const Result<void> taken = reader_->take(std::move(response)); !taken)
     lost("it sent what no correct server sends: " + taken.error().message);
 }
@@ -198,7 +312,7 @@ RoomEvents SimClient::events() {
   };
   events.committed = [this](RoomSeq place, const Cut& cut) {
     ledger_.told_committed(place, cut);
-    pass(Committed{place, cut});
+    pass(Committed{place, cut, by_datagram_});
   };
   events.rejected = [this](RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string&) {
     ledger_.told_rejected(place, room_->author, author_seq);
@@ -267,6 +381,10 @@ void SimClient::take(const RoomAtJoin& room) {
 void SimClient::take(const Committed& committed) {
   if (committed.cut.author == room_->author) felt_.erase(committed.cut.author_seq);
   replica_->commit(committed.place, committed.cut, committed.cut.author == room_->author);
+  const std::optional<Time> age = ledger_.age(committed.cut, time_.now());
+  if (age && committed.cut.author != room_->author)
+    (committed.by_datagram ? felt_by_datagram_ms_ : felt_by_stream_ms_)
+        .push_back(std::chrono::duration<float, std::milli>(*age).count());
 }
 
 void SimClient::take(const Rejected& rejected) {
@@ -297,6 +415,10 @@ void SimClient::watch() {
 bool SimClient::settled() const {
   return room_ && stream_ && stream_->at_rest() && bone_is_here_ && !interrupted_ && from_room_.empty() &&
          underway_->undecided() == 0 && replica_->unconfirmed() == 0;
+}
+
+bool SimClient::connected() const {
+  return room_ && stream_ && stream_->open() && bone_is_here_ && !interrupted_ && time_.now() >= held_back_until_;
 }
 
 std::string SimClient::standing() const {
@@ -340,9 +462,17 @@ void SimClient::cut(int left) {
   }
   at_ = quantise(pose_along(to, {0, 0, -1}));
   own_.push_back(one);
-  ledger_.made(one);
+  ledger_.made(one, time_.now());
   const bool pushed = underway_->push(one);
   ledger_.check(pushed && underway_->undecided() <= kMostUnderway, Invariant::bounds, "cuts under way are beyond their bound");
+  if (fast_) {
+    CuttingState state;
+    state.author = room_->author;
+    state.state_seq = ++state_seq_;
+    state.pose_bone_tool = dequantise(at_);
+    state.phase = CuttingPhase::cutting;
+    fast_->send(state);
+  }
   send();
   replica_->add_own(one);
   felt_[one.author_seq] = one.lease_epoch;

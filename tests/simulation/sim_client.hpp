@@ -17,6 +17,7 @@
 #include "haptic_client/net/cuts_underway.hpp"
 #include "haptic_client/net/session_reader.hpp"
 #include "tests/simulation/ledger.hpp"
+#include "tests/simulation/sim_link.hpp"
 #include "tests/simulation/sim_server.hpp"
 #include "tests/simulation/sim_stream.hpp"
 
@@ -33,13 +34,22 @@ struct HandPlan {
   double undo = 0.12, redo = 0.06, mark = 0.05, again = 0.15, beyond = 0.08;
 };
 
+// How a client's datagrams fare.
+struct DatagramPlan {
+  bool wanted = false;           // it takes the fast path that it is offered
+  PathQuality quality;           // both ways
+  bool up_blocked = false, down_blocked = false;  // for good: something on the way lets none through
+  wire::LinkOptions link;
+  std::chrono::nanoseconds clock_ahead{};
+};
+
 class SimClient {
  public:
   using Time = VirtualTime::Time;
   static constexpr std::size_t kMostUnderway = 1024;  // RoomSession::kMaxWaitingCuts
 
-  SimClient(VirtualTime& time, Ledger& ledger, SimServer& server, std::uint64_t seed, const Case& bone, const HandPlan& hand,
-            Breakage breakage);
+  SimClient(VirtualTime& time, Ledger& ledger, SimServer& server, Datagrams& datagrams, std::uint64_t number, std::uint64_t seed,
+            const Case& bone, const HandPlan& hand, const DatagramPlan& plan, Breakage breakage);
   void start();                  // the program; its hand begins when the bone is there
   void rest() { resting_ = true; }
   void leave();                  // for good
@@ -47,20 +57,33 @@ class SimClient {
     if (stream_) stream_->break_off(why);
   }
   [[nodiscard]] SimPath& path() { return path_; }
+  // Datagrams go from another address, as where a router forgets which was whose.
+  void move();
+  // In this time none gets through, on the way up, down or both.
+  void stop_datagrams(bool up, bool down, Time from, Time until);
+  // From now on, for good.
+  void block_datagrams(bool up, bool down);
+  void heal();                   // all ways that are not blocked are good from now on
 
   [[nodiscard]] bool here() const { return !gone_; }
   [[nodiscard]] bool settled() const;
+  // It is on the line, and what the network has held back until now has come.
+  [[nodiscard]] bool connected() const;
   [[nodiscard]] std::string standing() const;        // for messages
   [[nodiscard]] Digest hash() const { return replica_->hash(); }
   [[nodiscard]] RoomSeq room_seq() const { return replica_->room_seq(); }
   [[nodiscard]] std::uint64_t cuts() const { return cuts_made_; }
   [[nodiscard]] std::uint64_t resumed() const { return resumed_; }
   [[nodiscard]] std::uint64_t programs() const { return programs_; }
+  // Milliseconds from others' cuts until the replica had them, by what brought them.
+  [[nodiscard]] const std::vector<float>& felt_by_datagram_ms() const { return felt_by_datagram_ms_; }
+  [[nodiscard]] const std::vector<float>& felt_by_stream_ms() const { return felt_by_stream_ms_; }
 
  private:
   struct Committed {
     RoomSeq place;
     Cut cut;
+    bool by_datagram;
   };
   struct Rejected {
     RoomSeq place;
@@ -86,6 +109,11 @@ class SimClient {
   void start_anew();
   void send();
   void hear(const std::string& bytes);
+  void follow(const v1::SessionResponse& response);
+  void open_fast_path(std::uint64_t decided);
+  void set_ways();               // of the present address
+  void hear_row(wire::IndexedRow row);
+  void compare(const v1::SessionResponse& response);  // with what a datagram has said of the same row
   [[nodiscard]] RoomEvents events();
 
   void pass(FromRoom event);
@@ -108,8 +136,14 @@ class SimClient {
   VirtualTime& time_;
   Ledger& ledger_;
   SimServer& server_;
+  Datagrams& datagrams_;
+  const std::uint64_t number_;
   Random random_;
   SimPath path_;
+  DatagramPlan plan_;
+  int up_stopped_ = 0, down_stopped_ = 0;
+  std::uint16_t port_ = 0;                           // of its address
+  std::vector<float> felt_by_datagram_ms_, felt_by_stream_ms_;
   const Case& bone_;
   const HandPlan hand_;
   const Breakage breakage_;
@@ -123,6 +157,13 @@ class SimClient {
   std::shared_ptr<SimStream> stream_;                // shared with what is under way on it
   std::optional<CutsUnderway> underway_;
   std::optional<SessionReader> reader_;
+  std::optional<v1::LinkOffer> offer_;               // of the present stream
+  std::vector<std::pair<std::uint32_t, Digest>> numbered_tools_;
+  std::unique_ptr<SimFastPath> fast_;
+  std::map<std::uint64_t, wire::SessionRow> said_;   // by datagrams: rows of the present stream by index
+  bool by_datagram_ = false;                         // what is being heard
+  std::uint64_t state_seq_ = 0;
+  Time held_back_until_{};
   std::optional<Backoff> backoff_;
   std::shared_ptr<ToolBox> tools_;                   // shared with the replica's fields
   std::optional<haptic::Replica> replica_;

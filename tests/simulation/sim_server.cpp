@@ -35,9 +35,12 @@ std::shared_ptr<ToolBox> few_tools() {
 }
 
 // What SessionStream of server/net/session_service.cpp does between gRPC and the host.
-class SimServer::Session final : public SessionSink, public std::enable_shared_from_this<Session> {
+class SimServer::Session final : public SessionSink,
+                                 public std::enable_shared_from_this<Session>,
+                                 private SimLinks::Sink {
  public:
   static constexpr int kMaxQueuedCuts = 256;
+  static constexpr int kMostUndecided = 1024;  // of a client: what may come in datagrams while nothing is decided
 
   Session(SimServer& server, std::shared_ptr<SimStream> stream) : server_(server), stream_(std::move(stream)) {}
 
@@ -52,6 +55,7 @@ class SimServer::Session final : public SessionSink, public std::enable_shared_f
   }
   // The server's process is gone.
   void die() {
+    unlink();
     done_ = true;
     stream_->leave(SimStream::server);
   }
@@ -59,6 +63,11 @@ class SimServer::Session final : public SessionSink, public std::enable_shared_f
 
   AuthorId author() const override { return author_; }
   void begin(RoomSeq contained, MessageParts before, Bytes complete) override {
+    v1::SessionResponse said;
+    if (server_.links_ && said.ParseFromString(*complete)) {
+      link_ = server_.links_->add(author_, said.complete().decided_author_seq() + 1, *this);
+      before.insert(before.begin(), link_offer());
+    }
     outbox_.begin(contained, std::move(before), std::move(complete));
     pump();
   }
@@ -66,20 +75,25 @@ class SimServer::Session final : public SessionSink, public std::enable_shared_f
     outbox_.set_leaves(std::move(leaves));
     pump();
   }
-  void offer(RoomSeq place, const Bytes& row) override {
+  void offer(RoomSeq place, const Bytes& row) override { offer(place, row, {.room_seq = place}); }
+  void offer(RoomSeq place, const Bytes& row, const wire::SessionRow& fast) override {
+    if (closing_ || done_) return;
     const auto chance = [&] { return outbox_.takes(place) && server_.random_.index(8) == 0; };
     if (server_.condition_.breakage == Breakage::skipping && chance()) return;
     if (server_.condition_.breakage == Breakage::ordering) {
       if (!held_back_ && chance()) {
-        held_back_.emplace(place, row);
+        held_back_.emplace(HeldBack{place, row, fast});
         return;
       }
-      add(outbox_.add(place, row));
-      if (held_back_) add(outbox_.add(held_back_->first, held_back_->second));
+      tell(place, row, fast);
+      if (held_back_) tell(held_back_->place, held_back_->row, held_back_->fast);
       held_back_.reset();
       return;
     }
-    add(outbox_.add(place, row));
+    tell(place, row, fast);
+  }
+  void know_tool(std::uint32_t number, const Digest& tool) override {
+    if (link_) link_->know_tool(number, tool);
   }
   void answer(const Bytes& row) override { add(outbox_.add_answer(row)); }
   void refuse(const Error& why) override { close({true, why.message}); }
@@ -117,8 +131,22 @@ class SimServer::Session final : public SessionSink, public std::enable_shared_f
     Result<Cut> cut = wire::from_wire(message);
     if (!cut) return close({true, cut.error().message});
     if (cut->author != author_) return close({true, "cut.author is not the author who opened the session"});
+    // One that was taken before is answered with its first outcome; one ahead of its turn may follow others that come in
+    // datagrams.
+    if (link_ && cut->author_seq > taken_)
+      link_->offer(*cut);
+    else
+      take(std::move(*cut));
+    paused_ = queued_ >= kMaxQueuedCuts;
+    if (paused_) stream_->stop_reading(SimStream::server);
+  }
+
+  // In order of their author_seq, over whichever way they came.
+  void take(Cut cut) override {
+    if (closing_ || done_) return;
+    taken_ = std::max(taken_, cut.author_seq);
     if (server_.condition_.breakage == Breakage::dedup) {
-      const auto taken_again = [cut = *cut](Room& room) mutable -> Result<RoomEvent> {
+      const auto taken_again = [cut](Room& room) mutable -> Result<RoomEvent> {
         if (cut.author_seq <= room.decided(cut.author)) {
           cut.author_seq = room.decided(cut.author) + 1;
           (void)room.submit(cut);
@@ -128,10 +156,46 @@ class SimServer::Session final : public SessionSink, public std::enable_shared_f
       server_.host_->queue_event(taken_again, [](const Result<RoomEvent>&) {});
     }
     ++queued_;
-    server_.ledger_.check(queued_ <= kMaxQueuedCuts, Invariant::bounds, "a session has more cuts queued than it may");
-    server_.host_->queue_cut(shared_from_this(), std::move(*cut), {});
-    paused_ = queued_ >= kMaxQueuedCuts;
-    if (paused_) stream_->stop_reading(SimStream::server);
+    server_.ledger_.check(queued_ <= (link_ ? kMostUndecided : kMaxQueuedCuts), Invariant::bounds,
+                          "a session has more cuts queued than it may");
+    server_.host_->queue_cut(shared_from_this(), std::move(cut), {});
+  }
+  void take(CuttingState state) override {
+    if (!closing_ && !done_) server_.host_->offer_state(std::move(state));
+  }
+  void arrived(std::uint64_t index) override { outbox_.arrived(index); }
+
+  void tell(RoomSeq place, const Bytes& row, const wire::SessionRow& fast) {
+    const std::uint64_t before = outbox_.index();
+    const bool taken = outbox_.add(place, row);
+    tell_fast(place, fast, outbox_.index() > before);
+    add(taken);
+  }
+  void tell_fast(RoomSeq place, const wire::SessionRow& fast, bool numbered) {
+    if (!link_) return;
+    const bool committed = fast.kind == wire::SessionRowKind::committed;
+    if (committed && fast.cut.author == author_) link_->decided(fast.cut.author_seq);
+    if (fast.kind == wire::SessionRowKind::rejected) {
+      link_->decided(fast.author_seq);
+      link_->set_lease_epoch(fast.lease_epoch);
+    }
+    if (!numbered) return;
+    const bool fits = !committed || wire::fits_a_packet(fast.cut);
+    const bool goes = link_->tell({outbox_.index(), fits ? fast : wire::SessionRow{.room_seq = place}});
+    if (goes && server_.condition_.breakage == Breakage::pruning) outbox_.arrived(outbox_.index());
+  }
+  [[nodiscard]] Bytes link_offer() const {
+    v1::SessionResponse response;
+    v1::LinkOffer& offer = *response.mutable_link();
+    offer.set_session(link_->keys().session);
+    offer.set_key_up(link_->keys().up.bytes.data(), link_->keys().up.bytes.size());
+    offer.set_key_down(link_->keys().down.bytes.data(), link_->keys().down.bytes.size());
+    offer.set_udp_port(node(Datagrams::kServer).port);
+    return serialised(response);
+  }
+  void unlink() {
+    if (link_) server_.links_->remove(link_);
+    link_.reset();
   }
 
   void add(bool taken) {
@@ -163,7 +227,9 @@ class SimServer::Session final : public SessionSink, public std::enable_shared_f
   void gone() {
     if (std::exchange(done_, true)) return;
     server_.time_.post_in(0ns, [self = shared_from_this(), life = server_.life_] {
-      if (self->server_.life_ == life) self->server_.host_->leave(*self);
+      if (self->server_.life_ != life) return;
+      self->server_.host_->leave(*self);
+      self->unlink();
     });
   }
 
@@ -171,16 +237,27 @@ class SimServer::Session final : public SessionSink, public std::enable_shared_f
   std::shared_ptr<SimStream> stream_;
   AuthorId author_;
   SessionOutbox outbox_;
-  std::optional<std::pair<RoomSeq, Bytes>> held_back_;
+  std::shared_ptr<SimLinks::Link> link_;  // with the server's links
+  struct HeldBack {
+    RoomSeq place;
+    Bytes row;
+    wire::SessionRow fast;
+  };
+  std::optional<HeldBack> held_back_;
   std::optional<Ending> closing_;
   int queued_ = 0;
+  std::uint64_t taken_ = 0;  // newest author_seq that was queued
   bool paused_ = false, done_ = false;
 };
 
-SimServer::SimServer(VirtualTime& time, Ledger& ledger, std::uint64_t seed, const Case& bone, const ServerCondition& condition)
-    : time_(time), ledger_(ledger), random_(seed), bone_(bone), condition_(condition), disk_(seed, condition.sector_bytes) {}
+SimServer::SimServer(VirtualTime& time, Ledger& ledger, Datagrams& datagrams, std::uint64_t seed, const Case& bone,
+                     const ServerCondition& condition)
+    : time_(time), ledger_(ledger), datagrams_(datagrams), random_(seed), bone_(bone), condition_(condition),
+      disk_(seed, condition.sector_bytes) {}
 
 SimServer::~SimServer() {
+  sessions_.clear();
+  links_.reset();
   host_.reset();
   keeper_.reset();
 }
@@ -222,6 +299,8 @@ void SimServer::boot() {
   booted_ = time_.now();
   jumped_ = {};
   host_ = driven_host(std::move(kept->room), *keeper_);
+  if (condition_.fast_path)
+    links_ = std::make_unique<SimLinks>(datagrams_, random_.index(1u << 30), condition_.link, [this] { return power_is_out(); });
   disk_has_failed_ = false;
   ledger_.check(opened == replayed(), Invariant::replay, "the room that was opened is not the one of its rows");
   plan_tick();
@@ -279,6 +358,7 @@ Digest SimServer::reopened(bool with_checkpoint) {
   if (!host_) return {};
   for (const auto& session : sessions_) session->die();
   sessions_.clear();
+  links_.reset();
   ++life_;
   host_->stop();
   if (with_checkpoint) checkpoint();
@@ -309,6 +389,7 @@ void SimServer::down() {
   ++life_;
   disk_has_failed_ = disk_has_failed_ || (disk_fails_ && disk_.has_failed());
   for (const auto& session : sessions_) session->die();
+  links_.reset();
   host_.reset();
   keeper_.reset();
   sessions_.clear();
@@ -369,6 +450,7 @@ void SimServer::rest() {
   resting_ = true;
   writes_until_ = {};
   if (power_fails_ || disk_fails_) crash(power_fails_);
+  if (host_) plan_tick();
 }
 
 void SimServer::recover() {
@@ -381,8 +463,8 @@ void SimServer::recover() {
 void SimServer::plan_tick() {
   const bool paused = !resting_ && random_.unit() < condition_.pauses;
   const Time late = paused ? drawn(random_, 100ms, 3s) : drawn(random_, 0ns, condition_.late_most);
-  time_.post_in(kTick + late, [this, life = life_] {
-    if (life == life_ && host_) tick();
+  time_.post_in(kTick + late, [this, life = life_, planned = ++planned_tick_] {
+    if (life == life_ && planned == planned_tick_ && host_) tick();
   });
 }
 

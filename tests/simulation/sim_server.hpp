@@ -12,6 +12,7 @@
 #include "server/net/room_host.hpp"
 #include "server/net/room_keeper.hpp"
 #include "tests/simulation/ledger.hpp"
+#include "tests/simulation/sim_link.hpp"
 #include "tests/simulation/sim_stream.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 
@@ -25,6 +26,7 @@ enum class Breakage {
   skipping,     // now and then a row is left out
   replica,      // on coming back a client takes leaves over what it holds, instead of taking on what is held there
   forgetful,    // the journal waits for no disk
+  pruning,      // what goes in datagrams is not said over the stream, before the client says that it has come
 };
 
 // Those that a simulated room begins with: few, because everyone who opens or joins it makes them anew.
@@ -36,6 +38,8 @@ struct ServerCondition {
   std::chrono::nanoseconds late_most = std::chrono::milliseconds(1);  // of a tick
   double slow_writes = 0.03;                                          // share of ticks whose rows take up to 0.4 s to be kept
   double pauses = 0.0005;                                             // share of ticks that come 0.1 to 3 s late
+  bool fast_path = false;                                             // it offers one
+  wire::LinkOptions link = wire::server_link_options();
   Breakage breakage = Breakage::none;
 };
 
@@ -43,7 +47,8 @@ class SimServer {
  public:
   using Time = VirtualTime::Time;
 
-  SimServer(VirtualTime& time, Ledger& ledger, std::uint64_t seed, const Case& bone, const ServerCondition& condition);
+  SimServer(VirtualTime& time, Ledger& ledger, Datagrams& datagrams, std::uint64_t seed, const Case& bone,
+            const ServerCondition& condition);
   ~SimServer();
   SimServer(const SimServer&) = delete;
   SimServer& operator=(const SimServer&) = delete;
@@ -102,6 +107,7 @@ class SimServer {
 
   VirtualTime& time_;
   Ledger& ledger_;
+  Datagrams& datagrams_;
   Random random_;
   const Case& bone_;
   const ServerCondition condition_;
@@ -111,8 +117,10 @@ class SimServer {
   bool made_ = false;                    // a journal was, once
   std::unique_ptr<RoomKeeper> keeper_;
   std::unique_ptr<RoomHost> host_;
+  std::unique_ptr<SimLinks> links_;      // none: no fast path
   std::vector<std::shared_ptr<Session>> sessions_;  // with streams and queued cuts
   std::uint64_t life_ = 0;               // rises with every boot and crash
+  std::uint64_t planned_tick_ = 0;       // the newest that was planned counts
   Time began_{}, booted_{}, jumped_{};   // the room's time at its boot
   Time writes_until_{};                  // the disk is busy
   bool power_fails_ = false, disk_fails_ = false, operator_comes_ = false, disk_has_failed_ = false, resting_ = false;

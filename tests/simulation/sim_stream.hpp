@@ -1,6 +1,7 @@
 // A stream of messages between a client and a server on virtual time, as gRPC over TCP would carry it: reliable and in order
 // until it breaks, late where the network loses, and with a bound on what is under way.
 #pragma once
+#include <algorithm>
 #include <array>
 #include <deque>
 #include <functional>
@@ -85,6 +86,9 @@ class SimStream : public std::enable_shared_from_this<SimStream> {
   // The connection breaks in the middle.
   void break_off(const std::string& why);
 
+  [[nodiscard]] bool open() const { return !over_; }
+  // When all that was written so far has arrived, as far as it does.
+  [[nodiscard]] Time delayed_until() const { return std::max(ends_[client].last, ends_[server].last); }
   // Open, with nothing under way; once it is over, an end may not know it yet.
   [[nodiscard]] bool at_rest() const { return !over_ && ends_[client].under_way == 0 && ends_[server].under_way == 0; }
   [[nodiscard]] static std::uint64_t broken() { return broken_; }  // so many were, in this process

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <ctime>
+#include <iterator>
 #include <memory>
 #include <variant>
 
@@ -16,7 +17,8 @@ namespace {
 using namespace std::chrono_literals;
 using Time = VirtualTime::Time;
 
-constexpr Time kSettling = 60s;   // at most, after all trouble
+constexpr Time kSettling = 60s;   // at most, after all trouble, until everyone is on the line and all is decided and told
+constexpr double kSettled_s = 2;  // of that, once everyone is on the line
 constexpr Time kQuiet = 2s;       // then, before all must hold the same
 
 double cpu_ms() {
@@ -37,12 +39,17 @@ const Case& large_block() {
 class Simulation {
  public:
   Simulation(std::uint64_t seed, const SimulationOptions& options)
-      : options_(options), random_(seed), bone_(options.full ? large_block() : small_block()),
-        server_(time_, ledger_, random_.index(1u << 30), bone_, server_condition()) {
+      : options_(options), random_(seed), link_random_(seed ^ kLinks), bone_(options.full ? large_block() : small_block()),
+        fast_path_(link_random_.unit() < 0.5), seal_(seal()),
+        datagrams_(time_, ledger_, link_random_.index(1u << 30), link_random_.unit() < 0.5 ? 0.05 : 0.0),
+        server_(time_, ledger_, datagrams_, random_.index(1u << 30), bone_, server_condition()) {
     const std::size_t clients = 2 + random_.index(2);
-    for (std::size_t i = 0; i <= clients; ++i)  // and one that comes late
-      clients_.push_back(std::make_unique<SimClient>(time_, ledger_, server_, random_.index(1u << 30), bone_, hand(i == clients),
-                                                     options.breakage));
+    for (std::size_t i = 0; i <= clients; ++i) {  // and one that comes late
+      const bool late = i == clients;
+      ways_.push_back(way());
+      clients_.push_back(std::make_unique<SimClient>(time_, ledger_, server_, datagrams_, i + 1, random_.index(1u << 30), bone_,
+                                                     hand(late), datagram_plan(), options.breakage));
+    }
   }
 
   void run() {
@@ -50,11 +57,19 @@ class Simulation {
     time_.run_until(trouble_ends_);
     end_trouble();
     const Time began = time_.now();
-    while (!settled() && time_.now() - began < kSettling) time_.run_until(time_.now() + 50ms);
-    settled_s_ = std::chrono::duration<double>(time_.now() - began).count();
+    Time quiet = began;
+    while (!settled() && time_.now() - began < kSettling) {
+      time_.run_until(time_.now() + 20ms);
+      if (!connected()) quiet = time_.now();
+    }
+    settled_s_ = std::chrono::duration<double>(time_.now() - quiet).count();
+    back_s_ = std::chrono::duration<double>(quiet - began).count();
+    ledger_.check(settled_s_ <= kSettled_s || !connected(), Invariant::settled,
+                  "what was left took " + std::to_string(settled_s_) + " s to be decided and told");
     for (const auto& client : clients_)
       if (client->here()) ledger_.check(client->settled(), Invariant::decided, "a client is not settled: " + client->standing());
     time_.run_until(time_.now() + kQuiet);
+    datagrams_.check_forger();
     if (server_.up())
       check();
     else
@@ -68,7 +83,12 @@ class Simulation {
     report.disk_failures = server_.disk_failures();
     report.virtual_s = std::chrono::duration<double>(time_.now()).count();
     report.settled_s = settled_s_;
+    report.back_s = back_s_;
+    report.fast_path = fast_path_;
+    report.datagrams = datagrams_.counts();
     for (const auto& client : clients_) {
+      std::ranges::copy(client->felt_by_datagram_ms(), std::back_inserter(report.felt_by_datagram_ms));
+      std::ranges::copy(client->felt_by_stream_ms(), std::back_inserter(report.felt_by_stream_ms));
       report.cuts += client->cuts();
       report.resumed += client->resumed();
       report.programs += client->programs();
@@ -83,12 +103,53 @@ class Simulation {
   }
 
  private:
+  static constexpr std::uint64_t kLinks = 0x6c696e6b73;  // so that a seed's other trouble is the same without datagrams
+
+  // What both ways of a client's have in common.
+  struct Way {
+    Time delay{}, jitter{};
+    double loss = 0;
+  };
+  Way way() {
+    constexpr double kLoss[] = {0, 0, 0.02, 0.1, 0.3};
+    const bool bad = options_.full || random_.unit() < 0.3;
+    Way way;
+    way.delay = bad ? drawn(random_, 20ms, 110ms) : drawn(random_, 0ms, 5ms);
+    way.jitter = bad ? drawn(random_, 0ms, 10ms) : 0ms;
+    way.loss = kLoss[random_.index(5)];
+    return way;
+  }
+
+  // Keys last for seconds here, at both ends alike.
+  SealRules seal() {
+    SealRules rules;
+    if (link_random_.unit() < 0.5) rules.rekey_after = drawn(link_random_, 700ms, 5s);
+    return rules;
+  }
+
+  DatagramPlan datagram_plan() {
+    DatagramPlan plan;
+    plan.wanted = link_random_.unit() < 0.9;
+    if (link_random_.unit() < 0.15) plan.up_blocked = plan.down_blocked = true;
+    plan.quality = {.loss = ways_.back().loss,
+                    .duplicate = link_random_.unit() < 0.5 ? 0.05 : 0,
+                    .reorder = link_random_.unit() < 0.5 ? 0.1 : 0,
+                    .corrupt = link_random_.unit() < 0.5 ? 0.02 : 0,
+                    .delay = ways_.back().delay,
+                    .jitter = ways_.back().jitter};
+    plan.link.seal = seal_;
+    plan.clock_ahead = drawn(link_random_, 0s, 1000s);
+    return plan;
+  }
+
   ServerCondition server_condition() {
     ServerCondition condition;
     // Half of them with the bounds over time that osteon-server sets.
     if (random_.unit() < 0.5) condition.limits = {.time_slack = 1s, .swept_voxels_per_s = 5e8};
     condition.sector_bytes = random_.unit() < 0.5 ? 512 : 4096;
     condition.late_most = drawn(random_, 0ms, 10ms);
+    condition.fast_path = fast_path_;
+    condition.link.seal = seal_;
     condition.breakage = options_.breakage;
     return condition;
   }
@@ -98,6 +159,7 @@ class Simulation {
     plan.tools = {find_tool("burr-round-3.2").value()};
     plan.cuts = late ? 4 : 8 + static_cast<int>(random_.index(10));
     plan.level = random_.unit() < 0.3 ? 1 : 0;
+    plan.pause_most = drawn(random_, 500ms, 4s);  // so that there is work through all the trouble
     if (!options_.full) return plan;
     plan.tools.push_back(find_tool("drill-3.2").value());
     plan.cuts = late ? 20 : 60 + static_cast<int>(random_.index(60));
@@ -120,16 +182,16 @@ class Simulation {
     for (std::size_t i = 0; i < clients_.size(); ++i) {
       SimClient& client = *clients_[i];
       const bool late = i + 1 == clients_.size();
-      constexpr double kLoss[] = {0, 0, 0.02, 0.1, 0.3};
-      const bool bad = options_.full || random_.unit() < 0.3;
-      client.path().set({.delay = bad ? drawn(random_, 20ms, 110ms) : drawn(random_, 0ms, 5ms),
-                         .jitter = bad ? drawn(random_, 0ms, 10ms) : 0ms,
-                         .loss = kLoss[random_.index(5)]});
+      // A stream is late for more than its segments that are lost: it fills the queues on its way, and slows down.
+      const Time behind = fast_path_ && link_random_.unit() < 0.7 ? drawn(link_random_, 5ms, 150ms) : 0ms;
+      client.path().set({.delay = ways_[i].delay + behind, .jitter = ways_[i].jitter, .loss = ways_[i].loss});
       time_.post(late ? some_time() : drawn(random_, 0ms, 800ms), [&client] { client.start(); });
       for (std::size_t n = random_.index(3); n > 0; --n) {
-        const Time from = some_time();
-        client.path().partition(from, from + drawn(random_, 50ms, random_.unit() < 0.2 ? 8s : 1500ms));
+        const Time from = some_time(), until = from + drawn(random_, 50ms, random_.unit() < 0.2 ? 8s : 1500ms);
+        client.path().partition(from, until);
+        client.stop_datagrams(true, true, from, until);
       }
+      plan_datagrams(client);
       now_and_then(2, [&client] { client.break_line("the connection was reset"); });
     }
     if (random_.unit() < 0.5) time_.post(some_time(), [this] { clients_[1]->leave(); });
@@ -155,6 +217,22 @@ class Simulation {
     });
   }
 
+  // What happens to datagrams alone.
+  void plan_datagrams(SimClient& client) {
+    if (!fast_path_) return;
+    const auto time = [this] { return drawn(link_random_, 300ms, trouble_ends_); };
+    for (std::size_t n = link_random_.index(3); n > 0; --n) time_.post(time(), [&client] { client.move(); });
+    for (std::size_t n = link_random_.index(3); n > 0; --n) {
+      const Time from = time(), until = from + drawn(link_random_, 100ms, link_random_.unit() < 0.3 ? 8s : 1500ms);
+      const std::size_t which = link_random_.index(3);
+      client.stop_datagrams(which != 0, which != 1, from, until);
+    }
+    if (link_random_.unit() < 0.3) {
+      const std::size_t which = link_random_.index(3);
+      time_.post(time(), [&client, which] { client.block_datagrams(which != 0, which != 1); });
+    }
+  }
+
   // As a saw would.
   void part_the_bone() {
     const int at = static_cast<int>(random_.index(16)) - 8;
@@ -171,11 +249,16 @@ class Simulation {
 
   void end_trouble() {
     server_.rest();
+    datagrams_.rest();
     for (const auto& client : clients_) {
       client->rest();
-      client->path().set({});
-      client->path().heal();
+      client->heal();
     }
+  }
+
+  bool connected() {
+    return server_.up() &&
+           std::ranges::all_of(clients_, [](const auto& client) { return !client->here() || client->connected(); });
   }
 
   bool settled() {
@@ -209,15 +292,19 @@ class Simulation {
   }
 
   const SimulationOptions options_;
-  Random random_;
+  Random random_, link_random_;
   const Case& bone_;
+  const bool fast_path_;
+  const SealRules seal_;
   VirtualTime time_;
   Ledger ledger_;
+  Datagrams datagrams_;
   SimServer server_;
+  std::vector<Way> ways_;  // of the clients
   std::vector<std::unique_ptr<SimClient>> clients_;
   std::vector<RoomRow> rows_;
   Time trouble_ends_{};
-  double settled_s_ = 0;
+  double settled_s_ = 0, back_s_ = 0;
 };
 
 }  // namespace

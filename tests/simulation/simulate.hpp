@@ -21,7 +21,12 @@ struct SimulationReport {
   std::uint64_t rows = 0, committed = 0, rejected = 0, undone = 0, splits = 0;  // in the journal
   std::uint64_t acknowledged = 0;    // rows that someone was told of
   std::uint64_t crashes = 0, disk_failures = 0, breaks = 0, resumed = 0, programs = 0;
-  double virtual_s = 0, settled_s = 0;  // altogether; from the end of all trouble until every cut was decided and told
+  double virtual_s = 0;
+  double settled_s = 0;              // from when the trouble is over and everyone on the line until every cut is decided and told
+  double back_s = 0;                 // from the end of all trouble until then
+  bool fast_path = false;            // offered
+  DatagramCounts datagrams;
+  std::vector<float> felt_by_datagram_ms, felt_by_stream_ms;  // from a cut until a partner's replica has it
   double cpu_ms = 0;
 };
 

@@ -4,7 +4,7 @@ import json
 
 from registry import Measured
 
-BREAKAGES = ("dedup", "ordering", "skipping", "replica", "forgetful", "overtaking")
+BREAKAGES = ("dedup", "ordering", "skipping", "replica", "forgetful", "pruning")
 PROTOCOL_SEED_MS = 50.0
 CONVERGED_S = 2.0
 FELT_LOOPBACK_MS, FELT_BAD_MS = 25.0, 150.0

@@ -1,0 +1,167 @@
+// The fast path on virtual time: what haptic_client/net/fast_path.cpp and server/net/link_server.cpp do between sockets and
+// the two links, over a simulated network, with somebody on the way who forges.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <span>
+#include <unordered_set>
+#include <vector>
+
+#include "common/wire/client_link.hpp"
+#include "common/wire/server_link.hpp"
+#include "tests/simulation/ledger.hpp"
+#include "tests/support/network/sim_network.hpp"
+
+namespace osteon::test {
+
+// Rings once, at the earliest of the times it was set to since it rang last.
+class Alarm {
+ public:
+  using Time = VirtualTime::Time;
+  Alarm(VirtualTime& time, std::function<void()> ring) : time_(time), ring_(std::move(ring)) {}
+  ~Alarm() { *at_ = Time::min(); }
+  Alarm(const Alarm&) = delete;
+  Alarm& operator=(const Alarm&) = delete;
+  void set(Time at);
+
+ private:
+  VirtualTime& time_;
+  const std::function<void()> ring_;
+  std::shared_ptr<Time> at_ = std::make_shared<Time>(Time::max());  // shared with what is posted
+};
+
+struct DatagramCounts {
+  std::uint64_t sent = 0, opened = 0, forged = 0;
+  std::uint64_t rows = 0, cuts = 0;  // that datagrams have brought
+  std::uint64_t moves = 0;           // addresses that were proven
+};
+
+// All datagrams of a simulation. Whatever an end takes for authentic must be what the other end has sealed, and only once.
+class Datagrams {
+ public:
+  enum Way { up, down };
+  static constexpr std::uint64_t kServer = 1000, kForger = 666;  // nodes
+
+  // `forged`: share of the datagrams that somebody sees, and sends on in some other way.
+  Datagrams(VirtualTime& time, Ledger& ledger, std::uint64_t seed, double forged);
+
+  [[nodiscard]] VirtualTime& time() { return time_; }
+  [[nodiscard]] SimNetwork& network() { return network_; }
+  [[nodiscard]] DatagramCounts& counts() { return counts_; }
+  [[nodiscard]] Ledger& ledger() { return ledger_; }
+  void send(Way way, SimPort& port, const Endpoint& to, std::span<const std::uint8_t> bytes);
+  void opened(Way way, std::span<const std::uint8_t> bytes);
+  void client_is_at(const Endpoint& address) { clients_.insert(address); }
+  void rest() { forged_ = 0; }
+  void check_forger();                // what he was sent, in the end
+
+ private:
+  void forge(const Endpoint& from, const Endpoint& to, std::vector<std::uint8_t> bytes);
+
+  VirtualTime& time_;
+  Ledger& ledger_;
+  Random random_;
+  double forged_;
+  SimNetwork network_;
+  std::unique_ptr<SimPort> forger_;
+  std::uint64_t forger_sent_bytes_ = 0;
+  std::array<std::unordered_set<std::uint64_t>, 2> genuine_;  // not opened yet
+  std::set<Endpoint> clients_;
+  DatagramCounts counts_;
+};
+
+// The room's end of all fast paths: LinkServer, with SessionLink.
+class SimLinks {
+ public:
+  using Time = VirtualTime::Time;
+  class Sink {
+   public:
+    virtual ~Sink() = default;
+    virtual void take(Cut cut) = 0;
+    virtual void take(CuttingState state) = 0;
+    virtual void arrived(std::uint64_t index) = 0;
+  };
+  class Link;
+
+  // `silent`: the process runs no more, though it is not gone yet.
+  SimLinks(Datagrams& datagrams, std::uint64_t seed, const wire::LinkOptions& options, std::function<bool()> silent);
+  [[nodiscard]] std::shared_ptr<Link> add(AuthorId author, std::uint64_t first_author_seq, Sink& sink);
+  void remove(const std::shared_ptr<Link>& link);
+
+ private:
+  void turn();
+  void receive_some();
+
+  Datagrams& datagrams_;
+  Random random_;
+  const wire::LinkOptions options_;
+  const std::function<bool()> silent_;
+  std::unique_ptr<SimPort> port_;
+  std::map<std::uint32_t, std::shared_ptr<Link>> links_;
+  Alarm alarm_;
+};
+
+// Of one session.
+class SimLinks::Link {
+ public:
+  Link(SimLinks& links, const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq, Sink& sink);
+  [[nodiscard]] const SessionKeys& keys() const { return keys_; }
+  void offer(const Cut& cut);
+  // False: it goes over the stream only, since it does not fit or the client cannot be reached.
+  bool tell(const wire::IndexedRow& row);
+  void decided(std::uint64_t author_seq) { link_.decided(author_seq); }
+  void set_lease_epoch(std::uint64_t epoch) { link_.set_lease_epoch(epoch); }
+  void know_tool(std::uint32_t number, const Digest& tool) { link_.tools().add(number, tool); }
+
+ private:
+  friend class SimLinks;
+  std::size_t say_news();  // so many cuts of it
+
+  SimLinks& links_;
+  const SessionKeys keys_;
+  Sink* sink_;
+  wire::ServerLink link_;
+  std::uint64_t arrived_ = 0, moves_ = 0, state_seq_ = 0;
+};
+
+// The client's end, of one stream: FastPath.
+class SimFastPath {
+ public:
+  using Time = VirtualTime::Time;
+  struct Hears {                    // neither ends the path
+    std::function<void(wire::IndexedRow)> row;
+    std::function<void()> dead;
+  };
+
+  // `ahead`: of the server's clock.
+  SimFastPath(Datagrams& datagrams, std::uint64_t seed, const Endpoint& at, const SessionKeys& keys,
+              std::uint64_t first_author_seq, const wire::LinkOptions& options, Time ahead, Hears hears);
+  [[nodiscard]] bool send(const Cut& cut);
+  void send(const CuttingState& state);
+  void heard(std::uint64_t index);
+  void decided(std::uint64_t author_seq) { link_.acknowledge(author_seq); }
+  void know_tool(std::uint32_t number, const Digest& tool) { link_.tools().add(number, tool); }
+  void move(const Endpoint& to);
+  [[nodiscard]] bool alive() const { return link_.alive(now()); }
+
+ private:
+  void turn();
+  void wake();
+  [[nodiscard]] Time now() const { return datagrams_.time().now() + ahead_; }
+
+  Datagrams& datagrams_;
+  Random random_;
+  const Time ahead_;
+  const Hears hears_;
+  wire::ClientLink link_;
+  std::uint64_t pushed_;
+  bool was_alive_ = false;
+  std::unique_ptr<SimPort> port_;
+  Alarm alarm_;
+};
+
+}  // namespace osteon::test
