@@ -57,7 +57,6 @@ class Datagrams {
   void opened(Way way, std::span<const std::uint8_t> bytes);
   void client_is_at(const Endpoint& address) { clients_.insert(address); }
   void rest() { forged_ = 0; }
-  void check_forger();                // what he was sent, in the end
 
  private:
   void forge(const Endpoint& from, const Endpoint& to, std::vector<std::uint8_t> bytes);
@@ -68,7 +67,7 @@ class Datagrams {
   double forged_;
   SimNetwork network_;
   std::unique_ptr<SimPort> forger_;
-  std::uint64_t forger_sent_bytes_ = 0;
+  std::uint64_t from_forger_bytes_ = 0, to_forger_bytes_ = 0;  // to the room, and from it
   std::array<std::unordered_set<std::uint64_t>, 2> genuine_;  // not opened yet
   std::set<Endpoint> clients_;
   DatagramCounts counts_;

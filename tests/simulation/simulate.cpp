@@ -69,7 +69,6 @@ class Simulation {
     for (const auto& client : clients_)
       if (client->here()) ledger_.check(client->settled(), Invariant::decided, "a client is not settled: " + client->standing());
     time_.run_until(time_.now() + kQuiet);
-    datagrams_.check_forger();
     if (server_.up())
       check();
     else
