@@ -107,7 +107,10 @@ void Replica::renew(RoomSeq contained, std::span<const BodyId> bodies, std::span
 
 void Replica::change(RoomSeq place, std::span<const BodyId> bodies, std::span<const FieldLeaf> leaves) {
   note(place);
-  for (const BodyId id : bodies) body(id);
+  for (const BodyId id : bodies) {
+    again_ |= !bodies_.contains(id);  // what is pending is not in a new one
+    body(id);
+  }
   for (auto held = bodies_.begin(); held != bodies_.end();) {
     if (std::ranges::find(bodies, held->first) != bodies.end() || bodies.empty()) {
       ++held;

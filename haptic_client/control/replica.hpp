@@ -78,7 +78,7 @@ class Replica {
   std::map<BodyId, Body> bodies_;
   std::deque<Pending> pending_;         // own, in order
   std::set<Place> undone_;              // leaves of predicted bodies that hold what fell since settle()
-  bool again_ = false;                  // leaves were set since settle(): what is pending is not in them
+  bool again_ = false;                  // leaves were set or bodies made since settle(): what is pending is not in them
   std::vector<ChangedLeaves> changes_;
   RoomSeq room_seq_;
   std::uint64_t last_own_ = 0, rejected_ = 0, cut_again_ = 0;
