@@ -28,11 +28,14 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   AuthorId author() const override { return author_; }
   void begin(RoomSeq contained, MessageParts before, Bytes complete) override {
     v1::SessionResponse said;
-    if (links_ && said.ParseFromString(*complete)) {
-      link_ = links_->add(author_, said.complete().decided_author_seq() + 1, *this);
+    (void)said.ParseFromString(*complete);
+    const std::uint64_t decided = said.complete().decided_author_seq();
+    if (links_) {
+      link_ = links_->add(author_, decided + 1, *this);
       before.insert(before.begin(), link_offer());
     }
     const std::lock_guard lock(mutex_);
+    taken_ = decided;
     outbox_.begin(contained, std::move(before), std::move(complete));
     pump();
   }
@@ -216,7 +219,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   bool opened_ = false;       // only reactions to reads use it, and these come one by one
   SessionOutbox outbox_;
   int queued_ = 0;            // cuts between reading and deciding
-  std::uint64_t taken_ = 0;   // newest author_seq that was queued
+  std::uint64_t taken_ = 0;   // newest author_seq that was queued, here or in an earlier session
   bool paused_ = false, reading_ended_ = false;
 };
 

@@ -19,6 +19,7 @@
 #include "osteon/v1/cutting.grpc.pb.h"
 #include "osteon/v1/room.grpc.pb.h"
 #include "osteon/v1/watch.grpc.pb.h"
+#include "server/net/room_host.hpp"
 #include "tests/support/wait.hpp"
 
 namespace osteon::test {
@@ -144,16 +145,12 @@ class Surgeon {
   std::string rejected_, lost_;
 };
 
-// Whether the room has come to rest and every one of them is there.
-inline bool settled(const std::vector<Surgeon*>& holders) {
-  const auto there = [&] {
-    const std::uint64_t seq = status_of(holders.front()->session().room()).room_seq();
-    return std::ranges::all_of(holders, [&](Surgeon* holder) { return holder->complete() && holder->seq().value == seq; }) ? seq : 0;
-  };
-  const std::uint64_t seq = there();
-  if (seq == 0) return false;
-  std::this_thread::sleep_for(std::chrono::milliseconds{500});  // a search for pieces may be on its way
-  return there() == seq;
+// Whether the room has come to rest, with all pieces found that came off, and every one of them is there.
+inline bool settled(RoomHost& room, const std::vector<Surgeon*>& holders) {
+  const RoomSeq before = room.room_seq();
+  room.find_pieces();
+  return room.room_seq() == before &&
+         std::ranges::all_of(holders, [&](Surgeon* holder) { return holder->complete() && holder->seq() == before; });
 }
 
 // What a viewer holds of the surface.

@@ -37,10 +37,10 @@ TEST_F(RoomServerTest, EveryHolderHasTheServersHashHoweverLateItJoins) {
   const auto later = surgeon();
   // Crumbs that came off are events of their own, in their own time.
   const std::vector<Surgeon*> holders{first.get(), second.get(), late.get(), later.get()};
-  ASSERT_TRUE(wait_until([&] { return settled(holders); }, kPatience));
+  ASSERT_TRUE(wait_until([&] { return settled(host(), holders); }, kPatience));
   const auto status = status_of(later->session().room());
   EXPECT_GE(status.room_seq(), 60u);
-  for (Surgeon* holder : {first.get(), second.get(), late.get(), later.get()}) EXPECT_EQ(wire::to_wire(holder->hash()), status.field_hash());
+  for (std::size_t i = 0; i < holders.size(); ++i) EXPECT_EQ(wire::to_wire(holders[i]->hash()), status.field_hash()) << "holder " << i;
   EXPECT_GT(status.removed_mm3(), 0.0);
   EXPECT_EQ(status.rejected(), 0u);
 }
@@ -66,7 +66,7 @@ TEST_F(RoomServerTest, ALateViewerSeesTheBlocksOfAnEarlyOne) {
   const auto hand = surgeon();
   send(*hand, strokes(hand->author(), 40, 4));
   // Joins have places in the order too, and so has the crumb that is found a moment after the last stroke.
-  ASSERT_TRUE(wait_until([&] { return hand->own() == 40 && settled({hand.get()}); }, kPatience));
+  ASSERT_TRUE(wait_until([&] { return hand->own() == 40 && settled(host(), {hand.get()}); }, kPatience));
   const RoomSeq last = hand->seq();
   ASSERT_TRUE(early.read_to(last));
   MeshReader late(address());
@@ -105,7 +105,7 @@ TEST_F(RoomServerTest, AKilledClientDisturbsNobody) {
   }
   send(*survivor, strokes(survivor->author(), 20, 7));
   // The strokes leave a crumb, which is found a moment after the last of them.
-  ASSERT_TRUE(wait_until([&] { return survivor->own() == 20 && settled({survivor.get()}); }, kPatience));
+  ASSERT_TRUE(wait_until([&] { return survivor->own() == 20 && settled(host(), {survivor.get()}); }, kPatience));
   EXPECT_TRUE(watcher.read_to(survivor->seq()));
   EXPECT_EQ(wire::to_wire(survivor->hash()), status_of(survivor->session().room()).field_hash());
   EXPECT_TRUE(wait_until([&] { return server_->health().mesh_streams == 1 && server_->health().sessions == 1; }, kPatience));
