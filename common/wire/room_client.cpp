@@ -4,6 +4,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
+#include <mutex>
 #include <utility>
 #include <vector>
 
@@ -25,32 +26,50 @@ constexpr auto kAgainTime = 1s;                    // for one attempt to come ba
 // longer than its RoomWatch does.
 constexpr int kPingMs = 2000, kPingAnswerMs = 3000, kHandsPingAnswerMs = 25'000;
 
+// The room that a channel's calls are to: empty, the only one that is open.
+class RoomName {
+ public:
+  explicit RoomName(std::string name) : name_(std::move(name)) {}
+  void set(const std::string& name) {
+    const std::lock_guard lock(mutex_);
+    name_ = name;
+  }
+  [[nodiscard]] std::string get() const {
+    const std::lock_guard lock(mutex_);
+    return name_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::string name_;
+};
+
 // Puts the room's name on every call of a channel.
 class RoomNamer final : public grpc::experimental::Interceptor {
  public:
-  explicit RoomNamer(const std::string& room) : room_(room) {}
+  explicit RoomNamer(std::string room) : room_(std::move(room)) {}
   void Intercept(grpc::experimental::InterceptorBatchMethods* call) override {
-    if (call->QueryInterceptionHookPoint(grpc::experimental::InterceptionHookPoints::PRE_SEND_INITIAL_METADATA))
-      call->GetSendInitialMetadata()->insert({"osteon-room", room_});
+    if (!room_.empty() && call->QueryInterceptionHookPoint(grpc::experimental::InterceptionHookPoints::PRE_SEND_INITIAL_METADATA))
+      call->GetSendInitialMetadata()->insert({"osteon-room-bin", room_});
     call->Proceed();
   }
 
  private:
-  const std::string& room_;  // of the factory, which lives as long as the channel
+  const std::string room_;  // which the call refers to until it is over
 };
 
 class RoomNamers final : public grpc::experimental::ClientInterceptorFactoryInterface {
  public:
-  explicit RoomNamers(std::string room) : room_(std::move(room)) {}
+  explicit RoomNamers(std::shared_ptr<const RoomName> room) : room_(std::move(room)) {}
   grpc::experimental::Interceptor* CreateClientInterceptor(grpc::experimental::ClientRpcInfo*) override {
-    return new RoomNamer(room_);  // which the call deletes
+    return new RoomNamer(room_->get());  // which the call deletes
   }
 
  private:
-  const std::string room_;
+  const std::shared_ptr<const RoomName> room_;  // shared with whoever joined over this channel
 };
 
-std::shared_ptr<grpc::Channel> make_channel(const std::string& address, ClientKind kind, const std::string& room) {
+std::shared_ptr<grpc::Channel> make_channel(const std::string& address, ClientKind kind, const std::shared_ptr<const RoomName>& room) {
   // What fails is told in one sentence by the program, not in gRPC's own lines.
   gpr_set_log_function([](gpr_log_func_args*) {});
   grpc::ChannelArguments arguments;
@@ -64,7 +83,7 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address, ClientKi
   arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> namers;
-  if (!room.empty()) namers.push_back(std::make_unique<RoomNamers>(room));
+  if (room) namers.push_back(std::make_unique<RoomNamers>(room));
   return grpc::experimental::CreateCustomChannelWithInterceptors(address, grpc::InsecureChannelCredentials(), arguments,
                                                                  std::move(namers));
 }
@@ -94,6 +113,21 @@ Error error_of(const grpc::Status& status, const std::string& server) {
     default:
       return {ErrorCode::unavailable, server + " does not answer: " + status.error_message()};
   }
+}
+
+Result<std::shared_ptr<grpc::Channel>> reach(const std::string& address, const std::shared_ptr<const RoomName>& room, ClientKind kind,
+                                             std::chrono::milliseconds patience, const std::function<bool()>& stop) {
+  if (!is_host_port(address))
+    return failure(ErrorCode::invalid_input, "the server's address " + address +
+                                                 " is not HOST:PORT; give the one that osteon-server prints, such as 127.0.0.1:50151");
+  std::shared_ptr<grpc::Channel> channel = make_channel(address, kind, room);
+  // In short waits, so that a person who gives up is heard.
+  const auto until = Clock::now() + patience;
+  while (!channel->WaitForConnected(std::chrono::system_clock::now() + 50ms)) {
+    if (stop && stop()) return failure(ErrorCode::cancelled, "stopped before the server at " + address + " answered");
+    if (Clock::now() >= until) return tl::unexpected(nobody_answers(address, patience));
+  }
+  return channel;
 }
 
 v1::JoinRequest request_of(ClientKind kind) {
@@ -128,24 +162,15 @@ Result<JoinedRoom> ask_to_join(JoinedRoom room, const v1::JoinRequest& request, 
 
 }  // namespace
 
-Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, const std::string& room, ClientKind kind,
-                                                    std::chrono::milliseconds patience, const std::function<bool()>& stop) {
-  if (!is_host_port(address))
-    return failure(ErrorCode::invalid_input, "the server's address " + address +
-                                                 " is not HOST:PORT; give the one that osteon-server prints, such as 127.0.0.1:50151");
-  std::shared_ptr<grpc::Channel> channel = make_channel(address, kind, room);
-  // In short waits, so that a person who gives up is heard.
-  const auto until = Clock::now() + patience;
-  while (!channel->WaitForConnected(std::chrono::system_clock::now() + 50ms)) {
-    if (stop && stop()) return failure(ErrorCode::cancelled, "stopped before the server at " + address + " answered");
-    if (Clock::now() >= until) return tl::unexpected(nobody_answers(address, patience));
-  }
-  return channel;
+Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, ClientKind kind, std::chrono::milliseconds patience,
+                                                    const std::function<bool()>& stop) {
+  return reach(address, nullptr, kind, patience, stop);
 }
 
 Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
                              std::chrono::milliseconds patience, const std::function<bool()>& stop, const std::string& named) {
-  Result<std::shared_ptr<grpc::Channel>> channel = reach_server(address, named, kind, patience, stop);
+  const auto calls_to = std::make_shared<RoomName>(named);  // shared with the channel
+  Result<std::shared_ptr<grpc::Channel>> channel = reach(address, calls_to, kind, patience, stop);
   if (!channel) return tl::unexpected(channel.error());
   JoinedRoom room;
   room.channel = std::move(*channel);
@@ -153,7 +178,10 @@ Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const 
   request.set_name(name);
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kAnswerTime);
-  return ask_to_join(std::move(room), request, "the program at " + address, context);
+  Result<JoinedRoom> joined = ask_to_join(std::move(room), request, "the program at " + address, context);
+  // Others may be opened from now on: this one is meant.
+  if (joined) calls_to->set(joined->name);
+  return joined;
 }
 
 Result<JoinedRoom> join_again(const JoinedRoom& room, ClientKind kind, const std::optional<KeptEvents>& kept) {

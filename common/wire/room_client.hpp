@@ -33,14 +33,13 @@ struct JoinedRoom {
   std::string secret;                      // proves that a later connection is this one's
 };
 
-// A channel to the server, over which every call is to `room`: empty, the only one that is open there. Errors: invalid_input
-// (`address` is not HOST:PORT), unavailable (nobody answers there within `patience`, one sentence with the remedy), cancelled
-// (`stop` returned true).
-[[nodiscard]] Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, const std::string& room, ClientKind kind,
+// A channel to the server, over which no room is named. Errors: invalid_input (`address` is not HOST:PORT), unavailable (nobody
+// answers there within `patience`, one sentence with the remedy), cancelled (`stop` returned true).
+[[nodiscard]] Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, ClientKind kind,
                                                                   std::chrono::milliseconds patience, const std::function<bool()>& stop);
 
-// `name`: the caller's, shown to others. Errors: those of reach_server, and unsupported (protocol or kernel version differ; no
-// such room is open).
+// `name`: the caller's, shown to others. `room`: which one; empty, the only one that is open. Errors: those of reach_server, and
+// unsupported (protocol or kernel version differ; the room is closed), not_found (there is no such room).
 [[nodiscard]] Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
                                            std::chrono::milliseconds patience, const std::function<bool()>& stop,
                                            const std::string& room = {});

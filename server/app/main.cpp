@@ -79,11 +79,11 @@ nlohmann::json durations(const DurationHistogram& histogram) {
           {"max_us", histogram.max_us()}};
 }
 
-nlohmann::json summary_of(const RoomSummary& summary, const Digest& case_hash) {
+nlohmann::json summary_of(const RoomSummary& summary) {
   const HostHealth& health = summary.health;
   nlohmann::json bodies = nlohmann::json::array();
   for (const BodyId body : summary.bone.bodies) bodies.push_back(body.value);
-  return {{"case_hash", to_hex(case_hash)},
+  return {{"case_hash", to_hex(summary.case_hash)},
           {"field_hash", to_hex(summary.bone.field_hash)},
           {"mesh_hash", to_hex(summary.surface_hash)},
           {"room_seq", summary.bone.room_seq.value},
@@ -212,10 +212,11 @@ Result<void> check_rooms_folder(const std::filesystem::path& folder) {
 }
 
 // The only room's own, or one for each by its name.
-nlohmann::json summary_of(const std::map<std::string, RoomSummary>& rooms, const std::map<std::string, Digest>& cases, bool many) {
+nlohmann::json summary_of(const std::map<std::string, RoomSummary>& rooms, bool many) {
+  if (!many && rooms.size() == 1) return summary_of(rooms.begin()->second);
   nlohmann::json all = nlohmann::json::object();
-  for (const auto& [name, summary] : rooms) all[name] = summary_of(summary, cases.at(name));
-  return many ? nlohmann::json{{"rooms", all}} : all.front();
+  for (const auto& [name, summary] : rooms) all[name] = summary_of(summary);
+  return {{"rooms", all}};
 }
 
 Result<void> run(const Options& options, const StopSignal& stop) {
@@ -243,14 +244,13 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   while (!stop.wait_for(kHealthEvery)) log_health(**server);
 
   log::info("stopping");
-  std::map<std::string, Digest> cases;
-  for (const std::shared_ptr<OpenRoom>& room : (*server)->rooms().open_rooms()) cases[room->name] = room->host().bone().hash();
   const std::map<std::string, RoomSummary> summaries = (*server)->stop_all();
   for (const auto& [name, summary] : summaries) log_health(name, summary.health);
-  if (!options.save_file.empty())
-    if (Result<void> saved = save_fields(options.save_file, summaries.begin()->second.fields); !saved) return saved;
+  for (const auto& [name, summary] : summaries)
+    if (!summary.save.empty())
+      if (Result<void> saved = save_fields(summary.save, summary.fields); !saved) return saved;
   if (options.summary_file.empty()) return {};
-  return write_file(options.summary_file, summary_of(summaries, cases, !options.rooms_folder.empty()).dump(2) + "\n");
+  return write_file(options.summary_file, summary_of(summaries, !options.rooms_folder.empty()).dump(2) + "\n");
 }
 
 }  // namespace
@@ -285,7 +285,7 @@ int main(int argc, char** argv) {
                            ->excludes("--journal")
                            ->excludes("--save");
   app.add_option("--retention-days", options.retention_days,
-                 "After so many days the journals forget who somebody was; what they did stays")
+                 "After so many days a room's journal forgets who somebody was, when it is opened and once a day; what they did stays")
       ->check(CLI::Range(1, 36500));
   const std::map<std::string, Detail> details{{"auto", Detail::automatic}, {"full", Detail::full}, {"near", Detail::near}};
   app.add_option("--detail", options.detail,

@@ -8,7 +8,6 @@
 #include <memory>
 #include <string>
 
-#include "common/runtime/stop_signal.hpp"
 #include "server/net/rooms_client.hpp"
 
 namespace osteon {
@@ -54,8 +53,8 @@ Result<void> verify(RoomsClient& rooms, const Arguments& given) {
               to_hex(checked->field_hash).c_str(), checked->checkpoints);
   for (const std::string& fault : checked->faults) std::printf("fault:       %s\n", fault.c_str());
   if (!checked->faults.empty())
-    return failure(ErrorCode::invalid_input, "the journal of room " + given.name +
-                                                 " is damaged; close the room and see osteon-server recover --help");
+    return failure(ErrorCode::invalid_input, "what is kept of room " + given.name +
+                                                 " is not sound; close the room and see osteon-server verify and recover");
   std::printf("verdict:     sound\n");
   return {};
 }
@@ -86,8 +85,8 @@ void add_room_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
     sub->add_option("--server", given->server, "HOST:PORT of osteon-server")->required();
     sub->callback([&chosen, given, run] {
       chosen = [given, run]() -> Result<void> {
-        const StopSignal stop;
-        Result<RoomsClient> client = RoomsClient::reach(given->server, std::chrono::seconds(5), [&] { return stop.requested(); });
+        // What the server is asked may take long: Ctrl-C ends this program, and the server goes on.
+        Result<RoomsClient> client = RoomsClient::reach(given->server, std::chrono::seconds(5), {});
         if (!client) return tl::unexpected(client.error());
         return run(*client, *given);
       };

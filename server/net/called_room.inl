@@ -9,9 +9,9 @@
 
 namespace osteon {
 
-// By the call's metadata "osteon-room"; without it, the only one that is open.
+// By the call's metadata "osteon-room-bin"; without it, the only one that is open.
 inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const grpc::CallbackServerContext& context) {
-  const auto named = context.client_metadata().find("osteon-room");
+  const auto named = context.client_metadata().find("osteon-room-bin");
   return rooms.find(named == context.client_metadata().end() ? std::string() : std::string(named->second.data(), named->second.size()));
 }
 

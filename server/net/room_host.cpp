@@ -31,6 +31,10 @@ namespace {
 
 using Clock = RoomHost::Clock;
 
+Error only_to_be_watched() {
+  return {ErrorCode::unavailable, "this room shows what happened in another: it can be watched, with osteon-viewer, and not changed"};
+}
+
 }  // namespace
 
 // Leaves copied at once. Between two batches the room goes on cutting.
@@ -41,7 +45,7 @@ constexpr int kRowsPlayedPerTick = 256;
 // Who watches a playback is no row of it, so their numbers must not be those of the room that is shown.
 constexpr std::uint64_t kFirstWatcherOfPlayback = 1ull << 40;
 
-// Lock order: room_mutex, then sessions_mutex or that of the surface or the board, then a stream's own, then that of the jobs.
+// Lock order: copy_mutex, then room_mutex, then sessions_mutex or that of the surface or the board, then a stream's own, then that of the jobs.
 // queue_mutex, pieces_mutex and stats_mutex are never held with another.
 struct RoomHost::Impl {
   Impl(Room r, HostRates rates, Detail detail, RoomKeeper* k, std::optional<Playback> p)
@@ -55,6 +59,8 @@ struct RoomHost::Impl {
   }
 
   [[nodiscard]] bool driven() const { return rates_.tick.count() == 0; }
+  // Of a playback they are among its rows.
+  [[nodiscard]] bool looks_for_pieces() const { return rates_.pieces.count() > 0 && !playback; }
   void run_ticks();
   // Whether anything was decided.
   bool tick(std::chrono::nanoseconds now, bool last);
@@ -89,7 +95,8 @@ struct RoomHost::Impl {
 
   RoomKeeper* const keeper;  // null: nothing is kept
   std::optional<Playback> playback;
-  std::optional<RoomRow> upcoming;        // of the tick thread: the playback's next row
+  std::optional<RoomRow> upcoming;        // of the tick thread, as the next: the playback's next row
+  std::optional<std::chrono::nanoseconds> playback_began;
   std::atomic<std::uint64_t> next_watcher{kFirstWatcherOfPlayback};  // of a playback
   Room room;
   const std::chrono::nanoseconds time_at_start;
@@ -128,7 +135,8 @@ struct RoomHost::Impl {
   RoomCounts counts;
 
   std::optional<std::string> ended;       // under sessions_mutex: why new sessions end at once
-  std::optional<BoneStatus> last_status;  // of the job thread
+  std::mutex copy_mutex;                  // held while the bone is copied: of a stopped host by whoever asks
+  std::optional<BoneStatus> last_status;  // under copy_mutex
   std::vector<Queued> batch;              // of the tick thread
   std::vector<Committer::Tell> tells;     // of the tick thread
   std::chrono::nanoseconds next_kept{};   // of the tick thread: when it is next said how much is kept
@@ -154,7 +162,9 @@ bool RoomHost::Impl::tick(std::chrono::nanoseconds now, bool last) {
 
 // Whether anything happened.
 bool RoomHost::Impl::play(std::chrono::nanoseconds now) {
-  const auto passed = std::chrono::duration<double, std::nano>(now - time_at_start) * playback->speed;
+  // From the first tick on, so that nothing has happened before anyone could watch.
+  if (!playback_began) playback_began = now;
+  const auto passed = std::chrono::duration<double, std::nano>(now - *playback_began) * playback->speed;
   const auto until = time_at_start + std::chrono::duration_cast<std::chrono::nanoseconds>(passed);
   int played = 0;
   for (; playback->speed > 0 && playback->next && played < kRowsPlayedPerTick; ++played) {
@@ -222,7 +232,7 @@ void RoomHost::Impl::run_ticks() {
 }
 
 void RoomHost::Impl::decide(QueuedCut& queued) {
-  if (closed()) return later([sink = queued.sink](const Result<void>&) { sink->decided(); });
+  if (closed() || playback) return later([sink = queued.sink](const Result<void>&) { sink->decided(); });
   Result<Outcome> outcome = [&] {
     const std::unique_lock lock(room_mutex);
     Result<Outcome> decision = room.submit(queued.cut);
@@ -267,7 +277,7 @@ void RoomHost::Impl::decide(QueuedCut& queued) {
 void RoomHost::Impl::decide(QueuedEvent& queued) {
   Result<RoomEvent> event = [&]() -> Result<RoomEvent> {
     if (const std::optional<Error> why = closed()) return tl::unexpected(*why);
-    if (playback) return failure(ErrorCode::unavailable, "this room shows what happened in another: it can be watched, not changed");
+    if (playback) return tl::unexpected(only_to_be_watched());
     const std::unique_lock lock(room_mutex);
     Result<RoomEvent> decision = queued.change(room);
     room_seq = room.room_seq().value;
@@ -309,13 +319,13 @@ void RoomHost::Impl::tell_kept(std::chrono::nanoseconds now) {
   });
 }
 
-// [tick] What every session hears of an event that is not a cut. Only this thread changes the room.
-// Tools are numbered as they come to be told, the same for all sessions.
+// [any thread] Tools are numbered as they come to be told, the same for all sessions.
 std::uint32_t RoomHost::Impl::number_of(const Digest& tool) {
   const std::lock_guard lock(numbers_mutex);
   return tool_numbers.emplace(tool, static_cast<std::uint32_t>(tool_numbers.size() + 1)).first->second;
 }
 
+// [tick] What every session hears of an event that is not a cut. Only this thread changes the room.
 MessageParts RoomHost::Impl::rows_of(const RoomEvent& event) {
   MessageParts rows;
   if (event.tool) rows.push_back(tool_row(event.room_seq, event.tool->tool, number_of(event.tool->hash)));
@@ -426,6 +436,7 @@ void RoomHost::tick(std::chrono::nanoseconds now, bool keep) {
 void RoomHost::run_slowly(std::function<void()> job) { impl_->jobs.run(std::move(job)); }
 
 Result<void> RoomHost::resume(AuthorId author, const Digest& secret, const std::optional<JournalHead>& kept) {
+  if (impl_->playback) return tl::unexpected(only_to_be_watched());
   {
     const std::shared_lock lock(impl_->room_mutex);
     if (!impl_->room.proves(author, secret))
@@ -440,7 +451,7 @@ void RoomHost::join(MemberKind kind, const std::string& name, const Digest& secr
                     std::function<void(const Result<AuthorId>&)> answer) {
   if (impl_->playback) {
     if (kind == MemberKind::watcher) return answer(AuthorId{impl_->next_watcher++});
-    return answer(failure(ErrorCode::unavailable, "this room shows what happened in another: watch it with osteon-viewer"));
+    return answer(tl::unexpected(only_to_be_watched()));
   }
   std::uint32_t person = 0;
   if (impl_->keeper && !name.empty()) {
@@ -529,6 +540,7 @@ RoomHost::Impl::BoneCopy RoomHost::Impl::copy_bone(Bodies which) {
 }
 
 BoneStatus RoomHost::bone_status() {
+  const std::lock_guard copying(impl_->copy_mutex);
   {
     const std::shared_lock lock(impl_->room_mutex);
     if (impl_->last_status && impl_->last_status->room_seq == impl_->room.room_seq()) return *impl_->last_status;
@@ -551,6 +563,7 @@ BoneStatus RoomHost::bone_status() {
 }
 
 RoomHost::Leaves RoomHost::leaves_now() {
+  const std::lock_guard copying(impl_->copy_mutex);
   const Impl::BoneCopy copy = impl_->copy_bone(Impl::Bodies::all);
   Leaves all{copy.room_seq, {}};
   for (const auto& [id, field] : copy.bodies) std::ranges::move(field.leaves(), std::back_inserter(all.leaves));
@@ -558,6 +571,7 @@ RoomHost::Leaves RoomHost::leaves_now() {
 }
 
 SavedFields RoomHost::saved_fields() {
+  const std::lock_guard copying(impl_->copy_mutex);
   const Impl::BoneCopy copy = impl_->copy_bone();
   SavedFields saved;
   saved.case_hash = bone().hash();
@@ -585,7 +599,7 @@ void RoomHost::Impl::run_pieces() {
       pieces_due = look_wanted = false;
       ++looks_begun;
     }
-    if (rates_.pieces.count() > 0) {
+    if (looks_for_pieces()) {
       for (Separation& found : pieces.look()) ask_for_split(std::move(found));
     } else {
       const std::unique_lock room_lock(room_mutex);
@@ -632,6 +646,7 @@ void RoomHost::find_pieces() {
 }
 
 Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, const Digest& secret) {
+  if (impl_->playback) return tl::unexpected(only_to_be_watched());
   std::vector<FieldLeaf> leaves;
   MessageParts before;
   {
@@ -733,6 +748,7 @@ void RoomHost::stop() {
   // The last tick may still make blocks due, so the mesh thread ends after it.
   impl_->stopping = true;
   if (impl_->tick_thread.joinable()) impl_->tick_thread.join();
+  impl_->jobs.stop();
   impl_->board.stop();
   impl_->mesh.stop();
   {
@@ -743,14 +759,16 @@ void RoomHost::stop() {
   if (impl_->piece_thread.joinable()) {
     impl_->piece_thread.join();
     // What the last cuts separated, so that the bone is left, and saved, in its pieces.
-    if (impl_->rates_.pieces.count() > 0)
-      for (Separation& found : impl_->pieces.look()) (void)impl_->room.split(std::move(found));
+    if (impl_->looks_for_pieces())
+      for (Separation& found : impl_->pieces.look()) {
+        const std::unique_lock lock(impl_->room_mutex);
+        (void)impl_->room.split(std::move(found));
+      }
     impl_->room_seq = impl_->room.room_seq().value;
     impl_->mesh.update(false);
     impl_->committer.commit(impl_->room.take_rows(), {});
     impl_->committer.drain();
   }
-  impl_->jobs.stop();
 }
 
 }  // namespace osteon

@@ -195,7 +195,7 @@ std::uint16_t RoomServer::link_port() const { return impl_->links ? impl_->links
 LinkServerHealth RoomServer::link_health() const { return impl_->links ? impl_->links->health() : LinkServerHealth{}; }
 
 std::map<std::string, RoomSummary> RoomServer::stop_all() {
-  impl_->rooms->stop_upkeep();
+  impl_->rooms->begin_end();
   // Streams hear why first; those whose reader does not read are cut off after a moment.
   for (const std::shared_ptr<OpenRoom>& room : impl_->rooms->open_rooms()) room->end_streams("the server stops");
   impl_->server->Shutdown(std::chrono::system_clock::now() + std::chrono::milliseconds(500));

@@ -37,6 +37,11 @@ Error no_such_room(const std::string& name) {
 Error not_open(const std::string& name) {
   return {ErrorCode::unavailable, "the room " + name + " is closed; osteon-server rooms resume " + name + " opens it"};
 }
+Error kept_elsewhere(const OpenRoom& room) {
+  return {ErrorCode::unavailable, "the room " + room.name + " is kept in " + room.keeper_file().string() +
+                                      ", not in a folder of rooms; stop the server and see osteon-server --help for what is done to "
+                                      "its journal, or start it with --rooms FOLDER"};
+}
 Error not_kept(const std::string& name) {
   return {ErrorCode::unavailable, "the room " + name + " is not kept in a journal; start osteon-server with --rooms FOLDER"};
 }
@@ -109,14 +114,16 @@ RoomSummary OpenRoom::close() {
   host_->stop();
   if (keeper_) {
     // Nothing is lost where this fails: the next opening takes longer.
-    Result<void> done = keeper_->checkpoint(host_->room_seq(), host_->all_leaves());
-    if (done) done = keeper_->close();
-    if (!done) log::warn("the journal was not closed cleanly", {{"room", name}, {"reason", done.error().message}});
+    if (const Result<void> kept = keeper_->checkpoint(host_->room_seq(), host_->all_leaves()); !kept)
+      log::warn("no checkpoint", {{"room", name}, {"reason", kept.error().message}});
+    if (const Result<void> closed = keeper_->close(); !closed)
+      log::warn("the journal was not closed cleanly", {{"room", name}, {"reason", closed.error().message}});
   }
-  return {host_->bone_status(), host_->health(), save.empty() ? SavedFields{} : host_->saved_fields(), host_->surface_hash()};
+  return {host_->bone().hash(), host_->bone_status(), host_->health(), save, save.empty() ? SavedFields{} : host_->saved_fields(),
+          host_->surface_hash()};
 }
 
-void OpenRoom::keep_up() {
+void OpenRoom::keep_up(const std::function<bool()>& stop) {
   if (!keeper_) return;
   if (Clock::now() - forgotten_ > std::chrono::hours(24)) {
     forgotten_ = Clock::now();
@@ -124,14 +131,14 @@ void OpenRoom::keep_up() {
       log::warn("nobody was forgotten", {{"room", name}, {"reason", gone.error().message}});
   }
   const bool due = CheckpointPolicy{}.is_due(keeper_->changes_since_checkpoint(), Clock::now() - newest_checkpoint_);
-  if (!due || checkpointing_.exchange(true)) return;
+  if (!due) return;
   newest_checkpoint_ = Clock::now();
-  host_->run_slowly([this] {
-    const RoomHost::Leaves now = host_->leaves_now();
-    if (const Result<void> kept = keeper_->checkpoint(now.place, now.leaves); !kept)
-      log::warn("no checkpoint", {{"room", name}, {"reason", kept.error().message}});
-    checkpointing_ = false;
-  });
+  // Written here: whoever comes is answered by the thread that copies the leaves, and must not wait for the disk.
+  std::promise<RoomHost::Leaves> copied;
+  host_->run_slowly([&] { copied.set_value(host_->leaves_now()); });
+  const RoomHost::Leaves now = copied.get_future().get();
+  if (const Result<void> kept = keeper_->checkpoint(now.place, now.leaves, {.progress = {}, .stop = stop}); !kept)
+    log::warn("no checkpoint", {{"room", name}, {"reason", kept.error().message}});
 }
 
 Rooms::Rooms(RoomsOptions options) : options_(std::move(options)) {
@@ -142,23 +149,29 @@ Rooms::Rooms(RoomsOptions options) : options_(std::move(options)) {
 }
 
 Rooms::~Rooms() {
-  stop_upkeep();
+  begin_end();
+  jobs.stop();
+  files.stop();
   (void)close_all();
 }
 
 void Rooms::run_upkeep() {
   std::unique_lock lock(mutex_);
-  while (!upkeep_wake_.wait_for(lock, kUpkeepEvery, [&] { return upkeep_end_; })) {
+  while (!upkeep_wake_.wait_for(lock, kUpkeepEvery, [&] { return ending_.load(); })) {
     lock.unlock();
-    for (const std::shared_ptr<OpenRoom>& room : open_rooms()) room->keep_up();
+    for (const std::shared_ptr<OpenRoom>& room : open_rooms()) room->keep_up(until_the_end().stop);
     lock.lock();
   }
 }
 
-void Rooms::stop_upkeep() {
+UpkeepCalls Rooms::until_the_end() const {
+  return {.progress = {}, .stop = [this] { return ending_.load(); }};
+}
+
+void Rooms::begin_end() {
   {
     const std::lock_guard lock(mutex_);
-    upkeep_end_ = true;
+    ending_ = true;
     upkeep_wake_.notify_all();
   }
   if (upkeep_.joinable()) upkeep_.join();
@@ -239,6 +252,10 @@ std::vector<RoomListing> Rooms::list() const {
 Result<void> Rooms::check_new(const std::string& name) const {
   if (!is_name(name))
     return failure(ErrorCode::invalid_input, "\"" + name + "\" is no name of a room; use letters, digits, - and _, at most 64");
+  return check_free(name);
+}
+
+Result<void> Rooms::check_free(const std::string& name) const {
   const std::lock_guard lock(mutex_);
   if (open_.contains(name) || kept_file(name)) return failure(ErrorCode::exists, "there is a room " + name + "; choose another name");
   return {};
@@ -248,6 +265,7 @@ std::shared_ptr<OpenRoom> Rooms::take_in(std::shared_ptr<OpenRoom> room) {
   {
     const std::lock_guard lock(mutex_);
     open_[room->name] = room;
+    to_open_.erase(room->name);
   }
   note_open();
   log::info("room open", {{"room", room->name}, {"room_seq", room->host().room_seq().value}, {"kept", room->keeper() != nullptr}});
@@ -265,9 +283,15 @@ std::shared_ptr<OpenRoom> Rooms::take_out(const std::string& name) {
 
 void Rooms::note_open() const {
   if (options_.folder.empty()) return;
-  std::string names;
+  std::set<std::string> all;
+  {
+    const std::lock_guard lock(mutex_);
+    all = to_open_;
+  }
   for (const std::shared_ptr<OpenRoom>& room : open_rooms())
-    if (room->keeper() && kept_file(room->name)) names += room->name + "\n";
+    if (room->keeper()) all.insert(room->name);
+  std::string names;
+  for (const std::string& name : all) names += name + "\n";
   if (const Result<void> written = write_file(options_.folder / kOpenList, names); !written)
     log::warn("which rooms are open was not noted", {{"reason", written.error().message}});
 }
@@ -275,7 +299,7 @@ void Rooms::note_open() const {
 Result<std::shared_ptr<OpenRoom>> Rooms::add(const std::string& name, Room room, std::unique_ptr<RoomKeeper> keeper, fs::path save,
                                              const std::function<void(double)>& progress) {
   const std::lock_guard changing(changing_);
-  if (Result<void> may = check_new(name); !may) return tl::unexpected(may.error());
+  if (Result<void> may = check_free(name); !may) return tl::unexpected(may.error());
   const ServedCase* served = find_case(room.bone().hash());
   OSTEON_CHECK(served);
   auto made = std::make_shared<OpenRoom>(name, *served, std::move(room), options_, progress, std::move(keeper));
@@ -287,6 +311,10 @@ void Rooms::resume_all(const std::function<void(double)>& progress) {
   const Result<std::string> noted = read_file(options_.folder / kOpenList);
   if (!noted) return;
   const std::vector<std::string> names = lines_of(*noted);
+  {
+    const std::lock_guard lock(mutex_);
+    to_open_ = {names.begin(), names.end()};
+  }
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto part = [&](double fraction) { progress((static_cast<double>(i) + fraction) / static_cast<double>(names.size())); };
     const Result<std::shared_ptr<OpenRoom>> room = resume(names[i], part);
@@ -339,11 +367,15 @@ Result<std::shared_ptr<OpenRoom>> Rooms::open(const std::string& name, const Ser
 
 Result<RoomSummary> Rooms::close(const std::string& name) {
   const std::lock_guard changing(changing_);
+  if (const auto kept = find(name); kept && (*kept)->keeper() && !kept_file((*kept)->name))
+    return tl::unexpected(kept_elsewhere(**kept));
   const std::shared_ptr<OpenRoom> room = take_out(name);
   if (!room) return kept_file(name) ? tl::unexpected(not_open(name)) : tl::unexpected(no_such_room(name));
   room->end_streams("the room " + name + " was closed");
   RoomSummary summary = room->close();
   note_open();
+  if (!summary.save.empty())
+    if (Result<void> saved = save_fields(summary.save, summary.fields); !saved) return tl::unexpected(saved.error());
   log::info("room closed", {{"room", name}, {"room_seq", summary.bone.room_seq.value}});
   return summary;
 }
@@ -352,13 +384,13 @@ Result<std::shared_ptr<OpenRoom>> Rooms::branch(const std::string& name, const s
   {
     const std::lock_guard changing(changing_);
     if (Result<void> may = check_new(new_name); !may) return tl::unexpected(may.error());
-    if (options_.folder.empty()) return tl::unexpected(not_kept(name));
     const Result<std::shared_ptr<OpenRoom>> from = find(name);
     if (from && !(*from)->keeper()) return tl::unexpected(not_kept(name));
+    if (from && options_.folder.empty()) return tl::unexpected(kept_elsewhere(**from));
     const Result<fs::path> file = from ? Result<fs::path>(fs::path{}) : kept_file(name);
     if (!file) return tl::unexpected(file.error());
-    const Result<JournalHead> made = from ? (*from)->keeper()->branch(journal_of(new_name), to, new_name)
-                                          : branch_journal(*file, journal_of(new_name), to, new_name);
+    const Result<JournalHead> made = from ? (*from)->keeper()->branch(journal_of(new_name), to, new_name, until_the_end())
+                                          : branch_journal(*file, journal_of(new_name), to, new_name, until_the_end());
     if (!made) return tl::unexpected(made.error());
   }
   return resume(new_name);
@@ -403,19 +435,23 @@ Result<std::vector<std::string>> Rooms::remove(const std::string& name, bool wit
     // Only a room's own keeper can look into a journal that is in use.
     const auto has = [this](const fs::path& of, const JournalHead& head) {
       const Result<std::shared_ptr<OpenRoom>> in_use = find(of.stem().string());
-      return in_use ? (*in_use)->keeper()->has_head(head) : has_head(of, head);
+      return in_use && of == journal_of((*in_use)->name) ? (*in_use)->keeper()->has_head(head) : has_head(of, head);
     };
     const Result<std::vector<RoomFile>> branches = branches_of(options_.folder, *file, has);
     if (!branches) return tl::unexpected(branches.error());
-    for (const RoomFile& branch : *branches) names.push_back(branch.file.stem().string());
+    // A backup in the folder is no room.
+    for (const RoomFile& branch : *branches)
+      if (branch.file == journal_of(branch.file.stem().string())) names.push_back(branch.file.stem().string());
     if (names.size() > 1 && !with_branches) {
       std::string list;
       for (std::size_t i = 1; i < names.size(); ++i) list += (i > 1 ? ", " : "") + names[i];
       return failure(ErrorCode::unavailable, "the room " + name + " has branches, which hold what it was: " + list +
                                                  "; say --with-branches to delete them too");
     }
-  } else if (!find(name)) {
+  } else if (const Result<std::shared_ptr<OpenRoom>> room = find(name); !room || name.empty()) {
     return tl::unexpected(file.error());
+  } else if ((*room)->keeper()) {
+    return tl::unexpected(kept_elsewhere(**room));
   }
   std::vector<std::string> deleted;
   // Those that hang on others first: where this is interrupted, what is left is still known as a branch.
@@ -439,21 +475,24 @@ Result<RoomReport> Rooms::verify(const std::string& name) {
   (*room)->host().run_slowly([&] { bone.set_value((*room)->host().bone_status()); });
   const BoneStatus status = bone.get_future().get();
   // What is decided is kept a moment later.
-  while ((*room)->keeper()->head().place < status.room_seq && !(*room)->host().stopped())
+  while ((*room)->keeper()->head().place < status.room_seq && !(*room)->host().stopped() && !ending_)
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  return (*room)->keeper()->verify((*room)->host().bone(), BoneAt{status.room_seq, status.field_hash});
+  if ((*room)->keeper()->head().place < status.room_seq)
+    return failure(ErrorCode::unavailable, "the room " + name + " has stopped; check its journal with osteon-server verify once the server has ended");
+  return (*room)->keeper()->verify((*room)->host().bone(), BoneAt{status.room_seq, status.field_hash}, until_the_end());
 }
 
 Result<JournalHead> Rooms::back_up(const std::string& name, const std::string& file_name, fs::path& file) {
   const Result<std::shared_ptr<OpenRoom>> room = find(name);
   if (!room) return tl::unexpected(room.error());
-  if (!(*room)->keeper() || options_.folder.empty()) return tl::unexpected(not_kept(name));
+  if (!(*room)->keeper()) return tl::unexpected(not_kept(name));
+  if (options_.folder.empty()) return tl::unexpected(kept_elsewhere(**room));
   // A client names no folder: it may not write elsewhere on the server's disk.
   const fs::path plain = file_name;
   if (plain != plain.filename() || plain.extension() != ".backup" || !is_name(plain.stem().string()))
     return failure(ErrorCode::invalid_input, "\"" + file_name + "\" is not a plain name that ends in .backup");
   file = options_.folder / plain;
-  return (*room)->keeper()->backup(file);
+  return (*room)->keeper()->backup(file, until_the_end());
 }
 
 std::map<std::string, RoomSummary> Rooms::close_all() {

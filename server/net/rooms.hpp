@@ -10,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <utility>
@@ -26,10 +27,12 @@
 namespace osteon {
 
 struct RoomSummary {
+  Digest case_hash;
   BoneStatus bone;
   HostHealth health;
-  SavedFields fields;   // of the bone; empty where the room is not to be saved
-  Digest surface_hash;  // equal to every viewer's that has shown room_seq
+  std::filesystem::path save;  // where its owner is to write `fields`; empty: nowhere, and they are
+  SavedFields fields;
+  Digest surface_hash;         // equal to every viewer's that has shown room_seq
 };
 
 struct ServedCase {
@@ -61,18 +64,19 @@ class OpenRoom {
 
   [[nodiscard]] RoomHost& host() { return *host_; }
   [[nodiscard]] RoomKeeper* keeper() { return keeper_.get(); }  // null: it is lost when it is closed
+  [[nodiscard]] std::filesystem::path keeper_file() const { return keeper_ ? keeper_->file() : std::filesystem::path{}; }
   // Tells every stream why it ends.
   void end_streams(const std::string& why);
   // Afterwards nothing changes any more; the journal is closed cleanly, with a checkpoint.
   RoomSummary close();
-  // [upkeep] Writes a checkpoint where the next opening would take long without, and forgets whom it is time to forget.
-  void keep_up();
+  // [upkeep] Writes a checkpoint where the next opening would take long without, and forgets whom it is time to forget. `stop`
+  // returns true: what takes long is given up.
+  void keep_up(const std::function<bool()>& stop);
 
  private:
   using Clock = std::chrono::steady_clock;
   std::unique_ptr<RoomKeeper> keeper_;  // outlives the host, which writes to it
   std::unique_ptr<RoomHost> host_;
-  std::atomic<bool> checkpointing_{false};
   Clock::time_point newest_checkpoint_ = Clock::now(), forgotten_ = Clock::now();  // of upkeep
 };
 
@@ -114,16 +118,17 @@ class Rooms {
   Result<RoomSummary> close(const std::string& name);
   // All that `name` was up to that event, null for all.
   Result<std::shared_ptr<OpenRoom>> branch(const std::string& name, const std::string& new_name, RoomSeq to);
-  // Shows `name`, open or closed, from one event, null for its beginning, to another, null for its last.
+  // Shows `name`, which is open, from one event, null for its beginning, to another, null for its last. It ends early where
+  // that room is closed meanwhile.
   Result<std::shared_ptr<OpenRoom>> replay(const std::string& name, const std::string& new_name, RoomSeq from, RoomSeq to,
                                            double speed);
-  // The names of those that are gone. Error unavailable: it has branches, and they are not to go too.
+  // The names of those that are gone. Error unavailable: it has branches, and they are not to go too; it is kept elsewhere.
   Result<std::vector<std::string>> remove(const std::string& name, bool with_branches);
   // Of an open room, while it is cut.
   Result<RoomReport> verify(const std::string& name);
   Result<JournalHead> back_up(const std::string& name, const std::string& file_name, std::filesystem::path& file);
 
-  void stop_upkeep();                               // no checkpoint is written any more
+  void begin_end();  // gives up what takes long, and does no upkeep any more
   [[nodiscard]] std::map<std::string, RoomSummary> close_all();  // those that are open stay so in the folder's list
 
   // For calls that take long.
@@ -133,6 +138,7 @@ class Rooms {
  private:
   [[nodiscard]] std::filesystem::path journal_of(const std::string& name) const;
   [[nodiscard]] Result<void> check_new(const std::string& name) const;
+  [[nodiscard]] Result<void> check_free(const std::string& name) const;
   [[nodiscard]] Result<std::filesystem::path> kept_file(const std::string& name) const;
   Result<std::shared_ptr<OpenRoom>> open(const std::string& name, const ServedCase& served, bool is_new,
                                          const std::function<void(double)>& progress);
@@ -140,13 +146,15 @@ class Rooms {
   [[nodiscard]] std::shared_ptr<OpenRoom> take_out(const std::string& name);
   void note_open() const;  // writes the list of those that are open
   void run_upkeep();
+  [[nodiscard]] UpkeepCalls until_the_end() const;
 
   const RoomsOptions options_;
-  mutable std::mutex changing_;  // held by whatever changes the rooms; never waits for mutex_'s holder
+  mutable std::mutex changing_;  // held by whatever changes the rooms; taken before mutex_, never within it
   mutable std::mutex mutex_;
   std::map<std::string, std::shared_ptr<OpenRoom>> open_;
+  std::set<std::string> to_open_;  // that were open when the folder was last left, and are not yet again
   std::condition_variable upkeep_wake_;
-  bool upkeep_end_ = false;
+  std::atomic<bool> ending_{false};
   std::thread upkeep_;
 };
 

@@ -58,7 +58,7 @@ Result<RoomLine> line_of(const Result<Response>& response) {
 Result<RoomsClient> RoomsClient::reach(const std::string& address, std::chrono::milliseconds patience,
                                        const std::function<bool()>& stop) {
   // A long answer is waited for as long as by a hand.
-  Result<std::shared_ptr<grpc::Channel>> channel = wire::reach_server(address, {}, wire::ClientKind::haptic, patience, stop);
+  Result<std::shared_ptr<grpc::Channel>> channel = wire::reach_server(address, wire::ClientKind::haptic, patience, stop);
   if (!channel) return tl::unexpected(channel.error());
   return RoomsClient(std::move(*channel));
 }

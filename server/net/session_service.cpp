@@ -130,7 +130,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
       const std::shared_ptr<SessionSink> sink(keep, this);
       if (const Result<void> opened = host_.open_session(sink, secret); !opened) return close(invalid(opened.error().message));
       // A reader that went away meanwhile has left the host's list before it was on it.
-      if (!read_on()) host_.leave(*this);
+      if (!read_on()) leave();
     });
   }
 

@@ -4,6 +4,7 @@
 #include <csignal>
 #include <fstream>
 
+#include "common/volume/field_file.hpp"
 #include "tests/integration/killed_servers.hpp"
 #include "tests/integration/stage.hpp"
 #include "tests/support/scenes/bones.hpp"
@@ -109,6 +110,42 @@ TEST(Kept, TheRoomsOfAKilledServerAreOpenAgain) {
   ASSERT_EQ(stage.server().terminate(), 0) << stage.server().err();
   const nlohmann::json summary = read_json(stage / "server.json");
   EXPECT_EQ(summary.at("rooms").size(), 2u);
+}
+
+// A room that somebody makes beside the server's own changes nothing of how that one is kept.
+TEST(Kept, TheServersOwnRoomIsSavedWhateverIsMadeBesideIt) {
+  TempDir folder;
+  const std::string file = (folder / "bone.vdb").string();
+  Stage stage(12.0, {"--save", file});
+  {
+    Surgeon hand(stage.address(), folder / "cache");
+    ASSERT_TRUE(wait_until([&] { return hand.complete(); }, kPatience));
+    Cut cut = straight_cut(find_tool("burr-round-5").value(), {0, 0, 0}, {1, 0, 0}, {0, 0, -1}, 1);
+    cut.author = hand.author();
+    ASSERT_TRUE(hand.session().send(cut));
+    ASSERT_TRUE(wait_until([&] { return hand.own() == 1; }, kPatience));
+  }
+  ASSERT_NE(rooms(stage, {"create", "anna"}), "");  // before "room" in the order of names
+  ASSERT_EQ(stage.server().terminate(), 0) << stage.server().err();
+  const auto saved = load_fields(file);
+  ASSERT_TRUE(saved.has_value()) << saved.error().message;
+  EXPECT_FALSE(saved->leaves.empty());
+  EXPECT_EQ(read_json(stage / "server.json").at("rooms").size(), 2u);
+}
+
+TEST(Kept, ARoomOfAFileOfItsOwnIsNotForOthersToDelete) {
+  TempDir folder;
+  const std::filesystem::path file = folder / "my room.2026.journal";
+  Stage stage(12.0, {"--journal", file.string()});
+  for (const char* what : {"delete", "close"}) {
+    const RunResult refused = run(program("osteon-server"), {"rooms", what, "my room.2026", "--server", stage.address()}, 30s);
+    EXPECT_NE(refused.exit_code, 0);
+    EXPECT_NE(refused.err.find("my room.2026.journal"), std::string::npos) << refused.err;
+  }
+  Surgeon hand(stage.address(), folder / "cache", "", "my room.2026");
+  EXPECT_TRUE(wait_until([&] { return hand.complete(); }, kPatience));
+  ASSERT_EQ(stage.server().terminate(), 0);
+  EXPECT_TRUE(std::filesystem::exists(file));
 }
 
 void expect_refused(const std::vector<std::string>& arguments, const std::vector<std::string>& words) {

@@ -99,6 +99,25 @@ TEST_F(RoomsTest, ACallWithoutANameIsToTheOnlyRoom) {
   EXPECT_NE(refusal_of("carla").find("no room carla"), std::string::npos);
 }
 
+// Who joined the only room stays in it, whatever is opened beside it.
+TEST_F(RoomsTest, WhoJoinedWithoutANameStaysInThatRoom) {
+  ASSERT_TRUE(client_->create("anna", ""));
+  const auto hand = surgeon("");
+  cut(*hand, 5, 1);
+  ASSERT_TRUE(client_->create("berta", ""));
+  v1::UndoRequest undo;
+  undo.set_author(hand->author().value);
+  undo.set_count(1);
+  v1::UndoResponse undone;
+  grpc::ClientContext context;
+  const auto status = v1::RoomService::NewStub(hand->session().room().channel)->Undo(&context, undo, &undone);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  ASSERT_TRUE(client_->close("anna"));
+  grpc::ClientContext again;
+  EXPECT_FALSE(v1::RoomService::NewStub(hand->session().room().channel)->Undo(&again, undo, &undone).ok())
+      << "the room that is left is another";
+}
+
 TEST_F(RoomsTest, AClosedRoomSaysSoAndGoesOnWhereItWas) {
   ASSERT_TRUE(client_->create("anna", ""));
   ASSERT_TRUE(client_->create("berta", ""));
@@ -135,6 +154,23 @@ TEST_F(RoomsTest, TheRoomsThatWereOpenAreOpenAgain) {
   EXPECT_EQ(listed(true), (std::vector<std::string>{"anna", "carla"}));
   EXPECT_EQ(listed(false), std::vector<std::string>{"berta"});
   EXPECT_EQ(hash_of("anna"), before);
+}
+
+// One that cannot be opened today is tried again tomorrow.
+TEST_F(RoomsTest, ARoomThatCannotBeOpenedStaysOnTheListOfThoseThatWere) {
+  for (const char* name : {"anna", "berta", "carla"}) ASSERT_TRUE(client_->create(name, ""));
+  server_->stop_all();
+  client_.reset();
+  server_.reset();
+  fs::rename(dir_ / "rooms" / "berta.journal", dir_ / "berta.aside");
+  start();
+  EXPECT_EQ(listed(true), (std::vector<std::string>{"anna", "carla"}));
+  server_->stop_all();
+  client_.reset();
+  server_.reset();
+  fs::rename(dir_ / "berta.aside", dir_ / "rooms" / "berta.journal");
+  start();
+  EXPECT_EQ(listed(true), (std::vector<std::string>{"anna", "berta", "carla"}));
 }
 
 TEST_F(RoomsTest, ABranchBeginsWithWhatWasAndGoesItsOwnWay) {
@@ -187,6 +223,19 @@ TEST_F(RoomsTest, DeletingLeavesNothingAndAsksAboutBranches) {
   EXPECT_FALSE(client_->remove("anna", true).has_value());
 }
 
+// A backup in the folder is no room, whatever its name, and stands in nobody's way.
+TEST_F(RoomsTest, ABackupOfABranchIsNotTakenForARoomOfItsName) {
+  for (const char* name : {"anna", "bob"}) ASSERT_TRUE(client_->create(name, ""));
+  const auto anna = surgeon("anna");
+  cut(*anna, 3, 1);
+  ASSERT_TRUE(client_->branch("anna", "what-if", RoomSeq{}));
+  ASSERT_TRUE(client_->back_up("what-if", "bob.backup"));
+  const auto gone = client_->remove("anna", true);
+  ASSERT_TRUE(gone.has_value()) << gone.error().message;
+  EXPECT_EQ(*gone, (std::vector<std::string>{"what-if", "anna"}));
+  EXPECT_EQ(listed(true), std::vector<std::string>{"bob"});
+}
+
 TEST_F(RoomsTest, WhatHappenedHappensAgainForThoseWhoWatch) {
   ASSERT_TRUE(client_->create("anna", ""));
   const auto anna = surgeon("anna");
@@ -219,6 +268,20 @@ TEST_F(RoomsTest, WhatHappenedHappensAgainForThoseWhoWatch) {
   v1::UndoResponse undone;
   grpc::ClientContext context;
   EXPECT_FALSE(v1::RoomService::NewStub(watcher.channel)->Undo(&context, undo, &undone).ok());
+  // Nor does the surgeon of what is shown, who is known there with his secret.
+  wire::JoinedRoom author = anna->session().room();
+  author.channel = watcher.channel;
+  EXPECT_FALSE(wire::join_again(author, wire::ClientKind::haptic, {}).has_value());
+  v1::SessionRequest opening;
+  opening.mutable_open()->set_author(author.author.value);
+  opening.mutable_open()->set_server_epoch(watcher.server_epoch);
+  opening.mutable_open()->set_secret(author.secret);
+  grpc::ClientContext cutting;
+  const auto session = v1::CuttingService::NewStub(watcher.channel)->Session(&cutting);
+  ASSERT_TRUE(session->Write(opening));
+  v1::SessionResponse nothing;
+  EXPECT_FALSE(session->Read(&nothing));
+  EXPECT_NE(session->Finish().error_message().find("watched"), std::string::npos);
   EXPECT_FALSE(client_->replay("anna", "beyond", RoomSeq{}, RoomSeq{1000000}, 1.0).has_value());
   // Its room may be closed meanwhile; then it ends.
   ASSERT_TRUE(client_->close("film"));
