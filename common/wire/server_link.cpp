@@ -85,6 +85,15 @@ bool ServerLink::push(const IndexedRow& row) {
   return false;
 }
 
+bool ServerLink::tell(std::uint64_t index, const SessionRow& row) {
+  if (row.kind == SessionRowKind::committed && row.cut.author == author_) decided(row.cut.author_seq);
+  if (row.kind == SessionRowKind::rejected) {
+    decided(row.author_seq);
+    set_lease_epoch(row.lease_epoch);
+  }
+  return index != 0 && push({index, row});
+}
+
 void ServerLink::set_partners(std::span<const HeardState> partners) {
   std::map<std::uint64_t, Partner> kept;
   for (const HeardState& state : partners.first(std::min(partners.size(), kMostPartners))) {

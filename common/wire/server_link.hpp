@@ -44,6 +44,9 @@ class ServerLink {
   // streamed or too long for a packet, or since too much is unacknowledged. While the link is not alive(), every row above
   // acknowledged() goes over the stream too.
   [[nodiscard]] bool push(const IndexedRow& row);
+  // A row that the session's client is told of: an own cut in it is decided and kept, as is one that it rejects, which raises
+  // the lease too. It is pushed, unless `index` is 0: it has no number, having been among what the client was sent first.
+  bool tell(std::uint64_t index, const SessionRow& row);
   // The session's word over the stream: it has taken the rows up to here.
   void acknowledge(std::uint64_t index) { half_.acknowledge(index); }
   // The author has left: their cuts come no more.

@@ -54,22 +54,14 @@ void SessionLink::offer(const Cut& cut) {
   say(std::move(next));
 }
 
-void SessionLink::tell(const wire::IndexedRow& row) {
+bool SessionLink::tell(std::uint64_t index, const wire::SessionRow& row) {
+  bool goes = false;
   {
     const std::lock_guard lock(mutex_);
-    (void)link_.push(row);  // what does not go in datagrams goes over the stream, as all does
+    goes = link_.tell(index, row);
   }
   if (server_) server_->wake();
-}
-
-void SessionLink::decided(std::uint64_t author_seq) {
-  const std::lock_guard lock(mutex_);
-  link_.decided(author_seq);
-}
-
-void SessionLink::set_lease_epoch(std::uint64_t epoch) {
-  const std::lock_guard lock(mutex_);
-  link_.set_lease_epoch(epoch);
+  return goes;
 }
 
 void SessionLink::know_tool(std::uint32_t number, const Digest& tool) {

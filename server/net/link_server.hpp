@@ -38,11 +38,9 @@ class SessionLink {
 
   // A cut that came over the stream; the sink hears of it in its turn, within this call or later.
   void offer(const Cut& cut);
-  // Every row of the session in order, also those that go over the stream alone.
-  void tell(const wire::IndexedRow& row);
-  // Own cuts up to this one are decided and kept.
-  void decided(std::uint64_t author_seq);
-  void set_lease_epoch(std::uint64_t epoch);
+  // Every row of the session in order, also those that go over the stream alone: see wire::ServerLink::tell. False: this one
+  // goes over the stream alone.
+  bool tell(std::uint64_t index, const wire::SessionRow& row);
   void know_tool(std::uint32_t number, const Digest& tool);
   // Nothing is told to the sink any more once this returns.
   void close();

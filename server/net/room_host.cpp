@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <deque>
 #include <future>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -49,18 +50,19 @@ constexpr std::uint64_t kFirstWatcherOfPlayback = 1ull << 40;
 // queue_mutex, pieces_mutex and stats_mutex are never held with another.
 struct RoomHost::Impl {
   Impl(Room r, HostRates rates, Detail detail, RoomKeeper* k, std::optional<Playback> p)
-      : keeper(k), playback(std::move(p)), room(std::move(r)), time_at_start(room.time()),
+      : keeper(k), room(std::move(r)),
         rates_(rates),
         room_began(Clock::now() - std::chrono::duration_cast<Clock::duration>(room.time())),
         mesh(room, room_mutex, {rates.mesh, rates.looks}, detail, [this] { return board.tool_tips_mm(); }),
         committer(k ? [k](std::span<const RoomRow> rows) { return k->write(rows); } : Committer::Write{},
                   [this](const Error& why) { close_room(why); }, !driven()) {
     authors = room.authors();
+    if (p) player.emplace(std::move(*p), room.time());
   }
 
   [[nodiscard]] bool driven() const { return rates_.tick.count() == 0; }
   // Of a playback they are among its rows.
-  [[nodiscard]] bool looks_for_pieces() const { return rates_.pieces.count() > 0 && !playback; }
+  [[nodiscard]] bool looks_for_pieces() const { return rates_.pieces.count() > 0 && !player; }
   void run_ticks();
   // Whether anything was decided.
   bool tick(std::chrono::nanoseconds now, bool last);
@@ -79,7 +81,6 @@ struct RoomHost::Impl {
   [[nodiscard]] std::optional<Error> closed() const;
   void end_sessions(const std::string& why);
   void show_scene();
-  void show_tool(const Cut& cut);
   void read_leaves(std::vector<FieldLeaf>& leaves);
 
   // All bodies at one place of the order, copied while the room went on.
@@ -94,12 +95,9 @@ struct RoomHost::Impl {
   void ask_for_split(Separation found);
 
   RoomKeeper* const keeper;  // null: nothing is kept
-  std::optional<Playback> playback;
-  std::optional<RoomRow> upcoming;        // of the tick thread, as the next: the playback's next row
-  std::optional<std::chrono::nanoseconds> playback_began;
+  std::optional<Player> player;           // of a playback, from the beginning; used by the tick thread alone
   std::atomic<std::uint64_t> next_watcher{kFirstWatcherOfPlayback};  // of a playback
   Room room;
-  const std::chrono::nanoseconds time_at_start;
   std::shared_mutex room_mutex;
   std::optional<std::vector<Cut>> meanwhile;  // under room_mutex: cuts applied since copy_bone() began to copy
   const HostRates rates_;
@@ -151,9 +149,9 @@ bool RoomHost::Impl::tick(std::chrono::nanoseconds now, bool last) {
     std::swap(batch, queue);
     queue_closed = last;
   }
-  if (!playback) room.set_time(now);
+  if (!player) room.set_time(now);
   for (Queued& queued : batch) std::visit([this](auto& one) { decide(one); }, queued);
-  const bool decided = playback ? play(now) : !batch.empty();
+  const bool decided = player ? play(now) : !batch.empty();
   batch.clear();
   committer.commit(room.take_rows(), std::exchange(tells, {}));
   board.publish(RoomSeq{room_seq});
@@ -162,47 +160,29 @@ bool RoomHost::Impl::tick(std::chrono::nanoseconds now, bool last) {
 
 // Whether anything happened.
 bool RoomHost::Impl::play(std::chrono::nanoseconds now) {
-  // From the first tick on, so that nothing has happened before anyone could watch.
-  if (!playback_began) playback_began = now;
-  const auto passed = std::chrono::duration<double, std::nano>(now - *playback_began) * playback->speed;
-  const auto until = time_at_start + std::chrono::duration_cast<std::chrono::nanoseconds>(passed);
   int played = 0;
-  for (; playback->speed > 0 && playback->next && played < kRowsPlayedPerTick; ++played) {
-    if (!upcoming && !(upcoming = playback->next())) playback->next = nullptr;
-    if (!upcoming || upcoming->at > until) break;
-    const RoomRow row = std::move(*std::exchange(upcoming, std::nullopt));
-    const CutRow* cut = std::get_if<CutRow>(&row.what);
+  for (; played < kRowsPlayedPerTick; ++played) {
+    const std::optional<RoomRow> row = player->take(now);
+    if (!row) break;
+    const CutRow* cut = std::get_if<CutRow>(&row->what);
     {
       const std::unique_lock lock(room_mutex);
-      if (const Result<void> happened = room.replay(row); !happened) {
-        log::error("playback ended", {{"place", row.place.value}, {"reason", happened.error().message}});
-        playback->next = nullptr;
+      if (const Result<void> happened = room.replay(*row); !happened) {
+        log::error("playback ended", {{"place", row->place.value}, {"reason", happened.error().message}});
+        player->stop();
         break;
       }
       room_seq = room.room_seq().value;
       if (meanwhile && cut) meanwhile->push_back(cut->cut);
     }
-    if (cut)
-      show_tool(cut->cut);
-    else
+    if (!cut)
       show_scene();
+    else if (std::optional<CuttingState> state = player->see(cut->cut, *room.tools(), now))
+      board.offer(std::move(*state));
   }
+  for (CuttingState& state : player->at_rest(now)) board.offer(std::move(state));
   if (played > 0) note_changed(Clock::now());
   return played > 0;
-}
-
-// A recorded cut says where its tool was.
-void RoomHost::Impl::show_tool(const Cut& cut) {
-  const ToolBox::Entry* tool = room.tools()->find(cut.tool);
-  if (!tool) return;
-  CuttingState state;
-  state.author = cut.author;
-  state.state_seq = cut.author_seq;
-  state.tool_name = tool->tool.name;
-  state.pose_bone_tool = state.pose_bone_device = dequantise(cut.path.back());
-  state.spindle_rpm = cut.spindle_rpm;
-  state.phase = CuttingPhase::cutting;
-  board.offer(std::move(state));
 }
 
 void RoomHost::Impl::run_ticks() {
@@ -232,7 +212,7 @@ void RoomHost::Impl::run_ticks() {
 }
 
 void RoomHost::Impl::decide(QueuedCut& queued) {
-  if (closed() || playback) return later([sink = queued.sink](const Result<void>&) { sink->decided(); });
+  if (closed() || player) return later([sink = queued.sink](const Result<void>&) { sink->decided(); });
   Result<Outcome> outcome = [&] {
     const std::unique_lock lock(room_mutex);
     Result<Outcome> decision = room.submit(queued.cut);
@@ -277,7 +257,7 @@ void RoomHost::Impl::decide(QueuedCut& queued) {
 void RoomHost::Impl::decide(QueuedEvent& queued) {
   Result<RoomEvent> event = [&]() -> Result<RoomEvent> {
     if (const std::optional<Error> why = closed()) return tl::unexpected(*why);
-    if (playback) return tl::unexpected(only_to_be_watched());
+    if (player) return tl::unexpected(only_to_be_watched());
     const std::unique_lock lock(room_mutex);
     Result<RoomEvent> decision = queued.change(room);
     room_seq = room.room_seq().value;
@@ -388,7 +368,7 @@ std::vector<std::pair<RoomSeq, std::string>> RoomHost::marks() const {
   return impl_->room.marks();
 }
 bool RoomHost::knows(AuthorId author) const {
-  if (impl_->playback && author.value >= kFirstWatcherOfPlayback) return author.value < impl_->next_watcher;
+  if (impl_->player && author.value >= kFirstWatcherOfPlayback) return author.value < impl_->next_watcher;
   return author && author.value <= impl_->authors;
 }
 
@@ -436,7 +416,7 @@ void RoomHost::tick(std::chrono::nanoseconds now, bool keep) {
 void RoomHost::run_slowly(std::function<void()> job) { impl_->jobs.run(std::move(job)); }
 
 Result<void> RoomHost::resume(AuthorId author, const Digest& secret, const std::optional<JournalHead>& kept) {
-  if (impl_->playback) return tl::unexpected(only_to_be_watched());
+  if (impl_->player) return tl::unexpected(only_to_be_watched());
   {
     const std::shared_lock lock(impl_->room_mutex);
     if (!impl_->room.proves(author, secret))
@@ -449,7 +429,7 @@ Result<void> RoomHost::resume(AuthorId author, const Digest& secret, const std::
 
 void RoomHost::join(MemberKind kind, const std::string& name, const Digest& secret,
                     std::function<void(const Result<AuthorId>&)> answer) {
-  if (impl_->playback) {
+  if (impl_->player) {
     if (kind == MemberKind::watcher) return answer(AuthorId{impl_->next_watcher++});
     return answer(tl::unexpected(only_to_be_watched()));
   }
@@ -646,7 +626,7 @@ void RoomHost::find_pieces() {
 }
 
 Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, const Digest& secret) {
-  if (impl_->playback) return tl::unexpected(only_to_be_watched());
+  if (impl_->player) return tl::unexpected(only_to_be_watched());
   std::vector<FieldLeaf> leaves;
   MessageParts before;
   {

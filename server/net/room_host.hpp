@@ -17,6 +17,7 @@
 #include "server/net/committer.hpp"
 #include "server/net/room_keeper.hpp"
 #include "server/net/outbox.hpp"
+#include "server/net/playback.hpp"
 #include "server/net/state_board.hpp"
 #include "server/net/stream_sink.hpp"
 #include "server/room/room.hpp"
@@ -64,12 +65,6 @@ struct HostHealth {
   std::size_t furthest_behind = 0;  // rows or blocks that wait for the slowest reader
   std::size_t blocks = 0;
   std::size_t surface_bytes = 0;    // of the newest blocks: what a viewer that joins is sent
-};
-
-// Rows of another room that happen again in this one, which decides nothing itself.
-struct Playback {
-  std::function<std::optional<RoomRow>()> next;  // [tick] nothing: the last one was given
-  double speed = 1.0;                            // times as fast as it happened; 0: nothing happens
 };
 
 // The bone at one place of the room's order.

@@ -49,6 +49,16 @@ Bytes rejection_row(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease
   return serialised(response);
 }
 
+Bytes link_row(const SessionKeys& keys, std::uint16_t udp_port) {
+  v1::SessionResponse response;
+  v1::LinkOffer& offer = *response.mutable_link();
+  offer.set_session(keys.session);
+  offer.set_key_up(keys.up.bytes.data(), keys.up.bytes.size());
+  offer.set_key_down(keys.down.bytes.data(), keys.down.bytes.size());
+  offer.set_udp_port(udp_port);
+  return serialised(response);
+}
+
 Bytes kept_row(const JournalHead& head) {
   v1::SessionResponse response;
   response.mutable_kept()->set_room_seq(head.place.value);

@@ -1,7 +1,10 @@
 // What a room's events look like on their way to its members: serialised once, shared by all streams.
 #pragma once
+#include <cstdint>
+#include <string>
 #include <vector>
 
+#include "common/link/sealed.hpp"
 #include "server/journal/chain.hpp"
 #include "server/net/outbox.hpp"
 #include "server/room/room.hpp"
@@ -14,6 +17,7 @@ namespace osteon {
 // Whole SessionResponses.
 [[nodiscard]] Bytes cut_row(RoomSeq place, const Cut& cut);
 [[nodiscard]] Bytes rejection_row(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, Rejection reason);
+[[nodiscard]] Bytes link_row(const SessionKeys& keys, std::uint16_t udp_port);
 [[nodiscard]] Bytes kept_row(const JournalHead& head);
 [[nodiscard]] Bytes tool_row(RoomSeq place, const Tool& tool, std::uint32_t number);
 [[nodiscard]] Bytes scene_row(RoomSeq place, const std::vector<SceneItem>& items);

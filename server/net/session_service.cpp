@@ -10,6 +10,7 @@
 #include "osteon/v1/cutting.grpc.pb.h"
 #include "server/net/link_server.hpp"
 #include "server/net/called_room.inl"
+#include "server/net/room_rows.hpp"
 #include "server/net/services.hpp"
 
 namespace osteon {
@@ -32,7 +33,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     const std::uint64_t decided = said.complete().decided_author_seq();
     if (links_) {
       link_ = links_->add(author_, decided + 1, *this);
-      before.insert(before.begin(), link_offer());
+      before.insert(before.begin(), link_row(link_->keys(), links_->port()));
     }
     const std::lock_guard lock(mutex_);
     taken_ = decided;
@@ -58,16 +59,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
       send_or_give_up(outbox_.add(place, row));
       if (outbox_.index() > before) index = outbox_.index();
     }
-    if (!link_) return;
-    const bool committed = fast.kind == wire::SessionRowKind::committed;
-    if (committed && fast.cut.author == author_) link_->decided(fast.cut.author_seq);
-    if (fast.kind == wire::SessionRowKind::rejected) {
-      link_->decided(fast.author_seq);
-      link_->set_lease_epoch(fast.lease_epoch);
-    }
-    if (index == 0) return;
-    const bool fits = !committed || wire::fits_a_packet(fast.cut);
-    link_->tell({index, fits ? fast : wire::SessionRow{.room_seq = place, .kind = wire::SessionRowKind::streamed}});
+    if (link_) link_->tell(index, fast);  // beside the stream, which carries all
   }
   void know_tool(std::uint32_t number, const Digest& tool) override {
     if (link_) link_->know_tool(number, tool);
@@ -165,15 +157,6 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   void arrived(std::uint64_t index) override {
     const std::lock_guard lock(mutex_);
     outbox_.arrived(index);
-  }
-  [[nodiscard]] Bytes link_offer() const {
-    v1::SessionResponse response;
-    v1::LinkOffer& offer = *response.mutable_link();
-    offer.set_session(link_->keys().session);
-    offer.set_key_up(link_->keys().up.bytes.data(), link_->keys().up.bytes.size());
-    offer.set_key_down(link_->keys().down.bytes.data(), link_->keys().down.bytes.size());
-    offer.set_udp_port(links_->port());
-    return serialised(response);
   }
 
   void show(const v1::CuttingState& message) {

@@ -108,16 +108,10 @@ class Line final : public SessionSink, private SessionLink::Sink, public std::en
   }
   void set_leaves(std::vector<FieldLeaf>) override {}
   void offer(RoomSeq, const Bytes&) override { OSTEON_CHECK(!"rows come with what goes in few bytes of them"); }
-  void offer(RoomSeq place, const Bytes&, const wire::SessionRow& fast) override {
+  void offer(RoomSeq, const Bytes&, const wire::SessionRow& fast) override {
     const bool committed = fast.kind == wire::SessionRowKind::committed;
-    if (committed && fast.cut.author == author_) {
-      times.note(told, fast.cut.author_seq);
-      link_->decided(fast.cut.author_seq);
-    }
-    ++index_;
-    const bool fits = fast.kind != wire::SessionRowKind::streamed && (!committed || wire::fits_a_packet(fast.cut));
-    link_->tell({index_, fits ? fast : wire::SessionRow{.room_seq = place, .kind = wire::SessionRowKind::streamed}});
-    if (!fits) path_->heard(index_);  // the stream's copy
+    if (committed && fast.cut.author == author_) times.note(told, fast.cut.author_seq);
+    if (!link_->tell(++index_, fast)) path_->heard(index_);  // the stream's copy
   }
   void answer(const Bytes&) override {}
   void refuse(const Error&) override { ++refused; }

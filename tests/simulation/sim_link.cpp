@@ -169,9 +169,9 @@ void SimLinks::Link::offer(const Cut& cut) {
   say_news();
 }
 
-bool SimLinks::Link::tell(const wire::IndexedRow& row) {
+bool SimLinks::Link::tell(std::uint64_t index, const wire::SessionRow& row) {
   const Time now = links_.datagrams_.time().now();
-  const bool goes = link_.push(row) && link_.alive(now);
+  const bool goes = link_.tell(index, row) && link_.alive(now);
   links_.alarm_.set(now + std::chrono::microseconds(static_cast<int>(links_.random_.index(kWakingTakes_us))));
   return goes;
 }

@@ -13,6 +13,7 @@
 
 #include "common/wire/client_link.hpp"
 #include "common/wire/server_link.hpp"
+#include "server/net/link_server.hpp"
 #include "tests/simulation/ledger.hpp"
 #include "tests/support/network/sim_network.hpp"
 
@@ -77,13 +78,7 @@ class Datagrams {
 class SimLinks {
  public:
   using Time = VirtualTime::Time;
-  class Sink {
-   public:
-    virtual ~Sink() = default;
-    virtual void take(Cut cut) = 0;
-    virtual void take(CuttingState state) = 0;
-    virtual void arrived(std::uint64_t index) = 0;
-  };
+  using Sink = SessionLink::Sink;
   class Link;
 
   // `silent`: the process runs no more, though it is not gone yet.
@@ -111,9 +106,7 @@ class SimLinks::Link {
   [[nodiscard]] const SessionKeys& keys() const { return keys_; }
   void offer(const Cut& cut);
   // False: it goes over the stream only, since it does not fit or the client cannot be reached.
-  bool tell(const wire::IndexedRow& row);
-  void decided(std::uint64_t author_seq) { link_.decided(author_seq); }
-  void set_lease_epoch(std::uint64_t epoch) { link_.set_lease_epoch(epoch); }
+  bool tell(std::uint64_t index, const wire::SessionRow& row);
   void know_tool(std::uint32_t number, const Digest& tool) { link_.tools().add(number, tool); }
 
  private:

@@ -6,6 +6,7 @@
 #include "common/wire/convert.hpp"
 #include "osteon/v1/cutting.pb.h"
 #include "server/journal/upkeep.hpp"
+#include "server/net/room_rows.hpp"
 #include "server/net/services.hpp"
 
 namespace osteon::test {
@@ -37,7 +38,7 @@ std::shared_ptr<ToolBox> few_tools() {
 // What SessionStream of server/net/session_service.cpp does between gRPC and the host.
 class SimServer::Session final : public SessionSink,
                                  public std::enable_shared_from_this<Session>,
-                                 private SimLinks::Sink {
+                                 private SessionLink::Sink {
  public:
   static constexpr int kMaxQueuedCuts = 256;
   static constexpr int kMostUndecided = 1024;  // of a client: what may come in datagrams while nothing is decided
@@ -66,7 +67,7 @@ class SimServer::Session final : public SessionSink,
     v1::SessionResponse said;
     if (server_.links_ && said.ParseFromString(*complete)) {
       link_ = server_.links_->add(author_, said.complete().decided_author_seq() + 1, *this);
-      before.insert(before.begin(), link_offer());
+      before.insert(before.begin(), link_row(link_->keys(), node(Datagrams::kServer).port));
     }
     outbox_.begin(contained, std::move(before), std::move(complete));
     pump();
@@ -168,30 +169,13 @@ class SimServer::Session final : public SessionSink,
   void tell(RoomSeq place, const Bytes& row, const wire::SessionRow& fast) {
     const std::uint64_t before = outbox_.index();
     const bool taken = outbox_.add(place, row);
-    tell_fast(place, fast, outbox_.index() > before);
+    tell_fast(fast, outbox_.index() > before);
     add(taken);
   }
-  void tell_fast(RoomSeq place, const wire::SessionRow& fast, bool numbered) {
+  void tell_fast(const wire::SessionRow& fast, bool numbered) {
     if (!link_) return;
-    const bool committed = fast.kind == wire::SessionRowKind::committed;
-    if (committed && fast.cut.author == author_) link_->decided(fast.cut.author_seq);
-    if (fast.kind == wire::SessionRowKind::rejected) {
-      link_->decided(fast.author_seq);
-      link_->set_lease_epoch(fast.lease_epoch);
-    }
-    if (!numbered) return;
-    const bool fits = !committed || wire::fits_a_packet(fast.cut);
-    const bool goes = link_->tell({outbox_.index(), fits ? fast : wire::SessionRow{.room_seq = place}});
+    const bool goes = link_->tell(numbered ? outbox_.index() : 0, fast);
     if (goes && server_.condition_.breakage == Breakage::pruning) outbox_.arrived(outbox_.index());
-  }
-  [[nodiscard]] Bytes link_offer() const {
-    v1::SessionResponse response;
-    v1::LinkOffer& offer = *response.mutable_link();
-    offer.set_session(link_->keys().session);
-    offer.set_key_up(link_->keys().up.bytes.data(), link_->keys().up.bytes.size());
-    offer.set_key_down(link_->keys().down.bytes.data(), link_->keys().down.bytes.size());
-    offer.set_udp_port(node(Datagrams::kServer).port);
-    return serialised(response);
   }
   void unlink() {
     if (link_) server_.links_->remove(link_);

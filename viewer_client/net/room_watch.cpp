@@ -171,6 +171,14 @@ struct RoomWatch::Impl {
   void say_looks();
   Result<void> read_mesh_stream();
   void fetch_tools(const std::shared_ptr<grpc::Channel>& channel, std::uint64_t author, KnownTools& known);
+  // The same question to the room by the viewer's author.
+  template <class Response, class Request>
+  Result<Response> ask_as_author(grpc::Status (v1::RoomService::Stub::*call)(grpc::ClientContext*, const Request&, Response*),
+                                 Request request) const {
+    const auto [channel, author] = line();
+    request.set_author(author);
+    return ask(channel, call, request);
+  }
   // Channel and author of the newest join.
   std::pair<std::shared_ptr<grpc::Channel>, std::uint64_t> line() const {
     const std::lock_guard lock(mutex);
@@ -424,48 +432,38 @@ void RoomWatch::look(const Look& from) {
 bool RoomWatch::interrupted() const { return impl_->interrupted.load(); }
 
 Result<RoomAnswer> RoomWatch::undo(std::uint32_t count) {
-  const auto [channel, author] = impl_->line();
   v1::UndoRequest request;
-  request.set_author(author);
   request.set_count(count);
-  const auto answer = ask(channel, &v1::RoomService::Stub::Undo, request);
+  const auto answer = impl_->ask_as_author(&v1::RoomService::Stub::Undo, request);
   return answer ? answered(*answer, answer->undone_size()) : tl::unexpected(answer.error());
 }
 
 Result<RoomAnswer> RoomWatch::undo_to(RoomSeq mark) {
-  const auto [channel, author] = impl_->line();
   v1::UndoRequest request;
-  request.set_author(author);
   request.set_to_mark(mark.value);
-  const auto answer = ask(channel, &v1::RoomService::Stub::Undo, request);
+  const auto answer = impl_->ask_as_author(&v1::RoomService::Stub::Undo, request);
   return answer ? answered(*answer, answer->undone_size()) : tl::unexpected(answer.error());
 }
 
 Result<RoomAnswer> RoomWatch::mark(const std::string& label) {
-  const auto [channel, author] = impl_->line();
   v1::MarkRequest request;
-  request.set_author(author);
   request.set_label(label);
-  const auto answer = ask(channel, &v1::RoomService::Stub::Mark, request);
+  const auto answer = impl_->ask_as_author(&v1::RoomService::Stub::Mark, request);
   if (!answer) return tl::unexpected(answer.error());
   return RoomAnswer{RoomSeq{answer->room_seq()}, {}, "mark " + std::to_string(answer->room_seq())};
 }
 
 Result<RoomAnswer> RoomWatch::redo(std::uint32_t count) {
-  const auto [channel, author] = impl_->line();
   v1::RedoRequest request;
-  request.set_author(author);
   request.set_count(count);
-  const auto answer = ask(channel, &v1::RoomService::Stub::Redo, request);
+  const auto answer = impl_->ask_as_author(&v1::RoomService::Stub::Redo, request);
   return answer ? answered(*answer, answer->redone_size()) : tl::unexpected(answer.error());
 }
 
 Result<RoomAnswer> RoomWatch::remove_body(BodyId body) {
-  const auto [channel, author] = impl_->line();
   v1::RemoveBodyRequest request;
-  request.set_author(author);
   request.set_body(body.value);
-  const auto answer = ask(channel, &v1::RoomService::Stub::RemoveBody, request);
+  const auto answer = impl_->ask_as_author(&v1::RoomService::Stub::RemoveBody, request);
   return answer ? answered(*answer) : tl::unexpected(answer.error());
 }
 

@@ -356,8 +356,8 @@ FIGURES = [
     Figure("server_kills_acknowledged", "count", "cuts that they had acknowledged", "server_kills", (">=", 20_000), full=True),
     Figure("server_kills_lost", "count", "of them lost, kept twice, left out, or holders with another bone", "server_kills",
            ("==", 0), full=True),
-    Figure("server_kills_back", "ms", "from a server's return until both hands stood in its room again, median",
-           "server_kills", full=True),
+    Figure("server_kills_back", "ms", "from a server's return until both hands stood in its room again, median, in the slowest of "
+           "four rooms", "server_kills", full=True),
     Figure("bad_network_runs", "count", "real rooms at 40 +- 10 ms, 30 % loss, 10 % reorder, 5 % duplication", "bad_network",
            (">=", 50), full=True),
     Figure("bad_network_faults", "count", "of them not converged, and cuts not decided", "bad_network", ("==", 0), full=True),

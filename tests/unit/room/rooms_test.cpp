@@ -257,6 +257,25 @@ TEST_F(RoomsTest, WhatHappenedHappensAgainForThoseWhoWatch) {
   EXPECT_TRUE(viewer.read_to(last));
   EXPECT_TRUE(as_it_is.read_to(middle));
   EXPECT_NE(viewer.hashes(), as_it_is.hashes());
+  // Its tools are seen, and seen at rest once nothing more happens.
+  v1::WatchCuttingRequest watching;
+  const wire::JoinedRoom gallery = join(server_->address(), wire::ClientKind::viewer, "film");
+  watching.set_author(gallery.author.value);
+  grpc::ClientContext seeing;
+  seeing.set_deadline(std::chrono::system_clock::now() + kPatience);
+  const auto tools = v1::WatchService::NewStub(gallery.channel)->WatchCutting(&seeing, watching);
+  v1::WatchCuttingResponse seen;
+  bool at_rest = false;
+  while (!at_rest && tools->Read(&seen)) {
+    at_rest = seen.states_size() > 0;
+    for (const v1::CuttingState& state : seen.states()) {
+      EXPECT_TRUE(state.tool_name() == "drill-3.2" || state.tool_name() == "burr-round-5");
+      at_rest &= state.spindle_rpm() == 0;
+    }
+  }
+  EXPECT_TRUE(at_rest);
+  seeing.TryCancel();
+  (void)tools->Finish();
   // Nobody changes it.
   const auto hand = wire::join_room(server_->address(), wire::ClientKind::haptic, "test", std::chrono::seconds(5), {}, "film");
   ASSERT_FALSE(hand.has_value());

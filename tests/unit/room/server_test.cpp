@@ -59,6 +59,35 @@ TEST_F(RoomServerTest, ACutBeyondTheLimitsIsRejectedToItsAuthorAndTheRoomGoesOn)
   EXPECT_EQ(status_of(one->session().room()).rejected(), 1u);
 }
 
+// Whoever comes back and has not heard says it again, also where the room decided it in the session before.
+TEST_F(RoomServerTest, ACutOfAnEarlierSessionIsAnsweredAgainWithItsFirstOutcome) {
+  const wire::JoinedRoom room = join(address(), wire::ClientKind::haptic);
+  const auto stub = v1::CuttingService::NewStub(room.channel);
+  std::vector<RoomSeq> places;
+  for (int session = 0; session < 2; ++session) {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kPatience);
+    const auto stream = stub->Session(&context);
+    v1::SessionRequest request;
+    request.mutable_open()->set_author(room.author.value);
+    request.mutable_open()->set_server_epoch(room.server_epoch);
+    request.mutable_open()->set_secret(room.secret);
+    ASSERT_TRUE(stream->Write(request));
+    Cut cut = strokes(room.author, 1, 3)[0];
+    cut.lease_epoch = room.lease_epoch;
+    *request.mutable_cut() = wire::to_wire(cut);
+    ASSERT_TRUE(stream->Write(request));
+    v1::SessionResponse response;
+    while (stream->Read(&response) && response.message_case() != v1::SessionResponse::kCommitted)
+      ;
+    ASSERT_EQ(response.message_case(), v1::SessionResponse::kCommitted) << "session " << session;
+    places.push_back(RoomSeq{response.committed().room_seq()});
+    context.TryCancel();
+    (void)stream->Finish();
+  }
+  EXPECT_EQ(places[0], places[1]);
+}
+
 TEST_F(RoomServerTest, ALateViewerSeesTheBlocksOfAnEarlyOne) {
   MeshReader early(address());
   ASSERT_TRUE(early.read_to(RoomSeq{0}));

@@ -442,6 +442,36 @@ TEST(LinkEnds, CutsOfAnEarlierSessionAreLeftOut) {
   EXPECT_TRUE(pair.client.half().window().empty());
 }
 
+// What a session's client is told says of itself what it decides.
+TEST(LinkEnds, ARowDecidesTheOwnCutInIt) {
+  Pair pair;
+  pair.run(300ms);
+  for (std::uint64_t n = 1; n <= 3; ++n) ASSERT_TRUE(pair.client.push(pair.cut(n)));
+  pair.run(100ms);
+  const auto acknowledged = [&] {
+    pair.run(100ms);
+    return pair.client.acknowledged();
+  };
+  Cut of_another = pair.cut(2);
+  of_another.author = AuthorId{pair.cut(2).author.value + 1};
+  EXPECT_TRUE(pair.server.tell(1, {.room_seq = {1}, .kind = wire::SessionRowKind::committed, .cut = of_another}));
+  EXPECT_EQ(acknowledged(), 0u) << "another's cut";
+  EXPECT_TRUE(pair.server.tell(2, {.room_seq = {2}, .kind = wire::SessionRowKind::committed, .cut = pair.cut(1)}));
+  EXPECT_EQ(acknowledged(), 1u);
+  EXPECT_FALSE(pair.server.tell(0, {.room_seq = {2}, .kind = wire::SessionRowKind::committed, .cut = pair.cut(2)}))
+      << "it has no number";
+  EXPECT_EQ(acknowledged(), 2u);
+  wire::SessionRow rejection{.room_seq = {3}, .kind = wire::SessionRowKind::rejected};
+  rejection.author_seq = 3;
+  rejection.lease_epoch = 4;
+  EXPECT_TRUE(pair.server.tell(3, rejection));
+  EXPECT_EQ(acknowledged(), 3u);
+  EXPECT_EQ(pair.client.lease_epoch(), 4u);
+  std::vector<std::uint64_t> heard;
+  while (const auto row = pair.client.take_row()) heard.push_back(row->index);
+  EXPECT_EQ(heard, (std::vector<std::uint64_t>{1, 2, 3})) << "the one without a number is not said";
+}
+
 // After a long stop the stream brings thousands of rows in a moment.
 TEST(LinkEnds, RowsGoOnBehindAnyNumberThatTheStreamBrought) {
   constexpr std::uint64_t kRows = 5000;
