@@ -14,9 +14,10 @@ LAYERS = {
     "mechanics": {"core", "geometry", "tools", "field"},
     "sound": {"core"},
     "runtime": {"core"},
+    "access": {"core"},
     "link": {"core", "geometry"},
     "input": {"core", "geometry", "runtime"},
-    "wire": {"core", "geometry", "tools", "field", "surface", "mechanics", "link"},
+    "wire": {"core", "geometry", "tools", "field", "surface", "mechanics", "access", "link"},
 }
 PROGRAMS = ("server", "haptic_client", "viewer_client", "audio_client")
 # Inside a program: folders that only the program's app (and tests) put together.

@@ -1,0 +1,78 @@
+#include "common/access/role_table.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace osteon {
+namespace {
+
+constexpr RoleSet kInRoom{Role::observer, Role::trainee, Role::collaborator, Role::instructor};
+constexpr RoleSet kHands{Role::trainee, Role::collaborator, Role::instructor};
+constexpr RoleSet kPartners{Role::collaborator, Role::instructor};
+constexpr RoleSet kInstructor{Role::instructor};
+constexpr RoleSet kOperator{Role::operator_};
+constexpr RoleSet kOversight{Role::instructor, Role::operator_};
+
+constexpr std::array kCalls{
+    CallRow{"/osteon.v1.RoomService/Join", kInRoom},
+    CallRow{"/osteon.v1.RoomService/GetStatus", kInRoom},
+    CallRow{"/osteon.v1.RoomService/GetCase", kInRoom},
+    CallRow{"/osteon.v1.RoomService/ListTools", kInRoom},
+    CallRow{"/osteon.v1.RoomService/GetTool", kInRoom},
+    CallRow{"/osteon.v1.RoomService/AddTool", kHands},
+    CallRow{"/osteon.v1.RoomService/Undo", kHands},
+    CallRow{"/osteon.v1.RoomService/Redo", kHands},
+    CallRow{"/osteon.v1.RoomService/Mark", kHands},
+    CallRow{"/osteon.v1.RoomService/RemoveBody", kInstructor},
+    CallRow{"/osteon.v1.RoomService/SetSceneItem", kHands},
+    CallRow{"/osteon.v1.RoomService/RemoveSceneItem", kHands},
+    CallRow{"/osteon.v1.RoomService/SaveFields", kInstructor},
+    CallRow{"/osteon.v1.CuttingService/Session", kHands},
+    CallRow{"/osteon.v1.WatchService/WatchMesh", kInRoom},
+    CallRow{"/osteon.v1.WatchService/LookFrom", kInRoom},
+    CallRow{"/osteon.v1.WatchService/WatchCutting", kInRoom},
+    // Drawings and words reach everybody; what is not for them the stream leaves out.
+    CallRow{"/osteon.v1.PeopleService/WatchPeople", kInRoom},
+    CallRow{"/osteon.v1.PeopleService/Supervise", kInstructor},
+    CallRow{"/osteon.v1.PeopleService/Annotate", kInstructor},
+    CallRow{"/osteon.v1.PeopleService/Say", kHands},
+    CallRow{"/osteon.v1.PeopleService/Demonstrate", kInstructor},
+    CallRow{"/osteon.v1.PeopleService/EndDemonstration", kInstructor},
+    CallRow{"/osteon.v1.RoomsService/ListRooms", kOversight},
+    CallRow{"/osteon.v1.RoomsService/CreateRoom", kOperator},
+    CallRow{"/osteon.v1.RoomsService/CloseRoom", kOperator},
+    CallRow{"/osteon.v1.RoomsService/ResumeRoom", kOperator},
+    CallRow{"/osteon.v1.RoomsService/BranchRoom", kOversight},
+    CallRow{"/osteon.v1.RoomsService/DeleteRoom", kOperator},
+    CallRow{"/osteon.v1.RoomsService/VerifyRoom", kOversight},
+    CallRow{"/osteon.v1.RoomsService/BackUpRoom", kOperator},
+    CallRow{"/osteon.v1.RoomsService/ReplayRoom", kOversight},
+    CallRow{"/osteon.v1.CaseService/UploadCase", kOperator},
+    CallRow{"/osteon.v1.CaseService/ListCases", kOversight},
+};
+
+// In the order of the enumerations.
+constexpr std::array<RoleSet, kDatagrams> kCarried{kHands, kHands, kHands, kHands, kHands, kHands, kHands, kHands};
+constexpr std::array<RoleSet, kStreamContents> kContents{kInRoom, kInRoom, kInRoom,     kHands,    kInRoom,
+                                                         kInRoom, kInstructor, kInRoom, kInstructor};
+constexpr std::array<RoleSet, kRights> kGranted{kHands, kHands, kPartners, kInstructor};
+
+}  // namespace
+
+std::span<const CallRow> call_rows() { return kCalls; }
+
+const CallRow* find_call(std::string_view method) {
+  const auto row = std::ranges::find(kCalls, method, &CallRow::method);
+  return row == kCalls.end() ? nullptr : &*row;
+}
+
+bool may_call(Role role, std::string_view method) {
+  const CallRow* row = find_call(method);
+  return row != nullptr && row->roles.has(role);
+}
+
+bool may_carry(Role role, Datagram kind) { return kCarried.at(static_cast<std::size_t>(kind)).has(role); }
+bool may_receive(Role role, StreamContent content) { return kContents.at(static_cast<std::size_t>(content)).has(role); }
+bool has_right(Role role, Right right) { return kGranted.at(static_cast<std::size_t>(right)).has(role); }
+
+}  // namespace osteon
