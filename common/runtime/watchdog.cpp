@@ -3,10 +3,14 @@
 #include <pthread.h>
 #include <sched.h>
 
-#include <algorithm>
 #include <utility>
 
 namespace osteon {
+namespace {
+
+std::int64_t now_ns() noexcept { return std::chrono::steady_clock::now().time_since_epoch().count(); }
+
+}  // namespace
 
 Watchdog::Watchdog(std::chrono::nanoseconds patience, int priority, std::function<void()> late)
     : patience_(patience), late_(std::move(late)), thread_([this, priority] { watch(priority); }) {}
@@ -16,34 +20,42 @@ Watchdog::~Watchdog() {
   thread_.join();
 }
 
+void Watchdog::beat() noexcept {
+  const std::int64_t now = now_ns(), last = beat_at_ns_.load(std::memory_order_relaxed);
+  if (last != kResting && now - last > patience_.count()) {
+    measure(now - last);
+    stood_since_ns_.store(last, std::memory_order_relaxed);
+  }
+  beat_at_ns_.store(now, std::memory_order_relaxed);
+}
+
+void Watchdog::measure(std::int64_t silence_ns) noexcept {
+  std::int64_t longest = longest_ns_.load(std::memory_order_relaxed);
+  while (silence_ns > longest && !longest_ns_.compare_exchange_weak(longest, silence_ns, std::memory_order_relaxed)) {
+  }
+}
+
 void Watchdog::watch(int priority) {
   if (priority > 0) {
     sched_param parameters{};
     parameters.sched_priority = priority;
     ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &parameters);
   }
-  using Clock = std::chrono::steady_clock;
-  std::uint64_t seen = 0;
-  auto heard = Clock::now();
-  bool stalled = false;
-  while (!over_) {
-    std::this_thread::sleep_for(patience_ / 4);
-    const auto now = Clock::now();
-    const std::uint64_t beats = beats_.load(std::memory_order_relaxed);
-    const bool silent = beats == seen && beats != resting_.load(std::memory_order_relaxed);
-    if (!silent) {
-      seen = beats;
-      heard = now;
-      stalled = false;
-      continue;
-    }
-    const auto silence = std::chrono::nanoseconds(now - heard);
-    if (silence < patience_) continue;
-    longest_ns_.store(std::max<std::int64_t>(longest_ns_.load(std::memory_order_relaxed), silence.count()),
-                      std::memory_order_relaxed);
-    if (std::exchange(stalled, true)) continue;
+  std::int64_t told = kResting;  // a stall goes by the beat before it
+  const auto tell = [&](std::int64_t since) {
+    if (since <= told) return;
+    told = since;
     stalls_.fetch_add(1, std::memory_order_relaxed);
     if (late_) late_();
+  };
+  while (!over_) {
+    std::this_thread::sleep_for(patience_ / 4);
+    tell(stood_since_ns_.load(std::memory_order_relaxed));
+    const std::int64_t last = beat_at_ns_.load(std::memory_order_relaxed);
+    const std::int64_t silence = now_ns() - last;
+    if (last == kResting || silence <= patience_.count()) continue;
+    measure(silence);
+    tell(last);
   }
 }
 
