@@ -11,6 +11,7 @@ enum class ErrorCode {
   unsupported,     // well-formed, but of a version or kind that this program does not know
   unavailable,     // a peer or device does not answer now; trying again may help
   cancelled,       // the user asked to stop
+  denied,          // the caller may not do that here
   exists,          // it is already there, or in use by another
   internal,        // a library failed in a way that the user cannot mend
 };

@@ -17,6 +17,10 @@ std::string_view sentence(Rejection reason) {
     case Rejection::time: return "the tool has worked longer than time has passed";
     case Rejection::rate: return "the tool sweeps more than the room can follow";
     case Rejection::power: return "the tool takes more bone than any motor can";
+    case Rejection::frozen: return "an instructor has stopped this hand";
+    case Rejection::taken: return "an instructor holds this hand's tool";
+    case Rejection::forbidden_tool: return "an instructor lets this hand cut with other tools only";
+    case Rejection::zone: return "an instructor lets this hand cut in another place only";
   }
   return "the reason is unknown";
 }

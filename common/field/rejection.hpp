@@ -20,8 +20,12 @@ enum class Rejection : std::uint8_t {
   time = 10,      // more tool time than has passed since the lease was granted
   rate = 11,      // more volume swept than a room can evaluate
   power = 12,     // more bone than any motor can take in that time
+  frozen = 13,    // an instructor has stopped the hand
+  taken = 14,     // an instructor holds the hand's tool
+  forbidden_tool = 15,  // an instructor allows the hand other tools
+  zone = 16,      // outside where an instructor lets the hand cut
 };
-inline constexpr int kRejections = 13;
+inline constexpr int kRejections = 17;
 [[nodiscard]] std::string_view sentence(Rejection reason);
 
 }  // namespace osteon

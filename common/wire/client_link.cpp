@@ -60,7 +60,7 @@ void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
   std::size_t left_out = 0;
   const auto rows = rows_of(packet, tools_, &left_out);
   if (!rows) return half_.malformed();
-  if (std::ranges::any_of(*rows, [](const IndexedRow& row) { return !fits_a_packet(row.row.cut); })) return half_.malformed();
+  if (std::ranges::any_of(*rows, [](const IndexedRow& one) { return one.row.kind != SessionRowKind::streamed && !fits_a_packet(one.row); })) return half_.malformed();
   std::vector<HeardState> states;
   for (const v1::ToolState& sent : packet.partners()) {
     const auto known = partners_.find(sent.author());

@@ -289,4 +289,80 @@ Result<Tool> from_wire(const v1::ToolDefinition& tool) {
   return parsed;
 }
 
+v1::Supervision to_wire(const Supervision& supervision) {
+  v1::Supervision out;
+  out.set_stopped(supervision.stopped);
+  out.set_taken_by(supervision.taken_by.value);
+  out.set_guide(supervision.guide.value);
+  out.set_guide_share(static_cast<std::uint32_t>(supervision.guide_share));
+  out.set_force_limit(static_cast<std::uint32_t>(supervision.force_limit));
+  if (supervision.zone) {
+    for (const std::int32_t steps : supervision.zone->centre) out.mutable_zone()->add_centre(steps);
+    out.mutable_zone()->set_radius(supervision.zone->radius);
+  }
+  for (const Digest& tool : supervision.tools) out.add_tools(to_wire(tool));
+  out.set_words(supervision.words);
+  return out;
+}
+
+Result<Supervision> from_wire(const v1::Supervision& supervision) {
+  Supervision out;
+  out.stopped = supervision.stopped();
+  out.taken_by = {supervision.taken_by()};
+  out.guide = {supervision.guide()};
+  // What is beyond 31 bits is beyond every limit, too.
+  out.guide_share = static_cast<int>(std::min<std::uint32_t>(supervision.guide_share(), INT32_MAX));
+  out.force_limit = static_cast<int>(std::min<std::uint32_t>(supervision.force_limit(), INT32_MAX));
+  if (supervision.has_zone()) {
+    const v1::ZoneLimit& zone = supervision.zone();
+    if (zone.centre_size() != 3) return bad("supervision.zone.centre", "needs 3 numbers, this has " + std::to_string(zone.centre_size()));
+    out.zone = ZoneLimit{{zone.centre(0), zone.centre(1), zone.centre(2)}, zone.radius()};
+  }
+  for (const std::string& hash : supervision.tools()) {
+    const auto tool = digest_from_wire(hash);
+    if (!tool) return bad("supervision.tools:", tool.error().message);
+    out.tools.push_back(*tool);
+  }
+  std::ranges::sort(out.tools);
+  out.tools.erase(std::ranges::unique(out.tools).begin(), out.tools.end());
+  out.words = supervision.words();
+  if (const Result<void> sound = check(out); !sound) return tl::unexpected(sound.error());
+  return out;
+}
+
+v1::Annotation to_wire(const Annotation& annotation) {
+  v1::Annotation out;
+  out.set_annotation(annotation.id);
+  out.set_author(annotation.author.value);
+  out.set_kind(static_cast<v1::AnnotationKind>(annotation.kind));
+  for (const auto& point : annotation.points)
+    for (const std::int32_t steps : point) out.add_points(steps);
+  out.set_words(annotation.words);
+  out.set_colour(annotation.colour);
+  return out;
+}
+
+Result<Annotation> from_wire(const v1::Annotation& annotation) {
+  Annotation out;
+  out.id = annotation.annotation();
+  out.author = {annotation.author()};
+  if (annotation.kind() < v1::ANNOTATION_KIND_POINTER || annotation.kind() > v1::ANNOTATION_KIND_LABEL)
+    return bad("drawn.kind", "must be pointer, line or label");
+  out.kind = static_cast<AnnotationKind>(annotation.kind());
+  const auto numbers = static_cast<std::size_t>(annotation.points_size());
+  const std::size_t least = out.kind == AnnotationKind::line ? 2 : 1, most = out.kind == AnnotationKind::line ? kMostAnnotationPoints : 1;
+  if (numbers % 3 != 0 || numbers / 3 < least || numbers / 3 > most)
+    return bad("drawn.points", "needs 3 numbers for each of " + std::to_string(least) + " to " + std::to_string(most) + " points, this has " +
+                                   std::to_string(numbers));
+  for (int i = 0; i < annotation.points_size(); i += 3)
+    out.points.push_back({annotation.points(i), annotation.points(i + 1), annotation.points(i + 2)});
+  if (annotation.words().size() > kMostAnnotationWords)
+    return bad("drawn.words", "are longer than " + std::to_string(kMostAnnotationWords) + " bytes");
+  if (out.kind == AnnotationKind::label && annotation.words().empty()) return bad("drawn.words", "are missing; a label has some");
+  out.words = annotation.words();
+  if (annotation.colour() > 0xffffff) return bad("drawn.colour", "has more than 24 bits");
+  out.colour = annotation.colour();
+  return out;
+}
+
 }  // namespace osteon::wire

@@ -5,18 +5,18 @@
 #include "common/core/result.hpp"
 #include "common/field/cut.hpp"
 #include "common/field/field_hash.hpp"
+#include "common/field/supervision.hpp"
 #include "common/surface/look.hpp"
 #include "common/mechanics/cutting_state.hpp"
+#include "common/tools/annotation.hpp"
 #include "common/tools/placing.hpp"
+#include "common/wire/version.hpp"
 #include "osteon/v1/cutting.pb.h"
 #include "osteon/v1/room.pb.h"
 #include "osteon/v1/types.pb.h"
 #include "osteon/v1/watch.pb.h"
 
 namespace osteon::wire {
-
-// Version of the protocol that this build speaks.
-inline constexpr std::uint32_t kProtocolVersion = 3;
 
 [[nodiscard]] v1::Vector3 to_wire(const Vec3& v);
 [[nodiscard]] Vec3 from_wire(const v1::Vector3& v);
@@ -29,6 +29,8 @@ inline constexpr std::uint32_t kProtocolVersion = 3;
 [[nodiscard]] v1::SceneItem to_wire(const SceneItem& item);
 [[nodiscard]] v1::ToolDefinition to_wire(const Tool& tool);
 [[nodiscard]] v1::Look to_wire(const Look& look);
+[[nodiscard]] v1::Supervision to_wire(const Supervision& supervision);
+[[nodiscard]] v1::Annotation to_wire(const Annotation& annotation);
 [[nodiscard]] std::string to_wire(const Digest& digest);
 
 // Error invalid_input, naming the field, for anything a correct peer never sends: wrong counts, numbers that are not
@@ -42,6 +44,8 @@ inline constexpr std::uint32_t kProtocolVersion = 3;
 [[nodiscard]] Result<Tool> from_wire(const v1::ToolDefinition& tool);  // by the rules of tool files
 [[nodiscard]] Result<BlockKey> key_from_wire(const v1::MeshBlock& block);
 [[nodiscard]] Result<Look> from_wire(const v1::Look& look);
+[[nodiscard]] Result<Supervision> from_wire(const v1::Supervision& supervision);  // by check(); tools in any order
+[[nodiscard]] Result<Annotation> from_wire(const v1::Annotation& annotation);     // within the limits of annotation.hpp
 [[nodiscard]] Result<Digest> digest_from_wire(const std::string& bytes);
 
 }  // namespace osteon::wire

@@ -222,6 +222,12 @@ SendItem piece_of(const SessionRow& row, std::uint64_t index) {
     out.set_author_seq(row.author_seq);
     out.set_reason(row.reason);
     out.set_lease_epoch(row.lease_epoch);
+  } else if (row.kind == SessionRowKind::supervised) {
+    v1::SupervisedRow& out = *packet.add_supervised();
+    out.set_index(index);
+    out.set_room_seq(row.room_seq.value);
+    *out.mutable_supervision() = to_wire(row.supervision);
+    out.set_lease_epoch(row.lease_epoch);
   } else {
     v1::StreamedRow& out = *packet.add_streamed();
     out.set_index(index);
@@ -347,6 +353,12 @@ Result<std::vector<IndexedRow>> rows_of(const v1::DownPacket& packet, const Tool
   for (const v1::RejectedRow& row : packet.rejected()) {
     rows.push_back({row.index(), {.room_seq = {row.room_seq()}, .kind = SessionRowKind::rejected, .author_seq = row.author_seq(),
                                   .reason = row.reason(), .lease_epoch = row.lease_epoch()}});
+  }
+  for (const v1::SupervisedRow& row : packet.supervised()) {
+    Result<Supervision> supervision = from_wire(row.supervision());
+    if (!supervision) return tl::unexpected(supervision.error());
+    rows.push_back({row.index(), {.room_seq = {row.room_seq()}, .kind = SessionRowKind::supervised,
+                                  .lease_epoch = row.lease_epoch(), .supervision = std::move(*supervision)}});
   }
   for (const v1::StreamedRow& row : packet.streamed()) rows.push_back({row.index(), {.room_seq = {row.room_seq()}}});
   std::ranges::sort(rows, {}, &IndexedRow::index);

@@ -21,6 +21,7 @@
 
 #include "common/core/result.hpp"
 #include "common/field/cut.hpp"
+#include "common/field/supervision.hpp"
 #include "common/link/send_window.hpp"
 #include "osteon/v1/link.pb.h"
 
@@ -65,16 +66,23 @@ class CutSender {
 };
 
 // What a session is told, in its own order, which numbers these from 1.
-enum class SessionRowKind : std::uint8_t { committed, rejected, streamed };
+enum class SessionRowKind : std::uint8_t { committed, rejected, streamed, supervised };
 struct SessionRow {
   RoomSeq room_seq;
   SessionRowKind kind = SessionRowKind::streamed;  // what it was comes over the stream
   Cut cut{};                                       // committed
   std::uint64_t author_seq = 0;                    // rejected: of the session's own cut
   std::uint32_t reason = 0;                        // rejected: as the room numbers its reasons
-  std::uint64_t lease_epoch = 0;                   // rejected: of the session, from now on
+  std::uint64_t lease_epoch = 0;                   // rejected, supervised: of the session, from now on
+  Supervision supervision{};                       // supervised: of the session's own hand, from now on
   friend bool operator==(const SessionRow&, const SessionRow&) = default;
 };
+
+// The same of a row of any kind; a supervision of many tools goes over the stream too.
+inline constexpr std::size_t kMostToolsInPacket = 8;
+[[nodiscard]] inline bool fits_a_packet(const SessionRow& row) {
+  return row.kind != SessionRowKind::streamed && fits_a_packet(row.cut) && row.supervision.tools.size() <= kMostToolsInPacket;
+}
 
 // Codes the rows of one session, as items whose numbers are their index.
 class RowSender {

@@ -44,7 +44,7 @@ void ServerLink::receive(const Endpoint& from, std::span<const std::uint8_t> dat
     if (!read) ++left_out;
     else std::ranges::move(*read, std::back_inserter(cuts));
   }
-  if (!std::ranges::all_of(cuts, fits_a_packet)) return half_.malformed();
+  if (!std::ranges::all_of(cuts, [](const Cut& cut) { return fits_a_packet(cut); })) return half_.malformed();
   HeardState state = state_;
   const auto newer = packet.has_state() ? take_over(packet.state(), state) : false;
   if (!newer) return half_.malformed();
@@ -79,8 +79,7 @@ std::optional<HeardState> ServerLink::take_state() {
 }
 
 bool ServerLink::push(const IndexedRow& row) {
-  const bool fits = row.row.kind != SessionRowKind::streamed && fits_a_packet(row.row.cut);
-  if (half_.begin(row.index) && fits && sender_.push(row.row)) return true;
+  if (half_.begin(row.index) && fits_a_packet(row.row) && sender_.push(row.row)) return true;
   half_.goes_over_stream();
   return false;
 }
@@ -90,6 +89,10 @@ bool ServerLink::tell(std::uint64_t index, const SessionRow& row) {
   if (row.kind == SessionRowKind::rejected) {
     decided(row.author_seq);
     set_lease_epoch(row.lease_epoch);
+  }
+  if (row.kind == SessionRowKind::supervised) {
+    set_lease_epoch(row.lease_epoch);
+    set_frozen(!row.supervision.may_cut());
   }
   return index != 0 && push({index, row});
 }

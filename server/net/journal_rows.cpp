@@ -82,6 +82,7 @@ struct Writer {
     row.set_kind(static_cast<std::uint32_t>(join.kind));
     row.set_person(join.person);
     row.set_secret(wire::to_wire(join.secret));
+    row.set_role(static_cast<std::uint32_t>(join.role));
   }
   void operator()(const CutRow& cut) const { *out.mutable_cut() = wire::to_wire(cut.cut); }
   void operator()(const RejectionRow& rejection) const {
@@ -119,6 +120,18 @@ struct Writer {
   }
   void operator()(const ToolRow& tool) const { *out.mutable_tool() = wire::to_wire(tool.tool); }
   void operator()(const MarkRow& mark) const { out.mutable_mark()->set_label(mark.label); }
+  void operator()(const SuperviseRow& one) const {
+    out.mutable_supervision()->set_subject(one.subject.value);
+    *out.mutable_supervision()->mutable_supervision() = wire::to_wire(one.supervision);
+  }
+  void operator()(const AnnotationRow& one) const {
+    out.mutable_annotation()->set_annotation(one.id);
+    if (one.drawn) *out.mutable_annotation()->mutable_drawn() = wire::to_wire(*one.drawn);
+  }
+  void operator()(const WordsRow& said) const {
+    out.mutable_words()->set_to(said.to.value);
+    out.mutable_words()->set_words(said.words);
+  }
 };
 
 using What = decltype(RoomRow::what);
@@ -127,7 +140,8 @@ Result<What> read(const v1::JournalJoin& row) {
   if (row.kind() > static_cast<std::uint32_t>(MemberKind::watcher)) return bad("join.kind is not known");
   const Result<Digest> secret = wire::digest_from_wire(row.secret());
   if (!secret) return bad("join.secret: " + secret.error().message);
-  return JoinRow{AuthorId{row.author()}, static_cast<MemberKind>(row.kind()), row.person(), *secret};
+  if (row.role() >= static_cast<std::uint32_t>(kRoles)) return bad("join.role is not known");
+  return JoinRow{AuthorId{row.author()}, static_cast<MemberKind>(row.kind()), row.person(), *secret, static_cast<Role>(row.role())};
 }
 
 Result<What> read(const v1::Cut& row) {
@@ -176,6 +190,19 @@ Result<What> read(const v1::ToolDefinition& row) {
   return ToolRow{std::move(*tool)};
 }
 
+Result<What> read(const v1::JournalSupervision& row) {
+  Result<Supervision> set = wire::from_wire(row.supervision());
+  if (!set) return tl::unexpected(set.error());
+  return SuperviseRow{AuthorId{row.subject()}, std::move(*set)};
+}
+
+Result<What> read(const v1::JournalAnnotation& row) {
+  if (!row.has_drawn()) return AnnotationRow{row.annotation(), std::nullopt};
+  Result<Annotation> drawn = wire::from_wire(row.drawn());
+  if (!drawn) return tl::unexpected(drawn.error());
+  return AnnotationRow{row.annotation(), std::move(*drawn)};
+}
+
 Result<What> read(const v1::JournalRow& row) {
   switch (row.what_case()) {
     case v1::JournalRow::kJoin: return read(row.join());
@@ -188,6 +215,9 @@ Result<What> read(const v1::JournalRow& row) {
     case v1::JournalRow::kItem: return read(row.item());
     case v1::JournalRow::kTool: return read(row.tool());
     case v1::JournalRow::kMark: return MarkRow{row.mark().label()};
+    case v1::JournalRow::kSupervision: return read(row.supervision());
+    case v1::JournalRow::kAnnotation: return read(row.annotation());
+    case v1::JournalRow::kWords: return WordsRow{AuthorId{row.words().to()}, row.words().words()};
     case v1::JournalRow::WHAT_NOT_SET: break;
   }
   return failure(ErrorCode::unsupported, "its event is of a kind that this release does not know");

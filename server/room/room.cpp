@@ -76,9 +76,9 @@ RoomEvent Room::decide(AuthorId by, decltype(RoomRow::what) what) {
   return event;
 }
 
-AuthorId Room::join(MemberKind kind, std::uint32_t person, const Digest& secret) {
+AuthorId Room::join(MemberKind kind, std::uint32_t person, const Digest& secret, Role role) {
   const AuthorId author{authors_ + 1};
-  decide(author, JoinRow{author, kind, person, secret});
+  decide(author, JoinRow{author, kind, person, secret, role});
   return author;
 }
 
@@ -136,6 +136,7 @@ Rejection Room::judge(const Cut& cut) {
   if (!exists(cut.body)) return Rejection::body;
   const Surgeon& surgeon = surgeons_.at(cut.author);
   if (cut.lease_epoch != surgeon.epoch) return Rejection::lease;
+  if (const Rejection word = breach(people_.supervised(cut.author).supervision, cut); word != Rejection::none) return word;
   if (const Rejection form = judge_form(cut); form != Rejection::none) return form;
   if (limits_.time_slack.count() > 0 &&
       surgeon.claimed + std::chrono::microseconds(cut.path_us) > now_ - surgeon.granted + limits_.time_slack)

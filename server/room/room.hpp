@@ -24,6 +24,8 @@
 #include "common/volume/fragments.hpp"
 #include "server/room/block_store.hpp"
 #include "server/room/cut_energy.hpp"
+#include "server/room/people.hpp"
+#include "server/room/room_event.hpp"
 #include "server/room/room_row.hpp"
 #include "server/room/separation.hpp"
 
@@ -40,36 +42,6 @@ struct CutLimits {
   double swept_voxels_per_s = 0;           // of the cut's level: what the kernel is asked to look at
   double power_w = 0;                      // that a motor gives: bounds the energy of a cut beside that of a blow
   double blow_j = 20.0;
-};
-
-// A decided cut: its place in the room's order and whether it was applied there.
-struct Outcome {
-  RoomSeq room_seq;
-  Rejection rejection = Rejection::none;
-  bool repeated = false;   // decided before: this is its first outcome
-  std::uint64_t lease_epoch = 0;  // of its author from now on
-  CutReport report;        // of an applied cut, of all bodies together
-  [[nodiscard]] bool committed() const { return rejection == Rejection::none; }
-};
-
-enum class EventKind : std::uint8_t { cut, split, undo, redo, remove_body, scene, tool, join, mark };
-
-// A decided event that is not a cut, with what every holder of the bone must take over.
-struct RoomEvent {
-  RoomSeq room_seq;
-  EventKind kind = EventKind::cut;
-  AuthorId author;                        // null: the room itself
-  bool bone = false;                      // bodies or leaves changed
-  bool scene = false;                     // items changed
-  std::vector<BodyId> bodies;             // that exist from now on
-  std::vector<FieldLeaf> leaves;          // changed ones as they are now, and all of a body that is new
-  std::uint64_t lease_epoch = 0;          // of every lease that was granted before, from now on; 0: as they were
-  const ToolBox::Entry* tool = nullptr;   // one that was added
-  std::uint32_t item = 0;                 // one that was set or taken out
-  std::optional<Placed> set;              // as it stands now, where it was set
-  std::vector<RoomSeq> places;            // undo, redo: of the events taken back or done again, oldest first
-  CutReport cut;                          // of all bodies together
-  std::string mark;                       // its label
 };
 
 // Leaves of one body that changed, for whoever looks for pieces.
@@ -104,7 +76,7 @@ class Room {
   [[nodiscard]] std::chrono::nanoseconds time() const { return now_; }
 
   // A new identity, never given twice.
-  AuthorId join(MemberKind kind, std::uint32_t person = 0, const Digest& secret = {});
+  AuthorId join(MemberKind kind, std::uint32_t person = 0, const Digest& secret = {}, Role role = Role::none);
   [[nodiscard]] bool knows(AuthorId author) const;
   [[nodiscard]] std::uint64_t authors() const { return authors_; }  // so many have joined
   [[nodiscard]] bool may_cut(AuthorId author) const { return surgeons_.contains(author); }
@@ -131,6 +103,8 @@ class Room {
   Result<RoomEvent> undo_last(AuthorId by, std::size_t count, AuthorId of);
   Result<RoomEvent> undo_to(AuthorId by, RoomSeq mark);         // all that came after it
   Result<RoomEvent> redo_last(AuthorId by, std::size_t count);  // the newest undo events that still stand
+  // All that was done since then, by the room's time; all of it, where nothing is older.
+  Result<RoomEvent> undo_since(AuthorId by, std::chrono::nanoseconds since);
   Result<RoomEvent> mark(AuthorId by, std::string label);       // of 1 to kMostLabelBytes bytes
   Result<RoomEvent> remove_body(AuthorId by, BodyId body);
   // By the rules of common/tools/scene.hpp, which also say whether it is seated. id 0: a new one.
@@ -141,6 +115,13 @@ class Room {
     return split({parent, std::move(fragments), seen});
   }
   Result<RoomEvent> split(Separation found);
+  // What people decide about each other, draw and say: room_people.cpp. A trainee takes back and does again what is their
+  // own; errors as above, and denied where the author's role does not allow it.
+  Result<RoomEvent> supervise(AuthorId by, AuthorId subject, Supervision supervision);
+  Result<RoomEvent> annotate(AuthorId by, Annotation drawn);        // id 0: a new one; an author has one pointer
+  Result<RoomEvent> wipe_off(AuthorId by, std::uint32_t annotation);  // an own one, or anyone's for an instructor
+  Result<RoomEvent> say(AuthorId by, AuthorId to, std::string words);
+  [[nodiscard]] const People& people() const { return people_; }
   [[nodiscard]] BodyId next_body() const { return BodyId{last_body_ + 1}; }
 
   // What was decided since the last call, in order: for the journal, before anyone is told.
@@ -218,6 +199,7 @@ class Room {
     std::uint32_t item = 0;             // scene
     std::vector<RoomSeq> places = {};   // undo
     std::string label = {};             // mark
+    std::chrono::nanoseconds at{};
   };
   // What an item was set to; nothing: taken out.
   struct ItemState {
@@ -250,6 +232,10 @@ class Room {
   void apply(const RoomRow& row, const ItemRow& item, RoomEvent& event);
   void apply(const RoomRow& row, const ToolRow& tool, RoomEvent& event);
   void apply(const RoomRow& row, const MarkRow& mark, RoomEvent& event);
+  void apply(const RoomRow& row, const SuperviseRow& supervise, RoomEvent& event);
+  void apply(const RoomRow& row, const AnnotationRow& annotation, RoomEvent& event);
+  void apply(const RoomRow& row, const WordsRow& words, RoomEvent& event);
+  [[nodiscard]] Result<void> may_take_back(AuthorId by, const std::set<RoomSeq>& places) const;
   void bone_came_back(RoomEvent& event);
   void grant(Surgeon& surgeon);
   Event& add_event(const RoomRow& row, EventKind kind);
@@ -282,6 +268,7 @@ class Room {
   std::uint64_t authors_ = 0, bone_epoch_ = 1, bone_changes_ = 0;
   std::map<AuthorId, Digest> secrets_;
   std::map<AuthorId, Surgeon> surgeons_;
+  People people_;
   RoomCounts counts_;
   Digest genesis_;
   std::vector<RoomRow> rows_;   // decided since take_rows()

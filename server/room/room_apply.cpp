@@ -80,7 +80,9 @@ Result<void> Room::can_follow(const RoomRow& row) const {
       return require(author_seq == room.decided(author) + 1, "it is not its author's next cut");
     }
     Result<void> operator()(const JoinRow& join) const {
-      return require(join.author.value == room.authors_ + 1 && join.kind <= MemberKind::watcher, "an author was given twice");
+      return require(join.author.value == room.authors_ + 1 && join.kind <= MemberKind::watcher &&
+                         static_cast<int>(join.role) < kRoles,
+                     "an author was given twice");
     }
     Result<void> operator()(const CutRow& cut) const {
       if (Result<void> next = next_of(cut.cut.author, cut.cut.author_seq); !next) return next;
@@ -135,6 +137,24 @@ Result<void> Room::can_follow(const RoomRow& row) const {
     Result<void> operator()(const MarkRow& mark) const {
       return require(!mark.label.empty() && mark.label.size() <= kMostLabelBytes, "the mark has no label");
     }
+    Result<void> operator()(const SuperviseRow& one) const {
+      const Supervision& set = one.supervision;
+      bool all = room.surgeons_.contains(one.subject) && check(set).has_value();
+      for (const AuthorId named : {set.taken_by, set.guide}) all = all && (!named || (room.knows(named) && named != one.subject));
+      for (const Digest& tool : set.tools) all = all && room.tools_->find(tool);
+      return require(all, "it oversees what is not there");
+    }
+    Result<void> operator()(const AnnotationRow& one) const {
+      const auto& drawn = room.people_.annotations();
+      if (!one.drawn) return require(drawn.contains(one.id), "there is no such annotation");
+      const bool room_for_it =
+          drawn.contains(one.id) || (one.id == room.people_.last_annotation() + 1 && drawn.size() < kMostAnnotations);
+      return require(room_for_it && one.drawn->id == one.id && room.knows(one.drawn->author), "the annotation cannot be there");
+    }
+    Result<void> operator()(const WordsRow& said) const {
+      return require(!said.words.empty() && said.words.size() <= kMostWordsBytes && (!said.to || room.knows(said.to)),
+                     "nobody can have said it");
+    }
   };
   return std::visit(Judge{*this, row, possible}, row.what);
 }
@@ -157,6 +177,7 @@ Room::Event& Room::add_event(const RoomRow& row, EventKind kind) {
   Event& event = events_[row.place];
   event.kind = kind;
   event.author = row.author;
+  event.at = row.at;
   return event;
 }
 
@@ -165,6 +186,7 @@ void Room::apply(const RoomRow& row, const JoinRow& join, RoomEvent& event) {
   event.author = join.author;
   authors_ = join.author.value;
   secrets_[join.author] = join.secret;
+  people_.join(join.author, join.role, join.person);
   if (join.kind == MemberKind::surgeon) surgeons_[join.author].granted = row.at;
 }
 
@@ -479,6 +501,7 @@ Digest Room::room_hash() const {
       hasher.integer(static_cast<std::uint64_t>(row.rejection));
     }
   }
+  people_.add_to(hasher);
   return hasher.finish();
 }
 

@@ -232,12 +232,15 @@ Result<RoomEvent> Room::undo(AuthorId by, std::span<const RoomSeq> places) {
     if (!can_be_undone(place)) return refuse("event " + std::to_string(place.value) + " is none that can be undone");
     if (events_.at(place).undone) return refuse("event " + std::to_string(place.value) + " is undone already");
   }
-  return take_back(by, {places.begin(), places.end()});
+  const std::set<RoomSeq> named(places.begin(), places.end());
+  if (Result<void> may = may_take_back(by, named); !may) return tl::unexpected(may.error());
+  return take_back(by, named);
 }
 
 Result<RoomEvent> Room::undo_last(AuthorId by, std::size_t count, AuthorId of) {
   if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
   if (count == 0) return refuse("undo needs a count of at least 1");
+  if (people_.only_own(by) && !of) of = by;
   std::set<RoomSeq> places;
   for (auto event = events_.rbegin(); event != events_.rend() && places.size() < count; ++event) {
     const Event& row = event->second;
@@ -245,7 +248,13 @@ Result<RoomEvent> Room::undo_last(AuthorId by, std::size_t count, AuthorId of) {
     if (can_be_undone(event->first) && row.kind != EventKind::split) places.insert(event->first);
   }
   if (places.empty()) return failure(ErrorCode::unavailable, "there is nothing to undo");
+  if (Result<void> may = may_take_back(by, places); !may) return tl::unexpected(may.error());
   return take_back(by, std::move(places));
+}
+
+Result<RoomEvent> Room::undo_since(AuthorId by, std::chrono::nanoseconds since) {
+  const auto later = std::ranges::find_if(events_, [&](const auto& event) { return event.second.at >= since && event.first; });
+  return undo_to(by, later == events_.end() ? room_seq_ : RoomSeq{later->first.value - 1});
 }
 
 Result<RoomEvent> Room::undo_to(AuthorId by, RoomSeq mark) {
@@ -254,7 +263,10 @@ Result<RoomEvent> Room::undo_to(AuthorId by, RoomSeq mark) {
   std::set<RoomSeq> places;
   for (auto event = events_.upper_bound(mark); event != events_.end(); ++event)
     if (can_be_undone(event->first) && !event->second.undone) places.insert(event->first);
+  // A split is nobody's own: it falls with the cut that parted the piece.
+  if (people_.only_own(by)) std::erase_if(places, [&](RoomSeq place) { return events_.at(place).kind == EventKind::split; });
   if (places.empty()) return failure(ErrorCode::unavailable, "there is nothing to undo");
+  if (Result<void> may = may_take_back(by, places); !may) return tl::unexpected(may.error());
   return take_back(by, std::move(places));
 }
 
@@ -265,6 +277,7 @@ Result<RoomEvent> Room::redo_last(AuthorId by, std::size_t count) {
   for (auto event = events_.rbegin(); event != events_.rend() && row.undos.size() < count; ++event)
     if (event->second.kind == EventKind::undo && !event->second.undone) row.undos.push_back(event->first);
   if (row.undos.empty()) return failure(ErrorCode::unavailable, "there is nothing to redo");
+  if (Result<void> may = may_take_back(by, {row.undos.begin(), row.undos.end()}); !may) return tl::unexpected(may.error());
 
   std::set<RoomSeq> again;
   for (const RoomSeq undo : row.undos) {

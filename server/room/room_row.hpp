@@ -9,9 +9,12 @@
 #include <variant>
 #include <vector>
 
+#include "common/access/role.hpp"
 #include "common/core/digest.hpp"
 #include "common/field/cut.hpp"
 #include "common/field/rejection.hpp"
+#include "common/field/supervision.hpp"
+#include "common/tools/annotation.hpp"
 #include "common/tools/scene_item.hpp"
 #include "common/volume/cut_history.hpp"
 
@@ -25,6 +28,7 @@ struct JoinRow {
   MemberKind kind = MemberKind::watcher;
   std::uint32_t person = 0;  // a pseudonym: who it is, is written elsewhere and can be forgotten; 0: unnamed
   Digest secret{};         // SHA-256 of what proves that a later connection is the same author's
+  Role role = Role::none;  // none: in a room from before there were roles, or of the server itself
 };
 struct CutRow {
   Cut cut;
@@ -69,11 +73,27 @@ struct MarkRow {
   std::string label;
 };
 
+// What holds for a hand from now on. It raises the epoch of the hand's lease.
+struct SuperviseRow {
+  AuthorId subject;
+  Supervision supervision;
+};
+// An annotation as it is from now on.
+struct AnnotationRow {
+  std::uint32_t id = 0;
+  std::optional<Annotation> drawn;  // nothing: wiped off
+};
+struct WordsRow {
+  AuthorId to;             // null: to all
+  std::string words;
+};
+
 struct RoomRow {
   RoomSeq place;
   std::chrono::nanoseconds at{};  // since the room was made, by the clock of the server that decided
   AuthorId author;                // who asked for it; null: the room itself
-  std::variant<JoinRow, CutRow, RejectionRow, SplitRow, UndoRow, RedoRow, RemoveBodyRow, ItemRow, ToolRow, MarkRow> what;
+  std::variant<JoinRow, CutRow, RejectionRow, SplitRow, UndoRow, RedoRow, RemoveBodyRow, ItemRow, ToolRow, MarkRow,
+               SuperviseRow, AnnotationRow, WordsRow> what;
 };
 
 // Names a cut's bytes: every field, in the order of the protocol.

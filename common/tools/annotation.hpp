@@ -1,0 +1,31 @@
+// What somebody draws on the bone for others to see. It takes no part in cutting.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/core/id.hpp"
+
+namespace osteon {
+
+// Kept in journals and sent: numbers stay.
+enum class AnnotationKind : std::uint8_t {
+  pointer = 1,  // an arrow to one point; an author has one
+  line = 2,     // through all points
+  label = 3,    // words at one point
+};
+
+struct Annotation {
+  std::uint32_t id = 0;   // given by the room, from 1
+  AuthorId author;
+  AnnotationKind kind = AnnotationKind::pointer;
+  std::vector<std::array<std::int32_t, 3>> points;  // bone frame, in steps of 2^-10 mm
+  std::string words;
+  std::uint32_t colour = 0xffd040;                  // red, green, blue
+  friend bool operator==(const Annotation&, const Annotation&) = default;
+};
+
+inline constexpr std::size_t kMostAnnotations = 256, kMostAnnotationPoints = 1024, kMostAnnotationWords = 256;
+
+}  // namespace osteon

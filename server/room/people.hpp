@@ -1,0 +1,57 @@
+// The people of a room as its rows have made them: what they may do, what was decided about them, what they have drawn.
+#pragma once
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "common/access/role.hpp"
+#include "common/core/digest.hpp"
+#include "common/field/supervision.hpp"
+#include "common/tools/annotation.hpp"
+#include "server/room/room_row.hpp"
+
+namespace osteon {
+
+inline constexpr std::size_t kMostWordsBytes = 1024;
+
+class People {
+ public:
+  struct Supervised {
+    Supervision supervision;
+    RoomSeq place;  // of the row that set it
+  };
+
+  void join(AuthorId author, Role role, std::uint32_t person) { members_[author] = {role, person}; }
+  void supervise(RoomSeq place, const SuperviseRow& row) { supervised_[row.subject] = {row.supervision, place}; }
+  void draw(const AnnotationRow& row);
+
+  [[nodiscard]] Role role(AuthorId author) const;
+  [[nodiscard]] std::uint32_t person(AuthorId author) const;  // a pseudonym, 0: unnamed
+  // An author without a role may do whatever one with any role may: his room is from before there were roles, or his server
+  // knows nobody by name.
+  [[nodiscard]] bool oversees(AuthorId author) const;
+  [[nodiscard]] bool only_own(AuthorId author) const { return role(author) == Role::trainee; }
+  // What holds for a hand; nothing but the default where nobody has decided anything.
+  [[nodiscard]] const Supervised& supervised(AuthorId author) const;
+  [[nodiscard]] const std::map<std::uint32_t, Annotation>& annotations() const { return annotations_; }
+  [[nodiscard]] std::uint32_t last_annotation() const { return last_annotation_; }
+  // The one that a new drawing of this kind takes the place of; 0: none.
+  [[nodiscard]] std::uint32_t replaced_by(const Annotation& drawn) const;
+
+  // Adds nothing where nobody has a role, was overseen or has drawn anything: as the hash of a room was before there were
+  // people.
+  void add_to(Hasher& hasher) const;
+
+ private:
+  struct Member {
+    Role role = Role::none;
+    std::uint32_t person = 0;
+  };
+  std::map<AuthorId, Member> members_;
+  std::map<AuthorId, Supervised> supervised_;
+  std::map<std::uint32_t, Annotation> annotations_;
+  std::uint32_t last_annotation_ = 0;
+};
+
+}  // namespace osteon
