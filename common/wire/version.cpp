@@ -1,0 +1,43 @@
+#include "common/wire/version.hpp"
+
+#include <string>
+
+namespace osteon::wire {
+namespace {
+
+// The version that came with a kind of message; all before 4 know the first ten.
+std::uint32_t version_of(v1::SessionResponse::MessageCase kind) {
+  return kind > v1::SessionResponse::kNoted ? 4 : kOldestProtocolVersion;
+}
+
+// Where an event has its place in the room's order; 0: it is none.
+std::uint64_t place_of(const v1::SessionResponse& row) {
+  switch (row.message_case()) {
+    case v1::SessionResponse::kSupervised: return row.supervised().room_seq();
+    case v1::SessionResponse::kSaid: return row.said().room_seq();
+    default: return 0;
+  }
+}
+
+}  // namespace
+
+Result<void> check_protocol_version(std::uint32_t clients) {
+  if (clients >= kOldestProtocolVersion && clients <= kProtocolVersion) return {};
+  const std::string versions = "the client speaks protocol version " + std::to_string(clients) + " and the server protocol version " +
+                               std::to_string(kProtocolVersion) + ", or " + std::to_string(kOldestProtocolVersion);
+  return failure(ErrorCode::unsupported, versions + (clients < kOldestProtocolVersion
+                                                         ? "; install a newer Osteon where the client runs"
+                                                         : "; install a newer Osteon where the server runs, before the clients"));
+}
+
+std::optional<v1::SessionResponse> row_in(std::uint32_t version, const v1::SessionResponse& row) {
+  if (version >= version_of(row.message_case())) return row;
+  const std::uint64_t place = place_of(row);
+  if (place == 0) return std::nullopt;
+  v1::SessionResponse noted;
+  noted.mutable_noted()->set_room_seq(place);
+  noted.set_index(row.index());
+  return noted;
+}
+
+}  // namespace osteon::wire

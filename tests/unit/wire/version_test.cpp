@@ -1,0 +1,60 @@
+// What a client of the version before is told, and what one of another version is.
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+#include "common/wire/version.hpp"
+
+namespace osteon::wire {
+namespace {
+
+TEST(Version, TheServerTakesItsOwnAndTheOneBefore) {
+  EXPECT_EQ(kProtocolVersion, 4u);
+  for (const std::uint32_t taken : {3u, 4u}) EXPECT_TRUE(check_protocol_version(taken).has_value()) << taken;
+  for (const std::uint32_t other : {0u, 2u, 5u, 77u}) {
+    const Result<void> checked = check_protocol_version(other);
+    ASSERT_FALSE(checked.has_value()) << other;
+    EXPECT_EQ(checked.error().code, ErrorCode::unsupported);
+    const std::string& why = checked.error().message;
+    EXPECT_NE(why.find("version " + std::to_string(other) + " "), std::string::npos) << why;
+    EXPECT_NE(why.find("version 4, or 3"), std::string::npos) << why;
+    EXPECT_NE(why.find("install a newer Osteon where the " + std::string(other < 3 ? "client" : "server") + " runs"), std::string::npos) << why;
+    EXPECT_EQ(why.find('\n'), std::string::npos);
+  }
+}
+
+// Every kind that there is, as the protocol's descriptor lists them: version 3 was made with those numbered up to 10.
+TEST(Version, AnOlderSessionIsSentNoKindThatItDoesNotKnow) {
+  const auto* kinds = v1::SessionResponse::descriptor()->FindOneofByName("message");
+  ASSERT_NE(kinds, nullptr);
+  std::set<std::string> newer;
+  for (int i = 0; i < kinds->field_count(); ++i) {
+    const auto* field = kinds->field(i);
+    v1::SessionResponse row;
+    (void)row.GetReflection()->MutableMessage(&row, field);
+    ASSERT_EQ(static_cast<int>(row.message_case()), field->number());
+    EXPECT_TRUE(row_in(4, row).has_value()) << field->name();
+    if (field->number() > 10) newer.insert(field->name());
+    EXPECT_EQ(row_in(3, row).has_value(), field->number() <= 10) << field->name();
+  }
+  EXPECT_EQ(newer, (std::set<std::string>{"supervised", "said", "partner", "bone", "redial"}));
+}
+
+TEST(Version, AnEventOfANewKindIsAPlaceInTheOrderToAnOlderSession) {
+  v1::SessionResponse row;
+  row.mutable_supervised()->set_room_seq(17);
+  row.set_index(3);
+  const std::optional<v1::SessionResponse> older = row_in(3, row);
+  ASSERT_TRUE(older.has_value());
+  EXPECT_EQ(older->message_case(), v1::SessionResponse::kNoted);
+  EXPECT_EQ(older->noted().room_seq(), 17u);
+  EXPECT_EQ(older->index(), 3u);
+  row.mutable_said()->set_room_seq(18);
+  ASSERT_TRUE(row_in(3, row).has_value());
+  EXPECT_EQ(row_in(3, row)->noted().room_seq(), 18u);
+  EXPECT_EQ(row_in(4, row)->said().room_seq(), 18u);
+}
+
+}  // namespace
+}  // namespace osteon::wire
