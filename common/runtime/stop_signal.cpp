@@ -14,11 +14,11 @@ namespace osteon {
 namespace {
 
 // Signal handlers reach only static storage; StopSignal owns both for the time of its life.
-std::atomic<bool> stop_requested{false};
+std::atomic<int> stop_requests{0};
 std::atomic<int> wake_descriptor{-1};
 
 void raise_flag() noexcept {
-  stop_requested.store(true, std::memory_order_release);
+  stop_requests.fetch_add(1, std::memory_order_acq_rel);
   const std::uint64_t one = 1;
   const int descriptor = wake_descriptor.load(std::memory_order_acquire);
   if (descriptor >= 0) [[maybe_unused]] const auto written = ::write(descriptor, &one, sizeof one);
@@ -26,11 +26,26 @@ void raise_flag() noexcept {
 
 void on_signal(int) { raise_flag(); }
 
+// Sleeps until that many requests have come, or the time is over. The descriptor becomes readable with each.
+bool wait_for_requests(int wanted, std::chrono::milliseconds time) {
+  const auto end = std::chrono::steady_clock::now() + time;
+  while (stop_requests.load(std::memory_order_acquire) < wanted) {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
+    if (left.count() <= 0) return false;
+    pollfd wake{wake_descriptor.load(), POLLIN, 0};
+    ::poll(&wake, 1, static_cast<int>(left.count()));
+    // An earlier request must not wake again.
+    std::uint64_t seen = 0;
+    [[maybe_unused]] const auto read = ::read(wake.fd, &seen, sizeof seen);
+  }
+  return true;
+}
+
 }  // namespace
 
 StopSignal::StopSignal() {
   OSTEON_CHECK(wake_descriptor.load() < 0);
-  stop_requested = false;
+  stop_requests = 0;
   wake_descriptor = ::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
   struct sigaction action {};
   action.sa_handler = on_signal;
@@ -45,19 +60,12 @@ StopSignal::~StopSignal() {
   ::close(wake_descriptor.exchange(-1));
 }
 
-bool StopSignal::requested() const noexcept { return stop_requested.load(std::memory_order_acquire); }
+bool StopSignal::requested() const noexcept { return stop_requests.load(std::memory_order_acquire) > 0; }
 
 void StopSignal::request() noexcept { raise_flag(); }
 
-bool StopSignal::wait_for(std::chrono::milliseconds time) const {
-  const auto end = std::chrono::steady_clock::now() + time;
-  while (!requested()) {
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
-    if (left.count() <= 0) return false;
-    pollfd wake{wake_descriptor.load(), POLLIN, 0};
-    ::poll(&wake, 1, static_cast<int>(left.count()));
-  }
-  return true;
-}
+bool StopSignal::wait_for(std::chrono::milliseconds time) const { return wait_for_requests(1, time); }
+
+bool StopSignal::wait_for_second(std::chrono::milliseconds time) const { return wait_for_requests(2, time); }
 
 }  // namespace osteon

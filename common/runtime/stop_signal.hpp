@@ -4,8 +4,8 @@
 
 namespace osteon {
 
-// One per process, made in main before other threads start. A second signal changes nothing: an impatient person must
-// not leave half-written files. SIGQUIT still ends a process that hangs.
+// One per process, made in main before other threads start. A second signal ends nothing by itself: an impatient person must
+// not leave half-written files; it may shorten a wait. SIGQUIT still ends a process that hangs.
 class StopSignal {
  public:
   StopSignal();
@@ -17,6 +17,8 @@ class StopSignal {
   void request() noexcept;  // as if a signal had come
   // True when a stop was requested before the time was over.
   bool wait_for(std::chrono::milliseconds time) const;
+  // The same, of a second request.
+  bool wait_for_second(std::chrono::milliseconds time) const;
 };
 
 }  // namespace osteon

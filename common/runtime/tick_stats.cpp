@@ -30,12 +30,22 @@ void DurationHistogram::record(std::chrono::nanoseconds duration) noexcept {
   ++bins_[static_cast<std::size_t>(bin)];
   ++count_;
   max_ns_ = std::max(max_ns_, ns);
+  sum_ns_ += ns;
+}
+
+std::uint64_t DurationHistogram::count_up_to(std::chrono::nanoseconds duration) const noexcept {
+  if (duration.count() < 0) return 0;
+  const int last = std::min(bin_of(static_cast<std::uint64_t>(duration.count())), kBins - 1);
+  std::uint64_t counted = 0;
+  for (int bin = 0; bin <= last; ++bin) counted += bins_[static_cast<std::size_t>(bin)];
+  return counted;
 }
 
 DurationHistogram DurationHistogram::since(const DurationHistogram& earlier) const noexcept {
   DurationHistogram later = *this;
   for (std::size_t bin = 0; bin < bins_.size(); ++bin) later.bins_[bin] -= earlier.bins_[bin];
   later.count_ -= earlier.count_;
+  later.sum_ns_ -= earlier.sum_ns_;
   return later;
 }
 

@@ -71,6 +71,19 @@ TEST(DurationHistogram, PercentilesAreRightToThreePerCent) {
   EXPECT_EQ(DurationHistogram{}.percentile_us(50), 0.0);
 }
 
+TEST(DurationHistogram, CountsAndAddsUpToThreePerCent) {
+  DurationHistogram histogram;
+  for (int us = 1; us <= 1000; ++us) histogram.record(std::chrono::microseconds(us));
+  EXPECT_NEAR(static_cast<double>(histogram.count_up_to(500us)), 500, 16);
+  EXPECT_EQ(histogram.count_up_to(0us), 0u);
+  EXPECT_EQ(histogram.count_up_to(-1us), 0u);
+  EXPECT_EQ(histogram.count_up_to(1h), 1000u);
+  EXPECT_DOUBLE_EQ(histogram.sum_us(), 500'500.0);
+  const DurationHistogram earlier = histogram;
+  histogram.record(7us);
+  EXPECT_DOUBLE_EQ(histogram.since(earlier).sum_us(), 7.0);
+}
+
 TEST(DurationHistogram, TellsWhatCameLater) {
   TickStats stats;
   for (int us = 1; us <= 1000; ++us) stats.work.record(std::chrono::microseconds(us));
