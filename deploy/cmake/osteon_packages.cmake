@@ -13,6 +13,8 @@ find_package(pugixml REQUIRED)
 find_package(yaml-cpp REQUIRED)
 find_package(GDCM REQUIRED)
 find_package(PNG REQUIRED)
+find_package(OpenSSL REQUIRED)
+find_package(prometheus-cpp REQUIRED)
 find_package(VTK 9.1 REQUIRED COMPONENTS
   CommonCore CommonDataModel FiltersCore FiltersSources FiltersGeneral IOImage
   InteractionStyle RenderingCore RenderingOpenGL2 RenderingFreeType RenderingAnnotation)

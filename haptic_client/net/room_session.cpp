@@ -31,6 +31,7 @@ using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
 constexpr auto kCloseTime = 1s;
+constexpr std::chrono::milliseconds kLongestRedial = 10s;  // of a wait that a server asks for
 constexpr auto kCaseSilence = 60s;  // a whole case takes no longer on one machine
 
 Error cannot_cache(const fs::path& path, const std::string& why) {
@@ -211,6 +212,7 @@ struct RoomSession::Impl {
   std::condition_variable wake;
   Line* line = nullptr;                       // the open one
   CutsUnderway underway{kMaxWaitingCuts};
+  std::optional<std::chrono::milliseconds> redial;  // the server stops in good order: when to come again
   bool closing = false, over = false;
 };
 
@@ -226,8 +228,9 @@ void RoomSession::Impl::write(Line& open) {
   while (written) {
     {
       std::unique_lock lock(mutex);
-      wake.wait(lock, [&] { return underway.something_to_send() || closing || over || line != &open; });
-      if (over || line != &open) break;
+      wake.wait(lock, [&] { return underway.something_to_send() || closing || over || line != &open || redial; });
+      // A server that is about to stop decides what it has been sent and no more: the rest goes when the session goes on.
+      if (over || line != &open || redial) break;
       cut = underway.take_cut();
       state = cut ? std::nullopt : underway.take_state();
       if (!cut && !state) break;
@@ -244,6 +247,11 @@ void RoomSession::Impl::write(Line& open) {
 
 void RoomSession::Impl::follow(const v1::SessionResponse& response) {
   if (response.has_link()) offer = response.link();
+  if (response.has_redial()) {
+    const std::lock_guard lock(mutex);
+    redial = std::min<std::chrono::milliseconds>(std::chrono::milliseconds(response.redial().after_ms()), kLongestRedial);
+    wake.notify_all();
+  }
   if (response.has_tool() && response.tool().tool_number() != 0)
     if (const Result<Digest> tool = wire::digest_from_wire(response.tool().tool().tool_hash())) {
       numbered_tools.emplace_back(response.tool().tool_number(), *tool);
@@ -297,6 +305,7 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
     if (closing || over) return grpc::Status::CANCELLED;
     open.stream = stub->Session(&open.context);
     line = &open;
+    redial.reset();
     underway.stop();
   }
   {
@@ -359,7 +368,8 @@ Result<void> RoomSession::Impl::join_again() {
   while (true) {
     {
       std::unique_lock lock(mutex);
-      wake.wait_for(lock, backoff.next(), [&] { return closing || over; });
+      const std::chrono::nanoseconds asked = std::exchange(redial, std::nullopt).value_or(0ms);
+      wake.wait_for(lock, asked + backoff.next(), [&] { return closing || over; });
       if (closing || over) return {};
     }
     Result<wire::JoinedRoom> again = wire::join_again(joined, wire::ClientKind::haptic, reader->kept());

@@ -138,7 +138,8 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
     case v1::SessionResponse::kNoted:
       if (events_.noted) events_.noted(RoomSeq{response.noted().room_seq()});
       return {};
-    case v1::SessionResponse::kLink: return {};  // the session's own
+    case v1::SessionResponse::kLink:
+    case v1::SessionResponse::kRedial: return {};  // the session's own
     default: return failure(ErrorCode::unsupported, "SessionResponse.message is not known to this client");
   }
 }

@@ -47,7 +47,7 @@ constexpr int kRowsPlayedPerTick = 256;
 constexpr std::uint64_t kFirstWatcherOfPlayback = 1ull << 40;
 
 // Lock order: copy_mutex, then room_mutex, then sessions_mutex or that of the surface or the board, then a stream's own, then that of the jobs.
-// queue_mutex, pieces_mutex and stats_mutex are never held with another.
+// queue_mutex, pieces_mutex, stats_mutex and that of the figures are never held with another.
 struct RoomHost::Impl {
   Impl(Room r, HostRates rates, Detail detail, RoomKeeper* k, std::optional<Playback> p)
       : keeper(k), room(std::move(r)),
@@ -79,7 +79,7 @@ struct RoomHost::Impl {
   }
   void close_room(const Error& why);
   [[nodiscard]] std::optional<Error> closed() const;
-  void end_sessions(const std::string& why);
+  void end_sessions(const std::string& why, bool to_return = false);
   void show_scene();
   void read_leaves(std::vector<FieldLeaf>& leaves);
 
@@ -131,8 +131,11 @@ struct RoomHost::Impl {
   mutable std::mutex stats_mutex;
   TickStats stats;
   RoomCounts counts;
+  CutFigures figures;
 
   std::optional<std::string> ended;       // under sessions_mutex: why new sessions end at once
+  bool may_return = false;                // under sessions_mutex: so that they come again
+  Bytes redial;                           // under sessions_mutex: what sessions are told when the process is to stop
   std::mutex copy_mutex;                  // held while the bone is copied: of a stopped host by whoever asks
   std::optional<BoneStatus> last_status;  // under copy_mutex
   std::vector<Queued> batch;              // of the tick thread
@@ -202,6 +205,7 @@ void RoomHost::Impl::run_ticks() {
     }
     if (decided) reserve.refill();
     timer.done(own);
+    figures.publish(last);
     // Others read a copy, so that a tick never waits for a reader of its figures; only the last one makes sure.
     std::unique_lock lock(stats_mutex, std::try_to_lock);
     if (!lock && last) lock.lock();
@@ -213,6 +217,7 @@ void RoomHost::Impl::run_ticks() {
 
 void RoomHost::Impl::decide(QueuedCut& queued) {
   if (closed() || player) return later([sink = queued.sink](const Result<void>&) { sink->decided(); });
+  const Clock::time_point taken = Clock::now();
   Result<Outcome> outcome = [&] {
     const std::unique_lock lock(room_mutex);
     Result<Outcome> decision = room.submit(queued.cut);
@@ -226,6 +231,10 @@ void RoomHost::Impl::decide(QueuedCut& queued) {
       sink->decided();
     });
   if (!outcome->report.changed_leaves.empty()) note_changed(queued.arrived);
+  const Clock::time_point done = Clock::now();
+  const bool newly = outcome->committed() && !outcome->repeated;
+  if (newly) figures.committed(queued.arrived, taken, done);
+  if (!outcome->committed() && !outcome->repeated) figures.rejected(outcome->rejection);
   const Bytes row = outcome->committed() ? cut_row(outcome->room_seq, queued.cut)
                                          : rejection_row(outcome->room_seq, queued.cut.author_seq, outcome->lease_epoch,
                                                          outcome->rejection);
@@ -240,7 +249,8 @@ void RoomHost::Impl::decide(QueuedCut& queued) {
     fast.lease_epoch = outcome->lease_epoch;
   }
   later([this, sink = queued.sink, row, fast = std::move(fast), place = outcome->room_seq, repeated = outcome->repeated,
-         to_all = outcome->committed()](const Result<void>& durable) {
+         to_all = outcome->committed(), newly, done](const Result<void>& durable) {
+    const Clock::time_point kept = Clock::now();
     if (durable) {
       const std::lock_guard lock(sessions_mutex);
       // The author may have come back on another stream meanwhile.
@@ -250,6 +260,7 @@ void RoomHost::Impl::decide(QueuedCut& queued) {
       else if (author != open_authors.end())
         repeated ? author->second->answer(row) : author->second->offer(place, row, fast);
     }
+    if (durable && newly) figures.told(done, kept, Clock::now());
     sink->decided();
   });
 }
@@ -328,10 +339,11 @@ std::optional<Error> RoomHost::Impl::closed() const {
   return why;
 }
 
-void RoomHost::Impl::end_sessions(const std::string& why) {
+void RoomHost::Impl::end_sessions(const std::string& why, bool to_return) {
   const std::lock_guard lock(sessions_mutex);
   ended = why;
-  sessions.each([&](SessionSink& sink) { sink.end(why); });
+  may_return = to_return;
+  sessions.each([&](SessionSink& sink) { to_return ? sink.replaced(why) : sink.end(why); });
 }
 
 // What viewers draw beside the surface.
@@ -398,6 +410,9 @@ HostHealth RoomHost::health() const {
     const std::lock_guard lock(impl_->queue_mutex);
     health.queued_cuts = impl_->queue.size();
   }
+  health.stages = impl_->figures.stages();
+  health.rejections = impl_->figures.rejections();
+  health.serving = !stopped();
   const std::lock_guard lock(impl_->stats_mutex);
   health.tick = impl_->stats;
   health.counts = impl_->counts;
@@ -658,7 +673,8 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, co
     impl_->sessions.add(*sink);
     sink->begin(impl_->room.room_seq(), std::move(before), serialised(complete));
     for (const ToolBox::Entry* entry : tools) sink->know_tool(impl_->number_of(entry->hash), entry->hash);
-    if (impl_->ended) sink->end(*impl_->ended);
+    if (impl_->redial) sink->answer(impl_->redial);
+    if (impl_->ended) impl_->may_return ? sink->replaced(*impl_->ended) : sink->end(*impl_->ended);
   }
   impl_->read_leaves(leaves);
   if (!impl_->keeper) {
@@ -715,6 +731,18 @@ void RoomHost::queue_event(std::function<Result<RoomEvent>(Room&)> change,
 }
 
 bool RoomHost::stopped() const { return impl_->stopping || impl_->committer.failure(); }
+
+void RoomHost::ask_to_redial(std::chrono::milliseconds after, const std::string& why) {
+  const std::lock_guard lock(impl_->sessions_mutex);
+  impl_->redial = redial_row(after, why);
+  impl_->sessions.each([&](SessionSink& sink) { sink.answer(impl_->redial); });
+}
+
+void RoomHost::send_away(const std::string& why) {
+  impl_->end_sessions(why, true);
+  impl_->mesh.end_streams(why);
+  impl_->board.end_streams(why);
+}
 
 void RoomHost::end_streams(const std::string& why) {
   impl_->end_sessions(why);

@@ -15,6 +15,7 @@
 #include "common/wire/cut_run.hpp"
 #include "server/net/mesh_room.hpp"
 #include "server/net/committer.hpp"
+#include "server/net/cut_figures.hpp"
 #include "server/net/room_keeper.hpp"
 #include "server/net/outbox.hpp"
 #include "server/net/playback.hpp"
@@ -55,9 +56,12 @@ struct HostRates {
 
 struct HostHealth {
   TickStats tick;
+  StageTimes stages;              // of cuts
   DurationHistogram mesh_update;  // from a cut's arrival until its blocks' payloads were ready
   RoomSeq room_seq;
   RoomCounts counts;
+  RejectionCounts rejections{};   // of counts.rejected
+  bool serving = false;           // takes cuts
   std::size_t sessions = 0, mesh_streams = 0, cutting_streams = 0;
   std::size_t queued_cuts = 0, stale_blocks = 0;
   std::size_t waiting_rows = 0;     // decided and not yet kept
@@ -144,6 +148,11 @@ class RoomHost {
   void queue_event(std::function<Result<RoomEvent>(Room&)> change, std::function<void(const Result<RoomEvent>&)> answer);
 
   [[nodiscard]] bool stopped() const;        // takes no more
+  // The process is about to stop: sessions, also those that are opened from now on, are told to come again after that time,
+  // and go on until they have.
+  void ask_to_redial(std::chrono::milliseconds after, const std::string& why);
+  // As end_streams(), but so that sessions come again by themselves.
+  void send_away(const std::string& why);
   void end_streams(const std::string& why);  // those open now and those that come later
   void stop();                               // joins the threads; what is queued is decided before
   [[nodiscard]] std::vector<FieldLeaf> all_leaves() const;  // Room::all_leaves(), of one that has stopped

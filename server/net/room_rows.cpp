@@ -66,6 +66,13 @@ Bytes kept_row(const JournalHead& head) {
   return serialised(response);
 }
 
+Bytes redial_row(std::chrono::milliseconds after, const std::string& why) {
+  v1::SessionResponse response;
+  response.mutable_redial()->set_after_ms(static_cast<std::uint32_t>(after.count()));
+  response.mutable_redial()->set_why(why);
+  return serialised(response);
+}
+
 Bytes tool_row(RoomSeq place, const Tool& tool, std::uint32_t number) {
   v1::SessionResponse response;
   response.mutable_tool()->set_room_seq(place.value);

@@ -1,5 +1,6 @@
 // What a room's events look like on their way to its members: serialised once, shared by all streams.
 #pragma once
+#include <chrono>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -19,6 +20,7 @@ namespace osteon {
 [[nodiscard]] Bytes rejection_row(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, Rejection reason);
 [[nodiscard]] Bytes link_row(const SessionKeys& keys, std::uint16_t udp_port);
 [[nodiscard]] Bytes kept_row(const JournalHead& head);
+[[nodiscard]] Bytes redial_row(std::chrono::milliseconds after, const std::string& why);
 [[nodiscard]] Bytes tool_row(RoomSeq place, const Tool& tool, std::uint32_t number);
 [[nodiscard]] Bytes scene_row(RoomSeq place, const std::vector<SceneItem>& items);
 [[nodiscard]] Bytes noted_row(RoomSeq place, const std::string& mark);

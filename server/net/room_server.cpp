@@ -5,6 +5,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 #include <grpcpp/grpcpp.h>
+#include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/impl/service_type.h>
 
 #include <cerrno>
@@ -14,6 +15,7 @@
 #include <utility>
 
 #include "common/core/check.hpp"
+#include "server/net/health_watch.hpp"
 #include "common/runtime/log.hpp"
 #include "server/net/link_server.hpp"
 #include "server/net/services.hpp"
@@ -106,6 +108,8 @@ constexpr int kMaxReceiveBytes = 4 * 1024 * 1024;  // a cut of 64 knots is below
 constexpr int kMaxSendBytes = 4 * 1024 * 1024;     // a piece of a case is 1 MiB
 constexpr int kKeepaliveMs = 10'000;               // a peer that answers no ping that long is gone
 constexpr int kShortestPingMs = 500;               // clients may ask that often whether the server lives
+constexpr const char* kStopping = "the server is stopping; come again in a few seconds";
+constexpr std::chrono::milliseconds kComeAgainAfter{1000}, kDrainLook{20};
 
 }  // namespace
 
@@ -114,6 +118,7 @@ struct RoomServer::Impl {
   std::unique_ptr<LinkServer> links;   // outlives the streams
   std::vector<std::unique_ptr<grpc::Service>> services;
   std::unique_ptr<grpc::Server> server;
+  std::unique_ptr<HealthWatch> health;  // of the server
   std::string address;
 };
 
@@ -162,6 +167,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   impl->services.push_back(make_watch_service(*impl->rooms));
   impl->services.push_back(make_rooms_service(*impl->rooms));
 
+  grpc::EnableDefaultHealthCheckService(true);
   grpc::ServerBuilder builder;
   int port = 0;
   builder.AddListeningPort(listen, grpc::InsecureServerCredentials(), &port);
@@ -181,6 +187,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
     if (Result<void> usable = check_listen(listen); !usable) return tl::unexpected(usable.error());
     return tl::unexpected(cannot_listen(listen, "the system refused"));
   }
+  impl->health = std::make_unique<HealthWatch>(*impl->rooms, *impl->server->GetHealthCheckService());
   impl->address = parse_listen(listen)->host + ":" + std::to_string(port);
   return std::unique_ptr<RoomServer>(new RoomServer(std::move(impl)));
 }
@@ -194,10 +201,27 @@ HostHealth RoomServer::health() const {
 std::uint16_t RoomServer::link_port() const { return impl_->links ? impl_->links->port() : 0; }
 LinkServerHealth RoomServer::link_health() const { return impl_->links ? impl_->links->health() : LinkServerHealth{}; }
 
+void RoomServer::drain(std::chrono::milliseconds most, const std::function<bool(std::chrono::milliseconds)>& give_up) {
+  impl_->rooms->begin_drain(kComeAgainAfter, kStopping);
+  impl_->health->look();
+  const auto sessions = [&] {
+    std::size_t open = 0;
+    for (const std::shared_ptr<OpenRoom>& room : impl_->rooms->open_rooms()) open += room->host().health().sessions;
+    return open;
+  };
+  const auto until = std::chrono::steady_clock::now() + most;
+  log::info("draining", {{"sessions", sessions()}, {"most_ms", most.count()}});
+  while (sessions() > 0 && std::chrono::steady_clock::now() < until)
+    if (give_up(kDrainLook)) break;
+  log::info("drained", {{"sessions_left", sessions()}});
+}
+
 std::map<std::string, RoomSummary> RoomServer::stop_all() {
   impl_->rooms->begin_end();
   // Streams hear why first; those whose reader does not read are cut off after a moment.
-  for (const std::shared_ptr<OpenRoom>& room : impl_->rooms->open_rooms()) room->end_streams("the server stops");
+  for (const std::shared_ptr<OpenRoom>& room : impl_->rooms->open_rooms())
+    impl_->rooms->draining() ? room->send_away(kStopping) : room->end_streams("the server stops");
+  impl_->health.reset();
   impl_->server->Shutdown(std::chrono::system_clock::now() + std::chrono::milliseconds(500));
   impl_->server->Wait();
   std::map<std::string, RoomSummary> summaries = impl_->rooms->close_all();

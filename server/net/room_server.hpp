@@ -1,5 +1,6 @@
 // Rooms on the network: listens, serves proto/osteon/v1, stops cleanly.
 #pragma once
+#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -43,6 +44,9 @@ class RoomServer {
   [[nodiscard]] HostHealth health() const;           // of the only room
   [[nodiscard]] std::uint16_t link_port() const;     // UDP; 0: there is no fast path
   [[nodiscard]] LinkServerHealth link_health() const;
+  // Lets nobody in any more, tells grpc.health.v1 so, asks every session to come again later, and returns when all have gone
+  // with what they were told being kept, when `most` is over, or when `give_up`, which waits that long, returns true.
+  void drain(std::chrono::milliseconds most, const std::function<bool(std::chrono::milliseconds)>& give_up);
   // Ends every stream with a status and joins all threads; the journals are closed cleanly, with a checkpoint. Once.
   std::map<std::string, RoomSummary> stop_all();
   RoomSummary stop();  // the same, of the only room

@@ -10,6 +10,7 @@
 #include "common/core/check.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
+#include "common/wire/version.hpp"
 #include "server/net/journal_rows.hpp"
 #include "server/net/room_files.hpp"
 
@@ -105,9 +106,28 @@ OpenRoom::OpenRoom(std::string n, ServedCase served, Room room, const RoomsOptio
   host_ = std::make_unique<RoomHost>(std::move(room), options.rates, progress, options.detail, keeper_.get(), std::move(playback));
 }
 
+void OpenRoom::note_version(AuthorId author, std::uint32_t version) {
+  const std::lock_guard lock(versions_mutex_);
+  if (version == wire::kProtocolVersion)
+    older_versions_.erase(author);
+  else
+    older_versions_[author] = version;
+}
+
+std::uint32_t OpenRoom::version_of(AuthorId author) const {
+  const std::lock_guard lock(versions_mutex_);
+  const auto older = older_versions_.find(author);
+  return older == older_versions_.end() ? wire::kProtocolVersion : older->second;
+}
+
 void OpenRoom::end_streams(const std::string& why) {
   host_->find_pieces();
   host_->end_streams(why);
+}
+
+void OpenRoom::send_away(const std::string& why) {
+  host_->find_pieces();
+  host_->send_away(why);
 }
 
 RoomSummary OpenRoom::close() {
@@ -166,6 +186,19 @@ void Rooms::run_upkeep() {
 
 UpkeepCalls Rooms::until_the_end() const {
   return {.progress = {}, .stop = [this] { return ending_.load(); }};
+}
+
+void Rooms::begin_drain(std::chrono::milliseconds again, const std::string& why) {
+  {
+    const std::lock_guard lock(mutex_);
+    draining_ = why;
+  }
+  for (const std::shared_ptr<OpenRoom>& room : open_rooms()) room->host().ask_to_redial(again, why);
+}
+
+std::optional<std::string> Rooms::draining() const {
+  const std::lock_guard lock(mutex_);
+  return draining_;
 }
 
 void Rooms::begin_end() {
@@ -500,7 +533,8 @@ std::map<std::string, RoomSummary> Rooms::close_all() {
   std::map<std::string, RoomSummary> summaries;
   for (const std::shared_ptr<OpenRoom>& room : open_rooms()) {
     (void)take_out(room->name);
-    summaries.emplace(room->name, room->close());
+    const auto closed = summaries.emplace(room->name, room->close()).first;
+    log::info("room closed", {{"room", room->name}, {"room_seq", closed->second.bone.room_seq.value}});
   }
   return summaries;
 }

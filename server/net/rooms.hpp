@@ -20,6 +20,7 @@
 #include "common/tools/tool_box.hpp"
 #include "common/volume/case.hpp"
 #include "server/net/job_thread.hpp"
+#include "server/net/refusals.hpp"
 #include "server/net/room_files.hpp"
 #include "server/net/room_host.hpp"
 #include "server/net/room_keeper.hpp"
@@ -65,8 +66,13 @@ class OpenRoom {
   [[nodiscard]] RoomHost& host() { return *host_; }
   [[nodiscard]] RoomKeeper* keeper() { return keeper_.get(); }  // null: it is lost when it is closed
   [[nodiscard]] std::filesystem::path keeper_file() const { return keeper_ ? keeper_->file() : std::filesystem::path{}; }
+  // The version of the protocol that an author's newest join was made in; of one who never joined, this server's own.
+  void note_version(AuthorId author, std::uint32_t version);
+  [[nodiscard]] std::uint32_t version_of(AuthorId author) const;
   // Tells every stream why it ends.
   void end_streams(const std::string& why);
+  // The same; sessions come again by themselves.
+  void send_away(const std::string& why);
   // Afterwards nothing changes any more; the journal is closed cleanly, with a checkpoint.
   RoomSummary close();
   // [upkeep] Writes a checkpoint where the next opening would take long without, and forgets whom it is time to forget. `stop`
@@ -75,6 +81,8 @@ class OpenRoom {
 
  private:
   using Clock = std::chrono::steady_clock;
+  mutable std::mutex versions_mutex_;                     // never held with another
+  std::map<AuthorId, std::uint32_t> older_versions_;      // of those that are not this server's own
   std::unique_ptr<RoomKeeper> keeper_;  // outlives the host, which writes to it
   std::unique_ptr<RoomHost> host_;
   Clock::time_point newest_checkpoint_ = Clock::now(), forgotten_ = Clock::now();  // of upkeep
@@ -128,12 +136,16 @@ class Rooms {
   Result<RoomReport> verify(const std::string& name);
   Result<JournalHead> back_up(const std::string& name, const std::string& file_name, std::filesystem::path& file);
 
+  // From now on nobody is let in. `again`: when those who are asked to leave may come again.
+  void begin_drain(std::chrono::milliseconds again, const std::string& why);
+  [[nodiscard]] std::optional<std::string> draining() const;  // why nobody is let in
   void begin_end();  // gives up what takes long, and does no upkeep any more
   [[nodiscard]] std::map<std::string, RoomSummary> close_all();  // those that are open stay so in the folder's list
 
   // For calls that take long.
   JobThread jobs;   // whatever changes the rooms
   JobThread files;  // what only reads a case's files
+  RefusalCounts refusals;  // of all doors
 
  private:
   [[nodiscard]] std::filesystem::path journal_of(const std::string& name) const;
@@ -152,6 +164,7 @@ class Rooms {
   mutable std::mutex changing_;  // held by whatever changes the rooms; taken before mutex_, never within it
   mutable std::mutex mutex_;
   std::map<std::string, std::shared_ptr<OpenRoom>> open_;
+  std::optional<std::string> draining_;  // under mutex_
   std::set<std::string> to_open_;  // that were open when the folder was last left, and are not yet again
   std::condition_variable upkeep_wake_;
   std::atomic<bool> ending_{false};

@@ -11,6 +11,7 @@
 
 #include "common/field/kernel.hpp"
 #include "common/link/random_bytes.hpp"
+#include "common/runtime/log.hpp"
 #include "common/wire/convert.hpp"
 #include "osteon/v1/room.grpc.pb.h"
 #include "server/net/called_room.inl"
@@ -79,16 +80,12 @@ class CaseStream final : public OutStream<WriteReactor> {
 
 // Why a program of these versions cannot join; OK when it can.
 Status judge(const v1::JoinRequest& request) {
-  const auto mismatch = [](const char* what, std::uint32_t theirs, std::uint32_t ours) {
-    return Status(StatusCode::FAILED_PRECONDITION,
-                  std::string("the client speaks ") + what + " version " + std::to_string(theirs) + " and the server " +
-                      what + " version " + std::to_string(ours) + "; install the same Osteon release on both");
-  };
-  if (request.protocol_version() != wire::kProtocolVersion)
-    return mismatch("protocol", request.protocol_version(), wire::kProtocolVersion);
+  if (const Result<void> known = wire::check_protocol_version(request.protocol_version()); !known) return status_of(known.error());
   const bool needs_kernel = request.kind() == v1::CLIENT_KIND_HAPTIC;
   if (request.kernel_version() != kKernelVersion && (needs_kernel || request.kernel_version() != 0))
-    return mismatch("cut kernel", request.kernel_version(), kKernelVersion);
+    return {StatusCode::FAILED_PRECONDITION, "the client speaks cut kernel version " + std::to_string(request.kernel_version()) +
+                                                 " and the server cut kernel version " + std::to_string(kKernelVersion) +
+                                                 "; install the same Osteon release on both"};
   if (!v1::ClientKind_IsValid(request.kind()) || request.kind() == v1::CLIENT_KIND_UNSPECIFIED)
     return invalid("kind is not a kind of client that this server knows");
   if (request.name().size() > 256) return invalid("name is longer than 256 bytes");
@@ -114,17 +111,35 @@ class RoomServiceImpl final : public RoomBase {
                                  v1::JoinResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     if (Status status = judge(*request); !status.ok()) {
-      reactor->Finish(status);
-      return reactor;
+      rooms_.refusals.count(status.error_code() == StatusCode::FAILED_PRECONDITION ? "version" : "request");
+      log::warn("join refused", {{"peer", context->peer()}, {"reason", status.error_message()}});
+      return refuse(reactor, std::move(status));
+    }
+    if (const std::optional<std::string> why = rooms_.draining()) {
+      rooms_.refusals.count("draining");
+      return refuse(reactor, {StatusCode::UNAVAILABLE, *why});
     }
     const std::shared_ptr<OpenRoom> room = called(*context, reactor);
-    if (!room) return reactor;
-    room->host().run_slowly([room, reactor, request, response] {
+    if (!room) {
+      rooms_.refusals.count("room");
+      return reactor;
+    }
+    room->host().run_slowly([this, room, reactor, request, response] {
       RoomHost& host = room->host();
       const Case& bone = host.bone();
       const Result<AuthorId> author =
           request->resume_author() != 0 ? come_back(host, *request) : come(host, *request, *response);
-      if (!author) return reactor->Finish(status_of(author.error()));
+      if (!author) {
+        rooms_.refusals.count("room");
+        log::warn("join refused", {{"room", room->name}, {"reason", author.error().message}});
+        return reactor->Finish(status_of(author.error()));
+      }
+      room->note_version(*author, request->protocol_version());
+      log::info("joined", {{"room", room->name},
+                           {"author", author->value},
+                           {"kind", v1::ClientKind_Name(request->kind())},
+                           {"again", request->resume_author() != 0},
+                           {"protocol_version", request->protocol_version()}});
       response->set_author(author->value);
       response->set_room(room->name);
       response->set_server_epoch(room->server_epoch);

@@ -6,7 +6,9 @@
 #include <string>
 #include <utility>
 
+#include "common/runtime/log.hpp"
 #include "common/wire/convert.hpp"
+#include "common/wire/version.hpp"
 #include "osteon/v1/cutting.grpc.pb.h"
 #include "server/net/link_server.hpp"
 #include "server/net/called_room.inl"
@@ -35,6 +37,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
       link_ = links_->add(author_, decided + 1, *this);
       before.insert(before.begin(), link_row(link_->keys(), links_->port()));
     }
+    for (Bytes& row : before) row = in_its_version(row);
+    std::erase(before, nullptr);
     const std::lock_guard lock(mutex_);
     taken_ = decided;
     outbox_.begin(contained, std::move(before), std::move(complete));
@@ -45,12 +49,15 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     outbox_.set_leaves(std::move(leaves));
     pump();
   }
-  void offer(RoomSeq place, const Bytes& row) override {
+  void offer(RoomSeq place, const Bytes& any) override {
+    const Bytes row = in_its_version(any);
     const std::lock_guard lock(mutex_);
-    if (!closing()) send_or_give_up(outbox_.add(place, row));
+    if (row && !closing()) send_or_give_up(outbox_.add(place, row));
   }
   // [committing thread]
-  void offer(RoomSeq place, const Bytes& row, const wire::SessionRow& fast) override {
+  void offer(RoomSeq place, const Bytes& any, const wire::SessionRow& fast) override {
+    const Bytes row = in_its_version(any);
+    if (!row) return;
     std::uint64_t index = 0;
     {
       const std::lock_guard lock(mutex_);
@@ -59,14 +66,16 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
       send_or_give_up(outbox_.add(place, row));
       if (outbox_.index() > before) index = outbox_.index();
     }
-    if (link_) link_->tell(index, fast);  // beside the stream, which carries all
+    // Beside the stream, which carries all.
+    if (link_) link_->tell(index, row == any ? fast : wire::SessionRow{.room_seq = place, .kind = wire::SessionRowKind::streamed});
   }
   void know_tool(std::uint32_t number, const Digest& tool) override {
     if (link_) link_->know_tool(number, tool);
   }
-  void answer(const Bytes& row) override {
+  void answer(const Bytes& any) override {
+    const Bytes row = in_its_version(any);
     const std::lock_guard lock(mutex_);
-    if (!closing()) send_or_give_up(outbox_.add_answer(row));
+    if (row && !closing()) send_or_give_up(outbox_.add_answer(row));
   }
   void refuse(const Error& why) override { close(invalid(why.message)); }
   void decided() override {
@@ -116,6 +125,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
                            std::to_string(room_->server_epoch) + "; join again"});
     opened_ = true;
     author_ = AuthorId{request.author()};
+    version_ = room_->version_of(author_);
     const Digest secret = digest_of_secret(request.secret());
     // Reading goes on after the leaves were taken, so that no cut of this author is among them.
     host_.run_slowly([this, keep = self(), secret] {
@@ -167,6 +177,16 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     read_on();
   }
 
+  // A row as this client's version of the protocol has it; null where it has none.
+  [[nodiscard]] Bytes in_its_version(const Bytes& row) const {
+    if (version_ == wire::kProtocolVersion) return row;
+    v1::SessionResponse said;
+    (void)said.ParseFromString(*row);
+    const std::optional<v1::SessionResponse> older = wire::row_in(version_, said);
+    if (!older) return nullptr;
+    return older->message_case() == said.message_case() ? row : serialised(*older);
+  }
+
   // Reads the next request, or waits for decided() to do so. False when gRPC has let go of the stream.
   bool read_on() {
     const std::lock_guard lock(mutex_);
@@ -190,6 +210,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   }
   void leave() override {
     host_.leave(*this);
+    if (opened_) log::info("session over", {{"room", room_->name}, {"author", author_.value}});
     if (link_) links_->remove(link_);
   }
 
@@ -198,7 +219,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   LinkServer* const links_;
   std::shared_ptr<SessionLink> link_;  // with the link server; set before the host tells of rows
   ByteBuffer request_;
-  AuthorId author_;           // set before the host knows the stream
+  AuthorId author_;           // set before the host knows the stream, as the next
+  std::uint32_t version_ = wire::kProtocolVersion;
   bool opened_ = false;       // only reactions to reads use it, and these come one by one
   SessionOutbox outbox_;
   int queued_ = 0;            // cuts between reading and deciding

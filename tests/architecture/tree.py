@@ -31,6 +31,7 @@ HEAVY = {
     "HDF5": (re.compile(r"^hdf5"), ("haptic_client/app", "haptic_client/device")),
     "SQLite": (re.compile(r"^sqlite3"), ("server/journal",)),
     "Asio": (re.compile(r"^asio"), ("common/link",)),
+    "Prometheus": (re.compile(r"^prometheus/"), ("*/net",)),
     "libusb": (re.compile(r"^libusb"), ("haptic_client/device",)),
     "hidapi": (re.compile(r"^hidapi/"), ("common/input",)),
     "GDCM": (re.compile(r"^gdcm"), ("common/imaging", "server/import")),

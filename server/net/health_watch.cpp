@@ -1,0 +1,51 @@
+#include "server/net/health_watch.hpp"
+
+#include <grpcpp/health_check_service_interface.h>
+
+#include <chrono>
+
+#include "server/net/rooms.hpp"
+
+namespace osteon {
+namespace {
+
+constexpr std::chrono::milliseconds kLookEvery{200};
+
+}  // namespace
+
+HealthWatch::HealthWatch(const Rooms& rooms, grpc::HealthCheckServiceInterface& service) : rooms_(rooms), service_(service) {
+  look();
+  thread_ = std::thread([this] {
+    std::unique_lock lock(mutex_);
+    while (!wake_.wait_for(lock, kLookEvery, [this] { return end_; })) {
+      lock.unlock();
+      look();
+      lock.lock();
+    }
+  });
+}
+
+HealthWatch::~HealthWatch() {
+  {
+    const std::lock_guard lock(mutex_);
+    end_ = true;
+    wake_.notify_all();
+  }
+  thread_.join();
+}
+
+void HealthWatch::look() {
+  const std::lock_guard lock(mutex_);
+  const bool open = !rooms_.draining();
+  std::map<std::string, bool> now;
+  // What was there once is known as gone; a name that never was is unknown to the service.
+  for (const auto& [name, serving] : told_) now[name] = false;
+  now[""] = open;
+  for (const std::shared_ptr<OpenRoom>& room : rooms_.open_rooms()) now[room->name] = open && !room->host().stopped();
+  for (const auto& [name, serving] : now)
+    if (const auto before = told_.find(name); before == told_.end() || before->second != serving)
+      service_.SetServingStatus(name, serving);
+  told_ = std::move(now);
+}
+
+}  // namespace osteon

@@ -1,0 +1,190 @@
+#include "server/net/metrics.hpp"
+
+#include <prometheus/collectable.h>
+#include <prometheus/exposer.h>
+#include <prometheus/metric_family.h>
+
+#include <array>
+#include <exception>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "common/field/rejection.hpp"
+#include "server/net/certificate.hpp"
+#include "server/net/host_port.hpp"
+#include "server/net/room_server.hpp"
+
+namespace osteon {
+namespace {
+
+using prometheus::ClientMetric;
+using prometheus::MetricFamily;
+using prometheus::MetricType;
+using Labels = std::vector<ClientMetric::Label>;
+namespace fs = std::filesystem;
+
+// Of histograms: around the 8 ms of a tick and what a disk takes.
+constexpr std::array<double, 14> kBounds_s{0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.0085,
+                                           0.0125, 0.025,   0.05,   0.1,   0.25,   0.5,   1.0};
+
+// By the number of the reason.
+constexpr std::array<const char*, 17> kReasons{"none",    "body", "lease", "tool", "level",  "path",  "rotation",       "place", "sweep",
+                                               "spindle", "time", "rate",  "power", "frozen", "taken", "forbidden_tool", "zone"};
+
+double seconds(double us) { return us * 1e-6; }
+
+// The families in the order in which they were first named.
+class Page {
+ public:
+  void gauge(const char* name, const char* help, Labels labels, double value) {
+    ClientMetric metric;
+    metric.label = std::move(labels);
+    metric.gauge.value = value;
+    family(name, help, MetricType::Gauge).metric.push_back(std::move(metric));
+  }
+  void counter(const char* name, const char* help, Labels labels, double value) {
+    ClientMetric metric;
+    metric.label = std::move(labels);
+    metric.counter.value = value;
+    family(name, help, MetricType::Counter).metric.push_back(std::move(metric));
+  }
+  void histogram(const char* name, const char* help, Labels labels, const DurationHistogram& durations) {
+    ClientMetric metric;
+    metric.label = std::move(labels);
+    metric.histogram.sample_count = durations.count();
+    metric.histogram.sample_sum = seconds(durations.sum_us());
+    for (const double bound : kBounds_s)
+      metric.histogram.bucket.push_back(
+          {durations.count_up_to(std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(bound))), bound});
+    family(name, help, MetricType::Histogram).metric.push_back(std::move(metric));
+  }
+  [[nodiscard]] std::vector<MetricFamily> take() { return std::move(families_); }
+
+ private:
+  MetricFamily& family(const char* name, const char* help, MetricType type) {
+    const auto [known, is_new] = places_.emplace(name, families_.size());
+    if (is_new) families_.push_back({name, help, type, {}});
+    return families_[known->second];
+  }
+  std::map<std::string, std::size_t> places_;
+  std::vector<MetricFamily> families_;
+};
+
+double bytes_of(const fs::path& journal) {
+  double bytes = 0;
+  for (const fs::path& file : {journal, fs::path(journal.string() + "-wal")}) {
+    std::error_code failed;
+    const std::uintmax_t size = fs::file_size(file, failed);
+    if (!failed) bytes += static_cast<double>(size);
+  }
+  return bytes;
+}
+
+void tell_room(Page& page, OpenRoom& room, bool draining) {
+  const HostHealth health = room.host().health();
+  const auto with = [&](const char* name = nullptr, const std::string& value = {}) {
+    Labels labels{{"room", room.name}};
+    if (name) labels.push_back({name, value});
+    return labels;
+  };
+  page.gauge("osteon_room_serving", "1 while the room takes cuts.", with(), health.serving && !draining ? 1 : 0);
+  page.gauge("osteon_room_event", "Newest place in the room's order.", with(), static_cast<double>(health.room_seq.value));
+
+  const char* stage = "What a committed cut waits for: the tick, its decision, the disk, the streams.";
+  page.histogram("osteon_cut_stage_seconds", stage, with("stage", "wait"), health.stages.wait);
+  page.histogram("osteon_cut_stage_seconds", stage, with("stage", "decide"), health.stages.decide);
+  page.histogram("osteon_cut_stage_seconds", stage, with("stage", "commit"), health.stages.commit);
+  page.histogram("osteon_cut_stage_seconds", stage, with("stage", "tell"), health.stages.tell);
+  page.histogram("osteon_tick_late_seconds", "How late ticks began.", with(), health.tick.lateness);
+  page.histogram("osteon_tick_work_seconds", "How long ticks took.", with(), health.tick.work);
+  page.counter("osteon_ticks_missed_total", "Periods that no tick ran in.", with(), static_cast<double>(health.tick.missed));
+  page.histogram("osteon_journal_commit_seconds", "Transactions of the journal.", with(), health.commit);
+  if (room.keeper())
+    page.gauge("osteon_journal_bytes", "The journal's file and its log.", with(), bytes_of(room.keeper_file()));
+
+  const char* queue = "What waits: cuts for a tick, rows for the disk, blocks for the surface, the slowest reader's rows or blocks.";
+  page.gauge("osteon_queue_length", queue, with("queue", "cuts"), static_cast<double>(health.queued_cuts));
+  page.gauge("osteon_queue_length", queue, with("queue", "rows"), static_cast<double>(health.waiting_rows));
+  page.gauge("osteon_queue_length", queue, with("queue", "blocks"), static_cast<double>(health.stale_blocks));
+  page.gauge("osteon_queue_length", queue, with("queue", "reader"), static_cast<double>(health.furthest_behind));
+  page.gauge("osteon_sessions", "Haptic clients with an open session.", with(), static_cast<double>(health.sessions));
+  page.gauge("osteon_streams", "Open streams of viewers and audio clients.", with("kind", "mesh"), static_cast<double>(health.mesh_streams));
+  page.gauge("osteon_streams", "Open streams of viewers and audio clients.", with("kind", "cutting"),
+             static_cast<double>(health.cutting_streams));
+
+  const char* cuts = "Cuts by what became of them; refused ones broke the protocol.";
+  page.counter("osteon_cuts_total", cuts, with("outcome", "committed"), static_cast<double>(health.counts.committed));
+  page.counter("osteon_cuts_total", cuts, with("outcome", "rejected"), static_cast<double>(health.counts.rejected));
+  page.counter("osteon_cuts_total", cuts, with("outcome", "repeated"), static_cast<double>(health.counts.repeated));
+  page.counter("osteon_cuts_total", cuts, with("outcome", "refused"), static_cast<double>(health.counts.refused));
+  for (std::size_t i = 1; i < health.rejections.size(); ++i)
+    page.counter("osteon_rejections_total", "Rejected cuts by reason, since the room was opened.",
+                 with("reason", i < kReasons.size() ? kReasons[i] : std::to_string(i)), static_cast<double>(health.rejections[i]));
+}
+
+class Figures final : public prometheus::Collectable {
+ public:
+  Figures(RoomServer& server, fs::path certificate) : server_(server), certificate_(std::move(certificate)) {}
+
+  std::vector<MetricFamily> Collect() const override {
+    Page page;
+    const bool draining = server_.rooms().draining().has_value();
+    const auto rooms = server_.rooms().open_rooms();
+    page.gauge("osteon_rooms", "Open rooms.", {}, static_cast<double>(rooms.size()));
+    page.gauge("osteon_draining", "1 once the server lets nobody in any more.", {}, draining ? 1 : 0);
+    auto refusals = server_.rooms().refusals.counts();
+    for (const char* known : {"version", "request", "room", "draining"}) refusals.try_emplace(known, 0u);
+    for (const auto& [reason, count] : refusals)
+      page.counter("osteon_refusals_total", "Callers turned away at the door.", {{"reason", reason}}, static_cast<double>(count));
+    if (!certificate_.empty())
+      if (const Result<double> days = certificate_days_left(certificate_))
+        page.gauge("osteon_certificate_days_left", "Until the server's certificate is over.", {}, *days);
+    const LinkServerHealth links = server_.link_health();
+    page.gauge("osteon_links", "Fast paths, and those over which datagrams have come lately.", {{"state", "open"}}, static_cast<double>(links.links));
+    page.gauge("osteon_links", "", {{"state", "alive"}}, static_cast<double>(links.alive));
+    page.counter("osteon_strange_datagrams_total", "Datagrams that nobody with a key has sent.", {}, static_cast<double>(links.strangers));
+    for (const std::shared_ptr<OpenRoom>& room : rooms) tell_room(page, *room, draining);
+    return page.take();
+  }
+
+ private:
+  RoomServer& server_;
+  const fs::path certificate_;
+};
+
+}  // namespace
+
+struct Metrics::Impl {
+  std::shared_ptr<Figures> figures;  // shared with the exposer's questions under way
+  std::unique_ptr<prometheus::Exposer> exposer;
+  std::string address;
+};
+
+Metrics::Metrics(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Metrics::~Metrics() = default;
+const std::string& Metrics::address() const { return impl_->address; }
+
+Result<std::unique_ptr<Metrics>> Metrics::start(const std::string& listen, RoomServer& server, const fs::path& certificate) {
+  const Result<HostPort> at = parse_host_port(listen.find(':') == std::string::npos ? "127.0.0.1:" + listen : listen, "--metrics");
+  if (!at) return tl::unexpected(at.error());
+  if (!is_loopback(at->host))
+    return failure(ErrorCode::invalid_input, "--metrics " + listen + " is reachable from other machines, and whoever reaches it may read it; "
+                                                                     "use a port, or one with 127.0.0.1, [::1] or localhost");
+  auto impl = std::make_unique<Impl>();
+  const std::string host = at->host == "localhost" ? "127.0.0.1" : at->host;
+  impl->figures = std::make_shared<Figures>(server, certificate);
+  try {
+    // A thread for who asks, and one for who asks meanwhile.
+    impl->exposer = std::make_unique<prometheus::Exposer>(host + ":" + std::to_string(at->port), 2);
+    impl->exposer->RegisterCollectable(impl->figures);
+  } catch (const std::exception& error) {
+    return failure(ErrorCode::unavailable, "--metrics " + listen + " cannot be listened on (" + error.what() +
+                                               "); choose another port, or 0 for a free one");
+  }
+  const std::vector<int> ports = impl->exposer->GetListeningPorts();
+  impl->address = host + ":" + std::to_string(ports.empty() ? at->port : ports.front());
+  return std::unique_ptr<Metrics>(new Metrics(std::move(impl)));
+}
+
+}  // namespace osteon

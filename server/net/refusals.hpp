@@ -1,0 +1,34 @@
+// Who was turned away, counted by reason: for the metrics.
+#pragma once
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <string>
+#include <string_view>
+
+namespace osteon {
+
+// Any thread. A reason is a fixed word such as "version" or "ticket", never a caller's text: memory stays bounded, and what
+// comes after the first kMost different ones counts as "other".
+class RefusalCounts {
+ public:
+  static constexpr std::size_t kMost = 32;
+  void count(std::string_view reason) {
+    const std::lock_guard lock(mutex_);
+    const auto known = counts_.find(reason);
+    if (known != counts_.end())
+      ++known->second;
+    else
+      ++counts_[counts_.size() < kMost ? std::string(reason) : "other"];
+  }
+  [[nodiscard]] std::map<std::string, std::uint64_t, std::less<>> counts() const {
+    const std::lock_guard lock(mutex_);
+    return counts_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<std::string, std::uint64_t, std::less<>> counts_;
+};
+
+}  // namespace osteon
