@@ -1,0 +1,193 @@
+#include "common/mechanics/passivity.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/core/check.hpp"
+
+namespace osteon {
+namespace {
+
+constexpr double kMostLag_s = 1.0;     // nobody's line makes the others wait for longer
+constexpr double kLagSmoothing = 0.1;  // of one measurement
+
+Vec3 clamped(const Vec3& v, double most) {
+  const double size = v.norm();
+  return size > most ? Vec3(v * (most / size)) : v;
+}
+
+Eigen::Quaterniond quaternion(const Vec3& turn_rad) {
+  const double angle = turn_rad.norm();
+  return angle > 0.0 ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, turn_rad / angle)) : Eigen::Quaterniond::Identity();
+}
+
+Vec3 rotation_vector(const Eigen::Quaterniond& q) {
+  const double sine = q.vec().norm();
+  if (sine == 0.0) return Vec3::Zero();
+  return q.vec() * ((q.w() < 0.0 ? -2.0 : 2.0) * std::atan2(sine, std::abs(q.w())) / sine);
+}
+
+// Of the mount itself behind a load that grows: damping over stiffness, the slower of both ways.
+double lag_of(const MountParams& m) {
+  constexpr double kSI = 1e-3;
+  return 2.0 * m.damping * std::sqrt(kSI * std::max(m.mass_kg / m.stiffness_n_per_mm, m.inertia_kg_mm2 / m.stiffness_nmm_per_rad));
+}
+
+double smoothed_lag(double lag_s, double sample_s) {
+  const double sample = std::clamp(sample_s, 0.0, kMostLag_s);
+  return lag_s > 0.0 ? lag_s + kLagSmoothing * (sample - lag_s) : sample;
+}
+
+}  // namespace
+
+bool SharedBone::receive(std::uint64_t author, const BonePush& push) noexcept {
+  const auto found = authors_.find(author);
+  if (found == authors_.end() || !push.load.finite() || !std::isfinite(push.energy_mj)) return false;
+  Author& a = found->second;
+  if (push.push_seq <= a.push_seq) return false;
+  // The first total heard is where the count begins, whatever an earlier session came to.
+  if (a.push_seq == 0) {
+    a.told_mj = push.energy_mj;
+    a.heard_s = now_s_;
+  }
+  const double gained_mj = push.energy_mj - a.told_mj;
+  if (gained_mj > 0.0) {
+    // What nobody's arm can do was not put in.
+    constexpr double kSpare_s = 0.5;
+    share_out(author, std::min(gained_mj, params_.most_n * params_.most_mm_per_s * (now_s_ - a.heard_s + kSpare_s)));
+    a.told_mj = push.energy_mj;
+  }
+  a.push_seq = push.push_seq;
+  a.heard_s = now_s_;
+  a.load = {clamped(push.load.force_n, params_.most_n), clamped(push.load.moment_nmm, params_.most_nmm)};
+  if (push.seen_seq > 0 && push.seen_seq <= a.seen_seq && a.seen_seq - push.seen_seq < kTimesKept)
+    a.lag_s = smoothed_lag(a.lag_s, now_s_ - a.sent_s[push.seen_seq % kTimesKept]);
+  return true;
+}
+
+void SharedBone::share_out(std::uint64_t from, double energy_mj) noexcept {
+  if (authors_.size() < 2) return;  // there is nobody to be pushed back by it
+  for (auto& [author, a] : authors_)
+    if (author != from) a.granted_mj += energy_mj / static_cast<double>(authors_.size() - 1);
+}
+
+void SharedBone::step(double dt_s) noexcept {
+  now_s_ += dt_s;
+  Load all;
+  for (auto& [author, a] : authors_) {
+    if (now_s_ - a.heard_s > params_.silent_s) a.load = std::exp(-dt_s / params_.fade_s) * a.load;
+    all = all + a.load;
+  }
+  mount_.step(all, dt_s);
+}
+
+BoneSeen SharedBone::seen(std::uint64_t author) noexcept {
+  BoneSeen seen;
+  seen.shift = mount_.shift();
+  for (const auto& [other, a] : authors_) seen.lag_s = std::max(seen.lag_s, a.lag_s);
+  const auto found = authors_.find(author);
+  if (found == authors_.end()) return seen;
+  Author& a = found->second;
+  seen.seen_seq = ++a.seen_seq;
+  a.sent_s[a.seen_seq % kTimesKept] = now_s_;
+  seen.energy_mj = a.granted_mj;
+  seen.push_seq = a.push_seq;
+  return seen;
+}
+
+ShownBone::ShownBone(const ShownBoneParams& params)
+    : params_(params), own_mj_(params.allowance_mj), mount_lag_s_(lag_of(params.mount)), low_pass_s_(params.least_s) {
+  OSTEON_CHECK(params.mount.good() && params.least_s > 0.0 && params.most_s >= params.least_s && params.per_lag >= 0.0);
+  OSTEON_CHECK(params.allowance_mj >= 0.0 && params.kept_mj >= 0.0 && params.granted_most_mj >= 0.0);
+}
+
+void ShownBone::see(const BoneSeen& seen) noexcept {
+  if (seen.seen_seq <= seen_seq_ || !seen.shift.finite() || !std::isfinite(seen.energy_mj) || !std::isfinite(seen.lag_s)) return;
+  seen_seq_ = seen.seen_seq;
+  since_seen_s_ = 0.0;
+  told_ = {clamped(seen.shift.place_mm, params_.mount.most_mm), quaternion(clamped(seen.shift.turn_rad, params_.mount.most_rad))};
+  slowest_s_ = std::clamp(seen.lag_s, 0.0, kMostLag_s);
+  if (timed_seq_ > 0 && seen.push_seq >= timed_seq_) {
+    lag_s_ = smoothed_lag(lag_s_, now_s_ - timed_s_);
+    timed_seq_ = 0;
+  }
+  // As the server does: the first total is where the count begins.
+  if (total_mj_ < 0.0) total_mj_ = std::max(0.0, seen.energy_mj);
+  const double gained_mj = seen.energy_mj - total_mj_;
+  if (gained_mj <= 0.0) return;
+  total_mj_ = seen.energy_mj;
+  granted_mj_ += gained_mj;
+  others_mj_ = std::min(others_mj_ + gained_mj, params_.granted_most_mj);
+}
+
+void ShownBone::step(const Load& load, double dt_s) noexcept {
+  load_ = load.finite() ? load : Load{};
+  now_s_ += dt_s;
+  since_seen_s_ += dt_s;
+  held_back_ = false;
+
+  // Two passes, so that neither the pose nor its speed jumps at a pose told.
+  low_pass_s_ = std::clamp(params_.per_lag * (std::max(lag_s_, slowest_s_) + mount_lag_s_), params_.least_s, params_.most_s);
+  const double share = -std::expm1(-dt_s / low_pass_s_), share_again = -std::expm1(-dt_s / params_.least_s);
+  if (since_seen_s_ <= params_.silent_s) {
+    smooth_.mm += share * (told_.mm - smooth_.mm);
+    smooth_.turn = (quaternion(share * rotation_vector(told_.turn * smooth_.turn.conjugate())) * smooth_.turn).normalized();
+  } else {
+    smooth_ = shown_;
+  }
+  Vec3 move_mm = clamped(share_again * (smooth_.mm - shown_.mm), params_.most_mm_per_s * dt_s);
+  Vec3 turn_rad = clamped(share_again * rotation_vector(smooth_.turn * shown_.turn.conjugate()), params_.most_rad_per_s * dt_s);
+
+  // What the step takes from the hand, and what it gives: only along force and moment, and only as far as there are funds.
+  double by_move_mj = load_.force_n.dot(move_mm), by_turn_mj = load_.moment_nmm.dot(turn_rad);
+  const double taken_mj = std::max(0.0, by_move_mj) + std::max(0.0, by_turn_mj);
+  const double wanted_mj = std::max(0.0, -by_move_mj) + std::max(0.0, -by_turn_mj);
+  const double most_mj = funds_mj() + taken_mj;
+  if (wanted_mj > most_mj) {
+    held_back_ = true;
+    const double less = 1.0 - most_mj / wanted_mj;
+    if (by_move_mj < 0.0) move_mm -= less * by_move_mj / load_.force_n.squaredNorm() * load_.force_n;
+    if (by_turn_mj < 0.0) turn_rad -= less * by_turn_mj / load_.moment_nmm.squaredNorm() * load_.moment_nmm;
+    by_move_mj = load_.force_n.dot(move_mm);
+    by_turn_mj = load_.moment_nmm.dot(turn_rad);
+  }
+  shown_.mm += move_mm;
+  shown_.turn = (quaternion(turn_rad) * shown_.turn).normalized();
+
+  // One's own is spent first: what was granted is for what that does not pay.
+  const double net_mj = by_move_mj + by_turn_mj;
+  (net_mj > 0.0 ? put_in_mj_ : released_mj_) += std::abs(net_mj);
+  own_mj_ += net_mj;
+  if (own_mj_ < 0.0) {
+    others_mj_ = std::max(0.0, others_mj_ + own_mj_);
+    own_mj_ = 0.0;
+  }
+  give_away();
+}
+
+void ShownBone::give_away() noexcept {
+  const double spare_mj = own_mj_ - params_.kept_mj;
+  if (spare_mj <= 0.0) return;
+  own_mj_ -= spare_mj;
+  given_mj_ += spare_mj;
+}
+
+BonePush ShownBone::push() noexcept {
+  BonePush push{++push_seq_, load_, given_mj_, seen_seq_};
+  if (timed_seq_ == 0) {
+    timed_seq_ = push_seq_;
+    timed_s_ = now_s_;
+  }
+  return push;
+}
+
+void ShownBone::rejoin() noexcept {
+  seen_seq_ = timed_seq_ = 0;
+  total_mj_ = -1.0;
+}
+
+Pose ShownBone::pose_world_bone() const { return osteon::pose_world_bone(params_.mount, shift()); }
+
+Shift ShownBone::shift() const noexcept { return {shown_.mm, rotation_vector(shown_.turn)}; }
+
+}  // namespace osteon
