@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -20,6 +21,8 @@
 #include "common/volume/mesh_distance.hpp"
 #include "server/app/journal_commands.hpp"
 #include "server/app/room_commands.hpp"
+#include "server/app/server_config.hpp"
+#include "server/net/metrics.hpp"
 #include "server/net/room_server.hpp"
 
 namespace {
@@ -27,21 +30,6 @@ namespace {
 using namespace osteon;
 constexpr const char* kProgram = "osteon-server";
 constexpr std::chrono::seconds kHealthEvery{10};
-
-// What is asked of a hand over a network. No surgical motor gives more than 500 W [A]. A swept voxel takes about a nanosecond
-// of a core; a cup reamer asks for 2e8.
-constexpr CutLimits kServedLimits{.time_slack = std::chrono::milliseconds(1000), .swept_voxels_per_s = 5e8, .power_w = 500.0};
-
-struct Options {
-  std::vector<std::filesystem::path> case_folders;
-  std::string listen = "127.0.0.1:0";
-  std::filesystem::path address_file;
-  std::filesystem::path summary_file;
-  std::filesystem::path tools_folder;
-  std::filesystem::path save_file, resume_file, journal_file, rooms_folder;
-  int retention_days = 0;
-  Detail detail = Detail::automatic;
-};
 
 void log_health(const std::string& room, const HostHealth& health) {
   log::info("health", {{"room", room},
@@ -129,7 +117,7 @@ Result<void> load_tools(const std::filesystem::path& folder, ToolBox& box) {
 }
 
 // The box that every new room begins with. Tools are loaded once, so that a folder that changes meanwhile changes no room.
-Result<std::function<std::shared_ptr<ToolBox>()>> tool_boxes(const Options& options) {
+Result<std::function<std::shared_ptr<ToolBox>()>> tool_boxes(const ServerConfig& options) {
   const std::shared_ptr<ToolBox> loaded = builtin_tool_box();  // shared with the function below
   if (!options.tools_folder.empty())
     if (Result<void> done = load_tools(options.tools_folder, *loaded); !done) return tl::unexpected(done.error());
@@ -140,11 +128,11 @@ Result<std::function<std::shared_ptr<ToolBox>()>> tool_boxes(const Options& opti
   };
 }
 
-Result<Room> make_room(const Options& options, const Case& bone, std::shared_ptr<ToolBox> tools) {
-  if (options.resume_file.empty()) return Room(bone, kServedLimits, std::move(tools));
+Result<Room> make_room(const ServerConfig& options, const Case& bone, std::shared_ptr<ToolBox> tools) {
+  if (options.resume_file.empty()) return Room(bone, options.limits, std::move(tools));
   const Result<SavedFields> saved = load_fields(options.resume_file);
   if (!saved) return tl::unexpected(saved.error());
-  Result<Room> room = Room::resume(bone, *saved, kServedLimits, std::move(tools));
+  Result<Room> room = Room::resume(bone, *saved, options.limits, std::move(tools));
   if (!room) return failure(room.error().code, options.resume_file.string() + ": " + room.error().message);
   log::info("resumed", {{"file", options.resume_file.string()},
                         {"room_seq", saved->room_seq.value},
@@ -153,8 +141,8 @@ Result<Room> make_room(const Options& options, const Case& bone, std::shared_ptr
 }
 
 // The room that the journal keeps, or a new one in a new journal.
-Result<Room> open_journal(const Options& options, const Case& bone, std::shared_ptr<ToolBox> tools, std::unique_ptr<RoomKeeper>& keeper) {
-  RoomKeeper::Options keeping{.name = options.journal_file.stem().string(), .limits = kServedLimits, .tools = std::move(tools), .journal = {}, .today = {}};
+Result<Room> open_journal(const ServerConfig& options, const Case& bone, std::shared_ptr<ToolBox> tools, std::unique_ptr<RoomKeeper>& keeper) {
+  RoomKeeper::Options keeping{.name = options.journal_file.stem().string(), .limits = options.limits, .tools = std::move(tools), .journal = {}, .today = {}};
   keeping.retention_days = options.retention_days;
   Progress progress("journal");
   Result<KeptRoom> kept = RoomKeeper::open(options.journal_file, bone, keeping, [&](double fraction) { progress.update(fraction); });
@@ -169,12 +157,12 @@ Result<Room> open_journal(const Options& options, const Case& bone, std::shared_
 }
 
 // What the command line asks for: the rooms of a folder, or one room.
-Result<std::unique_ptr<Rooms>> open_rooms(const Options& options) {
+Result<std::unique_ptr<Rooms>> open_rooms(const ServerConfig& options) {
   Result<std::function<std::shared_ptr<ToolBox>()>> tools = tool_boxes(options);
   if (!tools) return tl::unexpected(tools.error());
   RoomsOptions rooms_options;
   rooms_options.folder = options.rooms_folder;
-  rooms_options.limits = kServedLimits;
+  rooms_options.limits = options.limits;
   rooms_options.tools = *tools;
   rooms_options.detail = options.detail;
   rooms_options.retention_days = options.retention_days;
@@ -219,7 +207,7 @@ nlohmann::json summary_of(const std::map<std::string, RoomSummary>& rooms, bool 
   return {{"rooms", all}};
 }
 
-Result<void> run(const Options& options, const StopSignal& stop) {
+Result<void> run(const ServerConfig& options, const StopSignal& stop) {
   // An address of an earlier run must not be taken for this one's.
   if (!options.address_file.empty()) {
     std::error_code ignored;
@@ -237,13 +225,21 @@ Result<void> run(const Options& options, const StopSignal& stop) {
                           {"udp_port", (*server)->link_port()},
                           {"surface_blocks", first.blocks},
                           {"surface_bytes", first.surface_bytes}});
+  Result<std::unique_ptr<Metrics>> metrics;
+  if (!options.metrics.empty()) {
+    metrics = Metrics::start(options.metrics, **server, {});
+    if (!metrics) return tl::unexpected(metrics.error());
+    log::info("metrics", {{"address", (*metrics)->address()}});
+  }
   if (!options.address_file.empty())
     if (Result<void> written = write_file(options.address_file, (*server)->address() + "\n"); !written)
       return tl::unexpected(written.error());
 
   while (!stop.wait_for(kHealthEvery)) log_health(**server);
+  (*server)->drain(std::chrono::seconds(options.drain_seconds), [&](std::chrono::milliseconds time) { return stop.wait_for_second(time); });
 
   log::info("stopping");
+  if (metrics) metrics->reset();
   const std::map<std::string, RoomSummary> summaries = (*server)->stop_all();
   for (const auto& [name, summary] : summaries) log_health(name, summary.health);
   for (const auto& [name, summary] : summaries)
@@ -253,10 +249,19 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   return write_file(options.summary_file, summary_of(summaries, !options.rooms_folder.empty()).dump(2) + "\n");
 }
 
+// `config`: what the file says, with what the command line says over it. The program's exit code.
+int check(const std::filesystem::path& file, std::vector<std::string> faults, const ServerConfig& config) {
+  for (const Result<void>& said : {check_server_config(config), check_server_places(config)})
+    if (!said) faults.push_back(file.string() + ": " + said.error().message);
+  for (const std::string& fault : faults) std::fprintf(stderr, "%s: %s\n", kProgram, fault.c_str());
+  if (faults.empty()) std::printf("%s: sound\n", file.c_str());
+  return faults.empty() ? 0 : 1;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  Options options;
+  ServerConfig options;
   CLI::App app("Owns the bone of a case: applies the cuts of haptic clients in one order and streams the surface and the "
                "tools' states to viewers and audio clients.",
                kProgram);
@@ -278,12 +283,12 @@ int main(int argc, char** argv) {
                  "Every event of the room, on the disk before anyone is told of it; where the file is there, the room goes on, "
                  "with all that can be undone")
       ->excludes(resume);
-  CLI::Option* rooms = app.add_option("--rooms", options.rooms_folder,
-                                      "Folder of many rooms, each kept in a journal: those that were open are opened, and "
-                                      "\"osteon-server rooms\" makes, closes, branches and deletes them")
-                           ->excludes(resume)
-                           ->excludes("--journal")
-                           ->excludes("--save");
+  app.add_option("--rooms", options.rooms_folder,
+                 "Folder of many rooms, each kept in a journal: those that were open are opened, and \"osteon-server rooms\" makes, "
+                 "closes, branches and deletes them")
+      ->excludes(resume)
+      ->excludes("--journal")
+      ->excludes("--save");
   app.add_option("--retention-days", options.retention_days,
                  "After so many days a room's journal forgets who somebody was, when it is opened and once a day; what they did stays")
       ->check(CLI::Range(1, 36500));
@@ -294,17 +299,31 @@ int main(int argc, char** argv) {
       ->transform(CLI::CheckedTransformer(details, CLI::ignore_case).description("auto|full|near"))
       ->default_str("auto");
   app.add_option("--summary", options.summary_file, "JSON written at the end: field hash, counts, ticks, latencies");
+  app.add_option("--metrics", options.metrics, "PORT or HOST:PORT of this machine where Prometheus finds figures of every room");
+  app.add_option("--drain-seconds", options.drain_seconds,
+                 "After SIGTERM or Ctrl-C, how long those in the rooms have to leave in good order; a second signal ends that")
+      ->check(CLI::Range(0, 600))
+      ->capture_default_str();
+  std::filesystem::path config_file;
+  bool only_check = false;
+  CLI::Option* from_file = app.add_option("--config", config_file, "YAML file with all of these, and limits; the command line wins over it");
+  app.add_flag("--check", only_check, "Says whether the --config file is sound, and what to change in it, and ends")->needs(from_file);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
+  if (!config_file.empty() && !command) {
+    const Result<ConfigRead> read = read_server_config(config_file);
+    if (!read) return log::exit_with(kProgram, read.error());
+    options = read->config;
+    if (const auto code = parse_arguments(app, argc, argv)) return *code;  // over what the file says
+    if (only_check) return check(config_file, read->faults, options);
+    if (!read->faults.empty()) return log::exit_with(kProgram, {ErrorCode::invalid_input, read->faults.front()});
+  }
 
   if (command) {
     const Result<void> done = command();
     return done ? 0 : log::exit_with(kProgram, done.error());
   }
   log::open(kProgram);
-  if (options.case_folders.empty())
-    return log::exit_with(kProgram, {ErrorCode::invalid_input, "--case is required; see osteon-server --help"});
-  if (options.case_folders.size() > 1 && rooms->count() == 0)
-    return log::exit_with(kProgram, {ErrorCode::invalid_input, "--case was given more than once, but there is one room; give --rooms FOLDER for many"});
+  if (const Result<void> fits = check_server_config(options); !fits) return log::exit_with(kProgram, fits.error());
   const StopSignal stop;
   const Result<void> outcome = run(options, stop);
   return outcome ? 0 : log::exit_with(kProgram, outcome.error());

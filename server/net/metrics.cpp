@@ -29,8 +29,9 @@ constexpr std::array<double, 14> kBounds_s{0.0001, 0.00025, 0.0005, 0.001, 0.002
                                            0.0125, 0.025,   0.05,   0.1,   0.25,   0.5,   1.0};
 
 // By the number of the reason.
-constexpr std::array<const char*, 17> kReasons{"none",    "body", "lease", "tool", "level",  "path",  "rotation",       "place", "sweep",
-                                               "spindle", "time", "rate",  "power", "frozen", "taken", "forbidden_tool", "zone"};
+constexpr std::array<const char*, 17> kReasons{"none",     "body",   "lease", "tool",           "level", "path",
+                                               "rotation", "place",  "sweep", "spindle",        "time",  "rate",
+                                               "power",    "frozen", "taken", "forbidden_tool", "zone"};
 
 double seconds(double us) { return us * 1e-6; }
 
@@ -56,7 +57,8 @@ class Page {
     metric.histogram.sample_sum = seconds(durations.sum_us());
     for (const double bound : kBounds_s)
       metric.histogram.bucket.push_back(
-          {durations.count_up_to(std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(bound))), bound});
+          {durations.count_up_to(std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(bound))),
+           bound});
     family(name, help, MetricType::Histogram).metric.push_back(std::move(metric));
   }
   [[nodiscard]] std::vector<MetricFamily> take() { return std::move(families_); }
@@ -100,16 +102,17 @@ void tell_room(Page& page, OpenRoom& room, bool draining) {
   page.histogram("osteon_tick_work_seconds", "How long ticks took.", with(), health.tick.work);
   page.counter("osteon_ticks_missed_total", "Periods that no tick ran in.", with(), static_cast<double>(health.tick.missed));
   page.histogram("osteon_journal_commit_seconds", "Transactions of the journal.", with(), health.commit);
-  if (room.keeper())
-    page.gauge("osteon_journal_bytes", "The journal's file and its log.", with(), bytes_of(room.keeper_file()));
+  if (room.keeper()) page.gauge("osteon_journal_bytes", "The journal's file and its log.", with(), bytes_of(room.keeper_file()));
 
-  const char* queue = "What waits: cuts for a tick, rows for the disk, blocks for the surface, the slowest reader's rows or blocks.";
+  const char* queue =
+      "What waits: cuts for a tick, rows for the disk, blocks for the surface, the slowest reader's rows or blocks.";
   page.gauge("osteon_queue_length", queue, with("queue", "cuts"), static_cast<double>(health.queued_cuts));
   page.gauge("osteon_queue_length", queue, with("queue", "rows"), static_cast<double>(health.waiting_rows));
   page.gauge("osteon_queue_length", queue, with("queue", "blocks"), static_cast<double>(health.stale_blocks));
   page.gauge("osteon_queue_length", queue, with("queue", "reader"), static_cast<double>(health.furthest_behind));
   page.gauge("osteon_sessions", "Haptic clients with an open session.", with(), static_cast<double>(health.sessions));
-  page.gauge("osteon_streams", "Open streams of viewers and audio clients.", with("kind", "mesh"), static_cast<double>(health.mesh_streams));
+  page.gauge("osteon_streams", "Open streams of viewers and audio clients.", with("kind", "mesh"),
+             static_cast<double>(health.mesh_streams));
   page.gauge("osteon_streams", "Open streams of viewers and audio clients.", with("kind", "cutting"),
              static_cast<double>(health.cutting_streams));
 
@@ -120,7 +123,8 @@ void tell_room(Page& page, OpenRoom& room, bool draining) {
   page.counter("osteon_cuts_total", cuts, with("outcome", "refused"), static_cast<double>(health.counts.refused));
   for (std::size_t i = 1; i < health.rejections.size(); ++i)
     page.counter("osteon_rejections_total", "Rejected cuts by reason, since the room was opened.",
-                 with("reason", i < kReasons.size() ? kReasons[i] : std::to_string(i)), static_cast<double>(health.rejections[i]));
+                 with("reason", i < kReasons.size() ? kReasons[i] : std::to_string(i)),
+                 static_cast<double>(health.rejections[i]));
 }
 
 class Figures final : public prometheus::Collectable {
@@ -141,9 +145,11 @@ class Figures final : public prometheus::Collectable {
       if (const Result<double> days = certificate_days_left(certificate_))
         page.gauge("osteon_certificate_days_left", "Until the server's certificate is over.", {}, *days);
     const LinkServerHealth links = server_.link_health();
-    page.gauge("osteon_links", "Fast paths, and those over which datagrams have come lately.", {{"state", "open"}}, static_cast<double>(links.links));
+    page.gauge("osteon_links", "Fast paths, and those over which datagrams have come lately.", {{"state", "open"}},
+               static_cast<double>(links.links));
     page.gauge("osteon_links", "", {{"state", "alive"}}, static_cast<double>(links.alive));
-    page.counter("osteon_strange_datagrams_total", "Datagrams that nobody with a key has sent.", {}, static_cast<double>(links.strangers));
+    page.counter("osteon_strange_datagrams_total", "Datagrams that nobody with a key has sent.", {},
+                 static_cast<double>(links.strangers));
     for (const std::shared_ptr<OpenRoom>& room : rooms) tell_room(page, *room, draining);
     return page.take();
   }
@@ -166,11 +172,13 @@ Metrics::~Metrics() = default;
 const std::string& Metrics::address() const { return impl_->address; }
 
 Result<std::unique_ptr<Metrics>> Metrics::start(const std::string& listen, RoomServer& server, const fs::path& certificate) {
-  const Result<HostPort> at = parse_host_port(listen.find(':') == std::string::npos ? "127.0.0.1:" + listen : listen, "--metrics");
+  const Result<HostPort> at =
+      parse_host_port(listen.find(':') == std::string::npos ? "127.0.0.1:" + listen : listen, "--metrics");
   if (!at) return tl::unexpected(at.error());
   if (!is_loopback(at->host))
-    return failure(ErrorCode::invalid_input, "--metrics " + listen + " is reachable from other machines, and whoever reaches it may read it; "
-                                                                     "use a port, or one with 127.0.0.1, [::1] or localhost");
+    return failure(ErrorCode::invalid_input, "--metrics " + listen +
+                                                 " is reachable from other machines, and whoever reaches it may read it; "
+                                                 "use a port, or one with 127.0.0.1, [::1] or localhost");
   auto impl = std::make_unique<Impl>();
   const std::string host = at->host == "localhost" ? "127.0.0.1" : at->host;
   impl->figures = std::make_shared<Figures>(server, certificate);
