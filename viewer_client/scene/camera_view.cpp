@@ -20,6 +20,16 @@ Look look_of(const CameraView& view, int width_px, int height_px) {
   return {view.eye_mm, view.target_mm, 2.0 * half_height / height_px, std::atan(half_height * std::hypot(1.0, shape))};
 }
 
+CameraView looking_as(const Look& look, const CameraView& now) {
+  const Vec3 sight = look.target_mm - look.eye_mm;
+  if (!(sight.norm() > 1e-6)) return now;
+  CameraView view = now;
+  view.eye_mm = look.eye_mm;
+  view.target_mm = look.target_mm;
+  view.up = across(Vec3::UnitZ(), sight.normalized(), across(-Vec3::UnitY(), sight.normalized(), Vec3::UnitX()));
+  return view;
+}
+
 CameraView overview(const Box& bone) {
   CameraView view;
   view.target_mm = 0.5 * (bone.min_mm + bone.max_mm);

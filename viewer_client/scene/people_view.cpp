@@ -1,0 +1,202 @@
+#include "viewer_client/scene/people_view.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdio>
+#include <set>
+
+#include "common/tools/cut_body.hpp"
+#include "common/tools/tool.hpp"
+
+namespace osteon {
+
+namespace {
+
+bool starts_character(char byte) { return (static_cast<unsigned char>(byte) & 0xc0) != 0x80; }  // UTF-8
+
+std::string tool_names(const std::vector<Digest>& tools) {
+  std::string names;
+  std::size_t unknown = 0;
+  for (const Digest& hash : tools) {
+    const auto known = std::ranges::find_if(builtin_tools(), [&](const Tool& tool) { return tool.hash() == hash; });
+    if (known == builtin_tools().end())
+      ++unknown;
+    else
+      names += (names.empty() ? "" : ", ") + known->name;
+  }
+  if (unknown != 0) names += (names.empty() ? "" : " and ") + std::to_string(unknown) + (unknown == 1 ? " other tool" : " other tools");
+  return names;
+}
+
+template <class... Number>
+std::string printed(const char* form, Number... number) {
+  char text[128];
+  std::snprintf(text, sizeof text, form, number...);
+  return text;
+}
+
+std::string radius_text(const ZoneLimit& zone) { return printed("%.1f mm", kQuantum_mm * zone.radius); }
+
+}  // namespace
+
+std::string wrapped(std::string_view text, std::size_t columns, std::size_t most) {
+  std::vector<std::string> lines(1);
+  std::size_t used = 0;  // characters of the last line
+  for (std::size_t at = 0; at < text.size();) {
+    if (static_cast<unsigned char>(text[at]) <= ' ') {
+      ++at;
+      continue;
+    }
+    std::size_t end = at, length = 0;
+    for (; end < text.size() && static_cast<unsigned char>(text[end]) > ' '; ++end) {
+      if (!starts_character(text[end])) continue;
+      if (length == columns) break;  // no word is longer than a line
+      ++length;
+    }
+    const bool glued = at > 0 && static_cast<unsigned char>(text[at - 1]) > ' ';
+    const std::size_t blank = used > 0 && !glued ? 1 : 0;
+    if (used > 0 && used + blank + length > columns) {
+      lines.emplace_back();
+      used = 0;
+    } else if (blank != 0) {
+      lines.back() += ' ';
+      ++used;
+    }
+    lines.back() += text.substr(at, end - at);
+    used += length;
+    at = end;
+  }
+  std::string out;
+  for (std::size_t i = 0; i < std::min(lines.size(), most); ++i) out += (i == 0 ? "" : "\n") + lines[i];
+  return lines.size() > most ? out + " ..." : out;
+}
+
+void PeopleView::take(const PeopleChange& change, Clock::time_point now) {
+  std::map<AuthorId, Person> before = people_;
+  if (change.complete) {
+    people_.clear();
+    annotations_.clear();
+  }
+  for (const Person& person : change.people) people_[person.author] = person;
+  for (const Annotation& drawn : change.annotations) annotations_[drawn.id] = drawn;
+  for (const std::uint32_t id : change.wiped) annotations_.erase(id);
+  room_seq_ = std::max(room_seq_, change.room_seq);
+
+  for (const Person& person : change.people) notice_decision(person, before[person.author].supervision, now);
+  for (const SaidWords& said : change.words) {
+    if (said.place <= newest_words_) continue;  // told again after a connection was lost
+    newest_words_ = said.place;
+    const auto addressee = people_.find(said.to);
+    const bool to_us = said.to && (said.to == self_ || (addressee != people_.end() && is_hand(addressee->second)));
+    const std::string to = !said.to ? "" : " to " + (to_us ? std::string("you") : name_of(said.to));
+    notice(name_of(said.from) + to + ": " + said.words, now);
+  }
+}
+
+void PeopleView::notice(std::string text, Clock::time_point now) {
+  if (notices_.size() == kMostNotices) notices_.pop_front();
+  notices_.push_back({now + kShown, std::move(text)});
+}
+
+bool PeopleView::is_hand(const Person& person) const {
+  if (hand_.empty()) return false;
+  const Result<Person> ours = find(hand_);
+  return ours && ours->author == person.author;
+}
+
+// Nobody says who decided what: where one alone is an instructor, they did.
+std::string PeopleView::overseer() const {
+  std::set<std::string> names;
+  for (const auto& [author, person] : people_)
+    if (person.role == Role::instructor) names.insert(name_of(author));
+  return names.size() == 1 ? *names.begin() : "An instructor";
+}
+
+void PeopleView::notice_decision(const Person& person, const Supervision& was, Clock::time_point now) {
+  const Supervision& is = person.supervision;
+  if (is == was) return;
+  const bool ours = is_hand(person);
+  const std::string whom = ours ? "you" : name_of(person.author), whose = ours ? "your" : name_of(person.author) + "'s";
+  std::vector<std::string> said;
+  if (is.stopped != was.stopped) said.push_back(overseer() + (is.stopped ? " has stopped " + whose + " hand" : " has set " + whose + " hand free"));
+  if (is.taken_by != was.taken_by)
+    said.push_back(is.taken_by ? name_of(is.taken_by) + " has taken over " + whose + " tool" : overseer() + " has given " + whose + " tool back");
+  if (is.guide != was.guide)
+    said.push_back(is.guide ? overseer() + " leads " + whose + " hand along the tool of " + name_of(is.guide)
+                            : overseer() + " leads " + whose + " hand no more");
+  if (is.force_limit != was.force_limit)
+    said.push_back(overseer() + (is.force_limit != 0 ? " limits " + whose + " force to " + printed("%.2f N", is.force_limit_n())
+                                                     : " limits " + whose + " force no more"));
+  if (is.zone != was.zone)
+    said.push_back(overseer() + " lets " + whom + " cut " + (is.zone ? "only within " + radius_text(*is.zone) + " of a point" : "everywhere"));
+  if (is.tools != was.tools)
+    said.push_back(overseer() + " lets " + whom + " cut with " + (is.tools.empty() ? "every tool" : tool_names(is.tools) + " only"));
+  if (is.words != was.words && !is.words.empty()) {
+    if (said.empty()) said.push_back(overseer() + " about " + whose + " hand");
+    said.back() += ": " + is.words;
+  }
+  for (std::string& text : said) notice(std::move(text), now);
+}
+
+Result<Person> PeopleView::find(std::string_view who) const {
+  const Person* found = nullptr;
+  if (who.starts_with('#')) {
+    std::uint64_t number = 0;
+    const auto [end, error] = std::from_chars(who.data() + 1, who.data() + who.size(), number);
+    const auto person = people_.find(AuthorId{number});
+    if (error == std::errc{} && end == who.data() + who.size() && person != people_.end()) found = &person->second;
+  }
+  std::string known;
+  for (const auto& [author, person] : people_) {
+    if (!person.name.empty() && person.name == who && (found == nullptr || person.here || !found->here)) found = &person;
+    if (person.here) known += (known.empty() ? "" : ", ") + name_of(author);
+  }
+  if (found != nullptr) return *found;
+  return failure(ErrorCode::not_found, "nobody is called " + std::string(who) + "; there are " + (known.empty() ? "none yet" : known));
+}
+
+std::string PeopleView::name_of(AuthorId author) const {
+  const auto person = people_.find(author);
+  return person != people_.end() && !person->second.name.empty() ? person->second.name : "#" + std::to_string(author.value);
+}
+
+std::map<AuthorId, std::string> PeopleView::names() const {
+  std::map<AuthorId, std::string> names;
+  for (const auto& [author, person] : people_) names.emplace(author, name_of(author));
+  return names;
+}
+
+std::vector<Annotation> PeopleView::annotations() const {
+  std::vector<Annotation> drawn;
+  for (const auto& [id, annotation] : annotations_) drawn.push_back(annotation);
+  return drawn;
+}
+
+std::vector<std::string> PeopleView::notices(Clock::time_point now) const {
+  std::vector<std::string> shown;
+  for (const Notice& notice : notices_)
+    if (now < notice.until) shown.push_back(notice.text);
+  return shown;
+}
+
+std::string PeopleView::holding() const {
+  if (hand_.empty()) return {};
+  const Result<Person> ours = find(hand_);
+  if (!ours) return {};
+  const Supervision& holds = ours->supervision;
+  std::string text;
+  const auto line = [&](const std::string& one) { text += (text.empty() ? "" : "\n") + one; };
+  if (holds.stopped) line("Your hand is stopped");
+  if (holds.taken_by) line(name_of(holds.taken_by) + " holds your tool");
+  if (holds.guide) line("Your hand is led along the tool of " + name_of(holds.guide));
+  if (holds.force_limit != 0) line("Force: " + printed("%.2f N", holds.force_limit_n()) + " at most");
+  if (holds.zone) {
+    const auto& at = holds.zone->centre;
+    line("Cut only within " + radius_text(*holds.zone) + printed(" of %.1f %.1f %.1f", kQuantum_mm * at[0], kQuantum_mm * at[1], kQuantum_mm * at[2]));
+  }
+  if (!holds.tools.empty()) line("Cut only with " + tool_names(holds.tools));
+  if (!holds.words.empty()) line(holds.words);
+  return text;
+}
+
+}  // namespace osteon
