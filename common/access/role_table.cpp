@@ -71,7 +71,7 @@ bool may_call(Role role, std::string_view method) {
   return row != nullptr && row->roles.has(role);
 }
 
-bool may_carry(Role role, Datagram kind) { return kCarried.at(static_cast<std::size_t>(kind)).has(role); }
+bool may_carry(Role role, DatagramContent kind) { return kCarried.at(static_cast<std::size_t>(kind)).has(role); }
 bool may_receive(Role role, StreamContent content) { return kContents.at(static_cast<std::size_t>(content)).has(role); }
 bool has_right(Role role, Right right) { return kGranted.at(static_cast<std::size_t>(right)).has(role); }
 

@@ -33,10 +33,10 @@ struct CallRow {
 [[nodiscard]] bool may_call(Role role, std::string_view method);
 
 // What a session's packets carry, up and down: proto/osteon/v1/link.proto.
-enum class Datagram : std::uint8_t { cuts, tool_state, bone_push, acknowledgements, committed_cuts, partners, supervision, bone_seen };
+enum class DatagramContent : std::uint8_t { cuts, tool_state, bone_push, acknowledgements, committed_cuts, partners, supervision, bone_seen };
 inline constexpr int kDatagrams = 8;
 // As sender of what goes up, as hearer of what comes down.
-[[nodiscard]] bool may_carry(Role role, Datagram kind);
+[[nodiscard]] bool may_carry(Role role, DatagramContent kind);
 
 // What streams tell. Of what a role may not be told the stream goes on without it.
 enum class StreamContent : std::uint8_t {

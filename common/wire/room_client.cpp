@@ -44,32 +44,36 @@ class RoomName {
   std::string name_;
 };
 
-// Puts the room's name on every call of a channel.
+// Puts the room's name and the ticket on every call of a channel.
 class RoomNamer final : public grpc::experimental::Interceptor {
  public:
-  explicit RoomNamer(std::string room) : room_(std::move(room)) {}
+  RoomNamer(std::string room, std::string ticket) : room_(std::move(room)), ticket_(std::move(ticket)) {}
   void Intercept(grpc::experimental::InterceptorBatchMethods* call) override {
-    if (!room_.empty() && call->QueryInterceptionHookPoint(grpc::experimental::InterceptionHookPoints::PRE_SEND_INITIAL_METADATA))
-      call->GetSendInitialMetadata()->insert({"osteon-room-bin", room_});
+    if (call->QueryInterceptionHookPoint(grpc::experimental::InterceptionHookPoints::PRE_SEND_INITIAL_METADATA)) {
+      if (!room_.empty()) call->GetSendInitialMetadata()->insert({"osteon-room-bin", room_});
+      if (!ticket_.empty()) call->GetSendInitialMetadata()->insert({"osteon-ticket", ticket_});
+    }
     call->Proceed();
   }
 
  private:
-  const std::string room_;  // which the call refers to until it is over
+  const std::string room_, ticket_;  // which the call refers to until it is over
 };
 
 class RoomNamers final : public grpc::experimental::ClientInterceptorFactoryInterface {
  public:
-  explicit RoomNamers(std::shared_ptr<const RoomName> room) : room_(std::move(room)) {}
+  RoomNamers(std::shared_ptr<const RoomName> room, Door door) : room_(std::move(room)), door_(std::move(door)) {}
   grpc::experimental::Interceptor* CreateClientInterceptor(grpc::experimental::ClientRpcInfo*) override {
-    return new RoomNamer(room_->get());  // which the call deletes
+    return new RoomNamer(room_ ? room_->get() : std::string(), ticket_text(door_));  // which the call deletes
   }
 
  private:
   const std::shared_ptr<const RoomName> room_;  // shared with whoever joined over this channel
+  const Door door_;
 };
 
-std::shared_ptr<grpc::Channel> make_channel(const std::string& address, ClientKind kind, const std::shared_ptr<const RoomName>& room) {
+std::shared_ptr<grpc::Channel> make_channel(const std::string& address, const std::shared_ptr<grpc::ChannelCredentials>& credentials,
+                                            ClientKind kind, const std::shared_ptr<const RoomName>& room, const Door& door) {
   // What fails is told in one sentence by the program, not in gRPC's own lines.
   gpr_set_log_function([](gpr_log_func_args*) {});
   grpc::ChannelArguments arguments;
@@ -83,9 +87,8 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address, ClientKi
   arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> namers;
-  if (room) namers.push_back(std::make_unique<RoomNamers>(room));
-  return grpc::experimental::CreateCustomChannelWithInterceptors(address, grpc::InsecureChannelCredentials(), arguments,
-                                                                 std::move(namers));
+  if (room || !door.ticket.empty()) namers.push_back(std::make_unique<RoomNamers>(room, door));
+  return grpc::experimental::CreateCustomChannelWithInterceptors(address, credentials, arguments, std::move(namers));
 }
 
 bool is_host_port(const std::string& address) {
@@ -96,11 +99,13 @@ bool is_host_port(const std::string& address) {
          std::stoi(port) > 0 && std::stoi(port) <= 65535;
 }
 
-Error nobody_answers(const std::string& address, std::chrono::milliseconds patience) {
+Error nobody_answers(const std::string& address, std::chrono::milliseconds patience, const Door& door) {
   const std::string seconds = std::to_string(patience.count() / 1000) +
                               (patience.count() % 1000 ? "." + std::to_string(patience.count() % 1000 / 100) : "");
   return {ErrorCode::unavailable, "no Osteon server answers at " + address + " within " + seconds +
-                                      " s; start osteon-server there or give its address with --server"};
+                                      " s; start osteon-server there or give its address with --server" +
+                                      (door.certificates.empty() ? ", or --certificates where it asks for them"
+                                                                 : ", or certificates of its own authority with --certificates")};
 }
 
 Error error_of(const grpc::Status& status, const std::string& server) {
@@ -108,6 +113,8 @@ Error error_of(const grpc::Status& status, const std::string& server) {
     case grpc::StatusCode::FAILED_PRECONDITION: return {ErrorCode::unsupported, status.error_message()};
     case grpc::StatusCode::INVALID_ARGUMENT: return {ErrorCode::invalid_input, status.error_message()};
     case grpc::StatusCode::NOT_FOUND: return {ErrorCode::not_found, status.error_message()};
+    case grpc::StatusCode::UNAUTHENTICATED:
+    case grpc::StatusCode::PERMISSION_DENIED: return {ErrorCode::denied, "the server lets you in no further: " + status.error_message()};
     case grpc::StatusCode::UNIMPLEMENTED:
       return {ErrorCode::unsupported, server + " is not an Osteon server of this version"};
     default:
@@ -116,16 +123,18 @@ Error error_of(const grpc::Status& status, const std::string& server) {
 }
 
 Result<std::shared_ptr<grpc::Channel>> reach(const std::string& address, const std::shared_ptr<const RoomName>& room, ClientKind kind,
-                                             std::chrono::milliseconds patience, const std::function<bool()>& stop) {
+                                             std::chrono::milliseconds patience, const std::function<bool()>& stop, const Door& door) {
   if (!is_host_port(address))
     return failure(ErrorCode::invalid_input, "the server's address " + address +
                                                  " is not HOST:PORT; give the one that osteon-server prints, such as 127.0.0.1:50151");
-  std::shared_ptr<grpc::Channel> channel = make_channel(address, kind, room);
+  const Result<std::shared_ptr<grpc::ChannelCredentials>> credentials = credentials_of(door, address);
+  if (!credentials) return tl::unexpected(credentials.error());
+  std::shared_ptr<grpc::Channel> channel = make_channel(address, *credentials, kind, room, door);
   // In short waits, so that a person who gives up is heard.
   const auto until = Clock::now() + patience;
   while (!channel->WaitForConnected(std::chrono::system_clock::now() + 50ms)) {
     if (stop && stop()) return failure(ErrorCode::cancelled, "stopped before the server at " + address + " answered");
-    if (Clock::now() >= until) return tl::unexpected(nobody_answers(address, patience));
+    if (Clock::now() >= until) return tl::unexpected(nobody_answers(address, patience, door));
   }
   return channel;
 }
@@ -163,14 +172,15 @@ Result<JoinedRoom> ask_to_join(JoinedRoom room, const v1::JoinRequest& request, 
 }  // namespace
 
 Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, ClientKind kind, std::chrono::milliseconds patience,
-                                                    const std::function<bool()>& stop) {
-  return reach(address, nullptr, kind, patience, stop);
+                                                    const std::function<bool()>& stop, const Door& door) {
+  return reach(address, nullptr, kind, patience, stop, door);
 }
 
 Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
-                             std::chrono::milliseconds patience, const std::function<bool()>& stop, const std::string& named) {
+                             std::chrono::milliseconds patience, const std::function<bool()>& stop, const std::string& named,
+                             const Door& door) {
   const auto calls_to = std::make_shared<RoomName>(named);  // shared with the channel
-  Result<std::shared_ptr<grpc::Channel>> channel = reach(address, calls_to, kind, patience, stop);
+  Result<std::shared_ptr<grpc::Channel>> channel = reach(address, calls_to, kind, patience, stop, door);
   if (!channel) return tl::unexpected(channel.error());
   JoinedRoom room;
   room.channel = std::move(*channel);

@@ -10,6 +10,7 @@
 #include "common/core/id.hpp"
 #include "common/core/result.hpp"
 #include "common/geometry/lattice.hpp"
+#include "common/wire/door.hpp"
 
 namespace grpc {
 class Channel;
@@ -34,15 +35,17 @@ struct JoinedRoom {
 };
 
 // A channel to the server, over which no room is named. Errors: invalid_input (`address` is not HOST:PORT), unavailable (nobody
-// answers there within `patience`, one sentence with the remedy), cancelled (`stop` returned true).
+// answers there within `patience`, one sentence with the remedy), cancelled (`stop` returned true), and those of credentials_of.
 [[nodiscard]] Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, ClientKind kind,
-                                                                  std::chrono::milliseconds patience, const std::function<bool()>& stop);
+                                                                  std::chrono::milliseconds patience, const std::function<bool()>& stop,
+                                                                  const Door& door = {});
 
 // `name`: the caller's, shown to others. `room`: which one; empty, the only one that is open. Errors: those of reach_server, and
-// unsupported (protocol or kernel version differ; the room is closed), not_found (there is no such room).
+// unsupported (protocol or kernel version differ; the room is closed), not_found (there is no such room), denied (who you are,
+// your ticket or your role does not let you in).
 [[nodiscard]] Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
                                            std::chrono::milliseconds patience, const std::function<bool()>& stop,
-                                           const std::string& room = {});
+                                           const std::string& room = {}, const Door& door = {});
 
 // The same author again over the same channel, after the stream or the server was lost. `kept`: the newest event that the
 // server said is kept, and its chain. Errors: unavailable (try again), any other (the room knows this client no more).

@@ -63,8 +63,12 @@ Result<Response> ask(const std::shared_ptr<grpc::Channel>& channel,
   const auto stub = v1::RoomService::NewStub(channel);
   const grpc::Status status = (stub.get()->*call)(&context, request, &response);
   if (status.ok()) return response;
-  const ErrorCode code = status.error_code() == grpc::StatusCode::INVALID_ARGUMENT ? ErrorCode::invalid_input : ErrorCode::unavailable;
-  return failure(code, status.error_message());
+  switch (status.error_code()) {
+    case grpc::StatusCode::INVALID_ARGUMENT: return failure(ErrorCode::invalid_input, status.error_message());
+    case grpc::StatusCode::PERMISSION_DENIED:
+    case grpc::StatusCode::UNAUTHENTICATED: return failure(ErrorCode::denied, status.error_message());
+    default: return failure(ErrorCode::unavailable, status.error_message());
+  }
 }
 
 template <class Response>
@@ -190,7 +194,7 @@ struct RoomWatch::Impl {
 
 Result<void> RoomWatch::Impl::join(std::chrono::milliseconds patience) {
   auto answer =
-      wire::join_room(options.address, wire::ClientKind::viewer, options.name, patience, [this] { return stopping(); }, options.room);
+      wire::join_room(options.address, wire::ClientKind::viewer, options.name, patience, [this] { return stopping(); }, options.room, options.door);
   if (!answer) return tl::unexpected(answer.error());
   const std::lock_guard lock(mutex);
   joined = std::move(*answer);
@@ -267,6 +271,9 @@ Result<void> RoomWatch::Impl::read_mesh_stream() {
   leave(mesh_context);
   if (outcome && !stopping()) {
     log::warn("mesh stream ended", {{"server", options.address}, {"reason", ended.error_message()}});
+    // Coming again would push out whoever took this viewer's place, or be refused for ever.
+    if (ended.error_code() == grpc::StatusCode::PERMISSION_DENIED || ended.error_code() == grpc::StatusCode::UNAUTHENTICATED)
+      return failure(ErrorCode::denied, "the server ended the session: " + ended.error_message());
   }
   return outcome;
 }

@@ -81,7 +81,7 @@ TEST(RoleTable, RefusesWhatItDoesNotKnow) {
 TEST(RoleTable, CarriesNothingOfAHandForThoseWhoHoldNone) {
   for (int kind = 0; kind < kDatagrams; ++kind)
     for (const Role role : kAll)
-      EXPECT_EQ(may_carry(role, static_cast<Datagram>(kind)),
+      EXPECT_EQ(may_carry(role, static_cast<DatagramContent>(kind)),
                 role == Role::trainee || role == Role::collaborator || role == Role::instructor)
           << to_string(role) << " " << kind;
 }

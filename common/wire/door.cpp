@@ -1,0 +1,78 @@
+#include "common/wire/door.hpp"
+
+#include <grpcpp/grpcpp.h>
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <fstream>
+#include <iterator>
+
+namespace osteon::wire {
+namespace {
+
+constexpr const char* kWays =
+    "--certificates DIR with --ticket FILE, as whoever runs the server gives them to you, or --plain for a server on this machine";
+
+Result<std::string> read_all(const std::filesystem::path& file, const char* what) {
+  std::ifstream in(file, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(in), {}};
+  if (in && !text.empty()) return text;
+  return failure(ErrorCode::not_found, file.string() + ", " + what + ", cannot be read; ask whoever runs the server for it");
+}
+
+}  // namespace
+
+void add_door_options(CLI::App& app, DoorArguments& arguments) {
+  app.add_option("--certificates", arguments.certificates, "Folder with ca.pem, person.pem and person.key: who the server is, and who you are");
+  app.add_option("--ticket", arguments.ticket, "File with the ticket that says which room you may come into, and in what role");
+  app.add_flag("--plain", arguments.plain, "Plain text without a certificate, to a server on this machine that was started so");
+}
+
+Result<Door> door_of(const DoorArguments& arguments) {
+  if (arguments.plain && (!arguments.certificates.empty() || !arguments.ticket.empty()))
+    return failure(ErrorCode::invalid_input, "--plain goes without --certificates and --ticket; give one or the other");
+  if (arguments.plain) return Door{};
+  if (arguments.certificates.empty() || arguments.ticket.empty()) return failure(ErrorCode::invalid_input, std::string("say how to come to the server: ") + kWays);
+  Door door{.certificates = arguments.certificates, .ticket = arguments.ticket};
+  if (const Result<std::string> ticket = read_all(door.ticket, "the ticket"); !ticket) return tl::unexpected(ticket.error());
+  for (const char* file : {"ca.pem", "person.pem", "person.key"})
+    if (const Result<std::string> read = read_all(door.certificates / file, "of --certificates"); !read) return tl::unexpected(read.error());
+  return door;
+}
+
+bool is_loopback(const std::string& host) {
+  if (host == "localhost" || host == "[::1]") return true;
+  // Four numbers: a name or a longer text is not taken for an address.
+  int parts[4] = {};
+  const char *at = host.data(), *last = at + host.size();
+  for (int i = 0; i < 4; ++i) {
+    const auto [end, error] = std::from_chars(at, last, parts[i]);
+    if (error != std::errc{} || parts[i] < 0 || parts[i] > 255) return false;
+    at = end;
+    if (i < 3 && (at == last || *at++ != '.')) return false;
+  }
+  return at == last && parts[0] == 127;
+}
+
+Result<std::shared_ptr<grpc::ChannelCredentials>> credentials_of(const Door& door, const std::string& address) {
+  if (door.certificates.empty()) {
+    if (is_loopback(address.substr(0, address.rfind(':')))) return grpc::InsecureChannelCredentials();
+    return failure(ErrorCode::invalid_input, "plain text goes to a server on this machine alone, and " + address + " is another; give --certificates DIR with --ticket FILE");
+  }
+  const Result<std::string> authority = read_all(door.certificates / "ca.pem", "the authority's certificate"),
+                            certificate = read_all(door.certificates / "person.pem", "your certificate"),
+                            key = read_all(door.certificates / "person.key", "your key");
+  for (const auto* file : {&authority, &certificate, &key})
+    if (!*file) return tl::unexpected(file->error());
+  return grpc::SslCredentials({.pem_root_certs = *authority, .pem_private_key = *key, .pem_cert_chain = *certificate});
+}
+
+std::string ticket_text(const Door& door) {
+  if (door.ticket.empty()) return {};
+  std::ifstream in(door.ticket);
+  std::string text;
+  in >> text;  // without the line's end
+  return text;
+}
+
+}  // namespace osteon::wire

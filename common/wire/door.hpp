@@ -1,0 +1,40 @@
+// How a client comes to a server: by what it proves who it is, and the channel that says so with every call.
+#pragma once
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "common/core/result.hpp"
+
+namespace CLI {  // NOLINT(readability-identifier-naming): the library's
+class App;
+}
+namespace grpc {
+class ChannelCredentials;
+}
+
+namespace osteon::wire {
+
+struct Door {
+  std::filesystem::path certificates;  // folder with ca.pem, person.pem, person.key; empty: plain text, to this machine alone
+  std::filesystem::path ticket;        // file with the ticket; read again for every call, so that it can be renewed
+};
+
+// What a program is told on its command line.
+struct DoorArguments {
+  bool plain = false;
+  std::filesystem::path certificates, ticket;
+};
+// --plain, --certificates and --ticket.
+void add_door_options(CLI::App& app, DoorArguments& arguments);
+// Errors: invalid_input (neither or both ways were given), not_found (a file is not there); the sentence says what to give.
+[[nodiscard]] Result<Door> door_of(const DoorArguments& arguments);
+
+// Whether only this machine is reached there: localhost, [::1] or four numbers that begin with 127.
+[[nodiscard]] bool is_loopback(const std::string& host);
+// Errors: not_found (a file of `door`), invalid_input (plain text to `address`, HOST:PORT, of another machine).
+[[nodiscard]] Result<std::shared_ptr<grpc::ChannelCredentials>> credentials_of(const Door& door, const std::string& address);
+// As it goes with a call; empty where there is none to be read.
+[[nodiscard]] std::string ticket_text(const Door& door);
+
+}  // namespace osteon::wire

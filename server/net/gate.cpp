@@ -1,0 +1,338 @@
+#include "server/net/gate.hpp"
+
+#include <grpcpp/grpcpp.h>
+#include <grpcpp/security/auth_metadata_processor.h>
+#include <grpcpp/security/server_credentials.h>
+#include <grpcpp/security/tls_certificate_provider.h>
+#include <grpcpp/security/tls_credentials_options.h>
+
+#include <algorithm>
+#include <atomic>
+#include <fstream>
+#include <iterator>
+#include <utility>
+
+#include "common/runtime/log.hpp"
+
+namespace osteon {
+namespace {
+
+constexpr std::size_t kMostRemembered = 4096;  // certificates, and tickets
+constexpr unsigned kCertificatesEverySeconds = 1;
+
+UnixTime system_now() { return std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now()); }
+
+Result<std::string> read_all(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(in), {}};
+  if (in && !text.empty()) return text;
+  return failure(ErrorCode::not_found, file.string() + " cannot be read; deploy/certs makes what --certificates needs");
+}
+
+std::string article(Role role) {
+  const std::string name(to_string(role));
+  return (std::string_view("aeiou").find(name.front()) == std::string_view::npos ? "a " : "an ") + name;
+}
+
+// "RoomService/Undo" of "/osteon.v1.RoomService/Undo".
+std::string_view short_name(std::string_view method) {
+  const std::size_t dot = method.rfind('.');
+  return dot == std::string_view::npos ? method : method.substr(dot + 1);
+}
+
+std::string changed_role(Role role) { return "your role has changed to " + std::string(to_string(role)) + "; join anew"; }
+
+template <class Map>
+void make_space(Map& map) {
+  if (map.size() >= kMostRemembered) map.clear();
+}
+
+// What comes once or not at all; nothing where it came twice: two readers might take different ones.
+std::optional<std::string_view> only(const grpc::AuthMetadataProcessor::InputMetadata& metadata, const char* key) {
+  const auto [first, last] = metadata.equal_range(key);
+  if (first == last) return std::string_view();
+  if (std::next(first) != last) return {};
+  return std::string_view(first->second.data(), first->second.size());
+}
+
+// gRPC asks it before every call, known or not, and before anything of the call's message is read.
+class Doorkeeper final : public grpc::AuthMetadataProcessor {
+ public:
+  explicit Doorkeeper(Gate& gate) : gate_(gate) {}
+  bool IsBlocking() const override { return false; }
+  grpc::Status Process(const InputMetadata& metadata, grpc::AuthContext* context, OutputMetadata*, OutputMetadata*) override {
+    const auto pem = context->FindPropertyValues(GRPC_X509_PEM_CERT_PROPERTY_NAME);
+    const auto ticket = only(metadata, "osteon-ticket"), room = only(metadata, "osteon-room-bin"), path = only(metadata, ":path");
+    if (pem.size() != 1) return {grpc::StatusCode::UNAUTHENTICATED, "no certificate came with the connection; give one with --certificates"};
+    if (!ticket || !room || !path || path->empty())
+      return {grpc::StatusCode::INVALID_ARGUMENT, "the call says twice which ticket or room is meant"};
+    const auto caller = gate_.admit({{pem[0].data(), pem[0].size()}, *ticket, *room, *path});
+    if (caller) return grpc::Status::OK;
+    return {caller.error().is_known ? grpc::StatusCode::PERMISSION_DENIED : grpc::StatusCode::UNAUTHENTICATED, caller.error().sentence};
+  }
+
+ private:
+  Gate& gate_;
+};
+
+}  // namespace
+
+class Gate::Watched final : public OpenStream {
+ public:
+  Watched(Gate& gate, Caller who, std::string in, AuthorId as, std::string_view what, End when)
+      : caller(std::move(who)), room(std::move(in)), author(as), method(what), gate_(gate), end_(std::move(when)), role_(caller.role) {}
+  ~Watched() override {
+    const std::lock_guard lock(gate_.mutex_);
+    gate_.streams_.remove_if([](const std::weak_ptr<Watched>& stream) { return stream.expired(); });
+  }
+  Role role() const override { return role_; }
+  void set_role(Role role) { role_ = role; }
+  [[nodiscard]] bool ended() const { return ended_; }
+  // Once.
+  void end(const Refusal& why) {
+    role_ = Role::none;
+    if (!ended_.exchange(true)) end_(why);
+  }
+
+  Caller caller;  // under the gate's mutex
+  const std::string room;
+  const AuthorId author;
+  const std::string method;
+
+ private:
+  Gate& gate_;
+  const End end_;
+  std::atomic<bool> ended_ = false;
+  std::atomic<Role> role_;
+};
+
+Gate::Gate(std::filesystem::path folder, TicketCheckKey key, RefusalCounts& counts, Now now)
+    : folder_(std::move(folder)), key_(key), refusals_(counts), now_(now ? std::move(now) : Now(system_now)), access_(folder_ / "access.txt") {}
+
+Gate::~Gate() {
+  if (!thread_.joinable()) return;
+  {
+    const std::lock_guard lock(mutex_);
+    end_ = true;
+  }
+  wake_.notify_all();
+  thread_.join();
+}
+
+Result<std::unique_ptr<Gate>> Gate::open(const std::filesystem::path& folder, RefusalCounts& counts, Now now) {
+  const Result<std::string> authority = read_all(folder / "ca.pem"), certificate = read_all(folder / "server.pem"),
+                            secret = read_all(folder / "server.key"), check = read_all(folder / "tickets.pub");
+  for (const auto* file : {&authority, &certificate, &secret, &check})
+    if (!*file) return tl::unexpected(file->error());
+  if (const Result<void> pair = check_key_pair(*certificate, *secret); !pair)
+    return failure(ErrorCode::invalid_input, (folder / "server.pem").string() + " and server.key: " + pair.error().message +
+                                                 "; make both anew with deploy/certs server");
+  const Result<TicketCheckKey> key = parse_check_key(*check);
+  if (!key) return failure(ErrorCode::invalid_input, (folder / "tickets.pub").string() + ": " + key.error().message);
+  std::unique_ptr<Gate> gate(new Gate(folder, *key, counts, std::move(now)));
+  // A list that is wrong at the start would let in whom it is to keep out.
+  if (const Result<bool> read = gate->access_.refresh(); !read) return tl::unexpected(read.error());
+  gate->thread_ = std::thread([raw = gate.get()] { raw->run(); });
+  return gate;
+}
+
+std::shared_ptr<grpc::ServerCredentials> Gate::credentials() {
+  // Read again while the server runs; a renewed certificate disturbs nobody who is in.
+  const auto files = std::make_shared<grpc::experimental::FileWatcherCertificateProvider>(  // shared with gRPC
+      (folder_ / "server.key").string(), (folder_ / "server.pem").string(), (folder_ / "ca.pem").string(), kCertificatesEverySeconds);
+  grpc::experimental::TlsServerCredentialsOptions options(files);
+  options.watch_root_certs();
+  options.watch_identity_key_cert_pairs();
+  options.set_cert_request_type(GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
+  auto credentials = grpc::experimental::TlsServerCredentials(options);
+  credentials->SetAuthMetadataProcessor(std::make_shared<Doorkeeper>(*this));  // shared with gRPC
+  return credentials;
+}
+
+Result<PersonCertificate> Gate::certificate_of(std::string_view pem) {
+  if (const auto known = certificates_.find(std::string(pem)); known != certificates_.end()) return known->second;
+  Result<PersonCertificate> read = read_person_certificate(pem);
+  if (!read) return read;
+  make_space(certificates_);
+  return certificates_.emplace(pem, std::move(*read)).first->second;
+}
+
+Result<Ticket> Gate::ticket_of(std::string_view text) {
+  if (const auto known = tickets_.find(std::string(text)); known != tickets_.end()) return known->second;
+  Result<Ticket> opened = open_ticket(text, key_);
+  if (!opened) return opened;
+  make_space(tickets_);
+  return tickets_.emplace(text, std::move(*opened)).first->second;
+}
+
+std::optional<Refusal> Gate::judge_again(Caller& caller, const std::string& room, std::string_view method) const {
+  const UnixTime now = now_();
+  if (now >= caller.certificate_ends) return Refusal{"certificate", false, "the certificate has expired; ask for a new one"};
+  if (const auto revoked = access_.list().refuses(caller.serial, caller.user, caller.ticket_id)) return Refusal{"revoked", false, *revoked};
+  Ticket ticket;
+  ticket.expires = caller.ends;
+  if (const Result<void> in_time = check_time(ticket, now); !in_time)
+    return Refusal{"ticket", false, in_time.error().message};
+  caller.role = access_.list().role(caller.user, room, caller.ticket_role);
+  if (method.empty() || may_call(caller.role, method)) return {};
+  if (!find_call(method)) return Refusal{"call", true, "this server has no such call"};
+  return Refusal{"role", true, article(caller.role) + " may not call " + std::string(short_name(method)) +
+                                   "; ask whoever runs the server for a ticket of another role"};
+}
+
+tl::expected<Caller, Refusal> Gate::judge(const CallClaims& call) {
+  const std::lock_guard lock(mutex_);
+  const auto refused = [](std::string_view reason, bool is_known, std::string sentence) {
+    return tl::unexpected(Refusal{reason, is_known, std::move(sentence)});
+  };
+  const Result<PersonCertificate> certificate = certificate_of(call.certificate_pem);
+  if (!certificate) return refused("certificate", false, certificate.error().message);
+  if (call.ticket.empty()) return refused("ticket", false, "no ticket came with the call; give one with --ticket FILE");
+  const Result<Ticket> ticket = ticket_of(call.ticket);
+  if (!ticket) return refused("ticket", false, ticket.error().message);
+  if (ticket->user != certificate->user)
+    return refused("person", true, "the ticket is for " + ticket->user + " and the certificate for " + certificate->user + "; come with your own");
+  if (!call.room.empty())
+    if (const Result<void> here = check_room(*ticket, call.room); !here) return refused("room", true, here.error().message);
+  Caller caller{.user = certificate->user,
+                .serial = certificate->serial,
+                .ticket_id = to_hex(ticket->id),
+                .ticket_room = ticket->room,
+                .ticket_role = ticket->role,
+                .role = ticket->role,
+                .ends = ticket->expires,
+                .certificate_ends = certificate->ends};
+  const std::string room(call.room.empty() ? std::string_view(ticket->room) : call.room);
+  if (std::optional<Refusal> refusal = judge_again(caller, room, call.method)) return tl::unexpected(std::move(*refusal));
+  return caller;
+}
+
+tl::expected<Caller, Refusal> Gate::admit(const CallClaims& call) {
+  auto caller = judge(call);
+  bool is_new = false;
+  std::string who = "a certificate without a name";
+  {
+    const std::lock_guard lock(mutex_);
+    ++(caller ? counts_.admitted : counts_.refused);
+    if (caller) return caller;
+    if (const Result<PersonCertificate> certificate = certificate_of(call.certificate_pem)) who = certificate->user;
+    is_new = log_.is_new(who, caller.error().sentence);
+  }
+  refusals_.count(caller.error().reason);
+  if (is_new) log::warn("refused", {{"who", who}, {"reason", caller.error().reason}, {"said", caller.error().sentence}});
+  return caller;
+}
+
+Result<void> Gate::check_resume(const Caller& caller, const std::string& room, int kind, AuthorId author) const {
+  const std::lock_guard lock(mutex_);
+  const Seat seat{room, caller.user, kind};
+  if (const auto known = authors_.find({room, author}); known != authors_.end()) {
+    if (known->second.seat != seat) return failure(ErrorCode::denied, "author " + std::to_string(author.value) + " is another person's; join anew");
+    if (known->second.role != caller.role) return failure(ErrorCode::denied, changed_role(caller.role));
+  }
+  if (const auto taken = seats_.find(seat); taken != seats_.end() && taken->second != author)
+    return failure(ErrorCode::denied, "a newer session of " + caller.user + " took the place of this one; join anew to take it back");
+  return {};
+}
+
+void Gate::joined(const Caller& caller, const std::string& room, int kind, AuthorId author) {
+  std::vector<std::shared_ptr<Watched>> held, displaced;  // let go of without the lock, which their end takes
+  {
+    const std::lock_guard lock(mutex_);
+    const Seat seat{room, caller.user, kind};
+    AuthorId& sitting = seats_[seat];
+    if (sitting && sitting != author) {
+      ++counts_.displaced;
+      authors_.erase({room, sitting});
+      for (const std::weak_ptr<Watched>& weak : streams_) held.push_back(weak.lock());
+      std::ranges::copy_if(held, std::back_inserter(displaced), [&](const std::shared_ptr<Watched>& stream) {
+        return stream && stream->room == room && stream->author == sitting;
+      });
+    }
+    sitting = author;
+    authors_[{room, author}] = {seat, caller.role};
+  }
+  const Refusal why{"displaced", true, "a newer session of " + caller.user + " took the place of this one"};
+  for (const std::shared_ptr<Watched>& stream : displaced) stream->end(why);
+}
+
+Result<void> Gate::check_author(const Caller& caller, const std::string& room, AuthorId author) const {
+  const std::lock_guard lock(mutex_);
+  const auto known = authors_.find({room, author});
+  if (known != authors_.end() && std::get<1>(known->second.seat) == caller.user) {
+    if (known->second.role == caller.role) return {};
+    return failure(ErrorCode::denied, changed_role(caller.role));
+  }
+  return failure(ErrorCode::denied, "author " + std::to_string(author.value) + " is not yours in this room, or no more; join anew");
+}
+
+void Gate::forget_room(const std::string& room) {
+  const std::lock_guard lock(mutex_);
+  std::erase_if(seats_, [&](const auto& seat) { return std::get<0>(seat.first) == room; });
+  std::erase_if(authors_, [&](const auto& author) { return author.first.first == room; });
+}
+
+std::shared_ptr<OpenStream> Gate::enter(const Caller& caller, const std::string& room, AuthorId author, std::string_view method, End end) {
+  auto stream = std::make_shared<Watched>(*this, caller, room, author, method, std::move(end));  // shared with look() while it ends it
+  const std::lock_guard lock(mutex_);
+  streams_.push_back(stream);
+  return stream;
+}
+
+GateCounts Gate::counts() const {
+  const std::lock_guard lock(mutex_);
+  GateCounts counts = counts_;
+  counts.streams = streams_.size();
+  return counts;
+}
+
+void Gate::refresh() {
+  const Result<bool> read = access_.refresh();
+  const std::string fault = read ? std::string() : read.error().message;
+  if (read && *read) log::info("access list", {{"entries", access_.list().size()}});
+  if (!fault.empty() && fault != access_fault_) log::error("access list", {{"fault", fault}});
+  access_fault_ = fault;
+}
+
+void Gate::look() {
+  std::vector<std::pair<std::shared_ptr<Watched>, Refusal>> ending;
+  std::vector<std::shared_ptr<Watched>> held;  // let go of without the lock, which their end takes
+  {
+    const std::lock_guard lock(mutex_);
+    refresh();
+    for (const std::weak_ptr<Watched>& weak : streams_) {
+      std::shared_ptr<Watched> stream = weak.lock();
+      if (!stream || stream->ended()) {
+        held.push_back(std::move(stream));
+        continue;
+      }
+      const Role before = stream->caller.role;
+      std::optional<Refusal> refusal = judge_again(stream->caller, stream->room, stream->method);
+      // The room knows the role in which somebody joined.
+      if (!refusal && stream->caller.role != before) refusal = Refusal{"role", true, changed_role(stream->caller.role)};
+      if (refusal) {
+        stream->set_role(Role::none);
+        ++counts_.ended;
+        ending.emplace_back(stream, std::move(*refusal));
+      }
+      held.push_back(std::move(stream));
+    }
+  }
+  for (const auto& [stream, why] : ending) {
+    refusals_.count(why.reason);
+    log::warn("stream ended", {{"who", stream->caller.user}, {"reason", why.reason}, {"said", why.sentence}});
+    stream->end(why);
+  }
+}
+
+void Gate::run() {
+  std::unique_lock lock(mutex_);
+  while (!end_) {
+    lock.unlock();
+    look();
+    lock.lock();
+    wake_.wait_for(lock, kLookEvery, [this] { return end_; });
+  }
+}
+
+}  // namespace osteon

@@ -1,0 +1,144 @@
+// Who is let in: looks at the certificate, the ticket and the list of who was revoked before every call, and again several
+// times a second for as long as a stream is open. The one place where a call is refused for who makes it.
+#pragma once
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <list>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <tuple>
+#include <unordered_map>
+#include <vector>
+
+#include "common/access/access_list.hpp"
+#include "common/access/role_table.hpp"
+#include "common/access/ticket.hpp"
+#include "common/core/id.hpp"
+#include "server/net/person_certificate.hpp"
+#include "server/net/refusal_log.hpp"
+#include "server/net/refusals.hpp"
+
+namespace grpc {
+class ServerCredentials;
+}
+
+namespace osteon {
+
+// A person who was let in.
+struct Caller {
+  std::string user;  // of the certificate
+  std::string serial, ticket_id;
+  std::string ticket_room;           // of the ticket; kAnyRoom: of every room
+  Role ticket_role = Role::none;     // of the ticket
+  Role role = Role::none;            // what holds now
+  UnixTime ends{};                   // of the ticket
+  UnixTime certificate_ends{};
+};
+
+// Why somebody was not.
+struct Refusal {
+  std::string_view reason;    // a fixed word, for counting
+  bool is_known = false;      // it is clear who it is, but that person may not do this
+  std::string sentence;       // for the caller
+};
+
+// What is looked at of a call.
+struct CallClaims {
+  std::string_view certificate_pem;  // of the connection
+  std::string_view ticket;           // metadata osteon-ticket; empty: none came
+  std::string_view room;             // metadata osteon-room-bin; empty: none came
+  std::string_view method;           // full name; empty: whatever it is
+};
+
+// A stream that is open. Its end is heard of, or it is told to end, whatever comes first.
+class OpenStream {
+ public:
+  virtual ~OpenStream() = default;
+  [[nodiscard]] virtual Role role() const = 0;  // what holds now
+};
+
+struct GateCounts {
+  std::uint64_t admitted = 0, refused = 0, ended = 0, displaced = 0;  // calls, calls, streams, sessions
+  std::size_t streams = 0;                                           // open now
+};
+
+// Any thread.
+class Gate {
+ public:
+  static constexpr std::chrono::milliseconds kLookEvery{250};
+  using Now = std::function<UnixTime()>;
+
+  // `folder`: ca.pem, server.pem, server.key, tickets.pub, and access.txt where somebody was revoked. The first three are read
+  // again when they change. `counts` outlives it. Errors: not_found, invalid_input; the sentence names the file.
+  [[nodiscard]] static Result<std::unique_ptr<Gate>> open(const std::filesystem::path& folder, RefusalCounts& counts, Now now = {});
+  ~Gate();
+  Gate(const Gate&) = delete;
+  Gate& operator=(const Gate&) = delete;
+
+  // Mutual TLS, with this gate before every call. It outlives the server.
+  [[nodiscard]] std::shared_ptr<grpc::ServerCredentials> credentials();
+
+  [[nodiscard]] tl::expected<Caller, Refusal> judge(const CallClaims& call);
+  // The same, counted, and logged once for each person and reason.
+  [[nodiscard]] tl::expected<Caller, Refusal> admit(const CallClaims& call);
+
+  // Who may be who in a room. `kind`: of client. Errors denied: the identity is another person's or of another role, or a newer
+  // one of the same person took its place.
+  [[nodiscard]] Result<void> check_resume(const Caller& caller, const std::string& room, int kind, AuthorId author) const;
+  // From now on this identity is the caller's. An earlier one of the same person, room and kind is nobody's, and its streams end.
+  void joined(const Caller& caller, const std::string& room, int kind, AuthorId author);
+  [[nodiscard]] Result<void> check_author(const Caller& caller, const std::string& room, AuthorId author) const;
+  // A room that is closed: its identities mean nothing any more.
+  void forget_room(const std::string& room);
+
+  // `end` is called once, on a thread of the gate's own, when the caller may have the stream no more; not after the result has
+  // been destroyed, except while that happens.
+  using End = std::function<void(const Refusal& why)>;
+  [[nodiscard]] std::shared_ptr<OpenStream> enter(const Caller& caller, const std::string& room, AuthorId author, std::string_view method,
+                                                  End end);
+  [[nodiscard]] GateCounts counts() const;
+  void look();  // at all streams, now
+
+ private:
+  class Watched;
+  Gate(std::filesystem::path folder, TicketCheckKey key, RefusalCounts& counts, Now now);
+  // Under mutex_. What changes while somebody is in: revocations, ends and roles. Sets the role that holds.
+  [[nodiscard]] std::optional<Refusal> judge_again(Caller& caller, const std::string& room, std::string_view method) const;
+  [[nodiscard]] Result<PersonCertificate> certificate_of(std::string_view pem);  // under mutex_, as the next two
+  [[nodiscard]] Result<Ticket> ticket_of(std::string_view text);
+  void refresh();
+  void run();
+
+  const std::filesystem::path folder_;
+  const TicketCheckKey key_;
+  RefusalCounts& refusals_;
+  const Now now_;
+  mutable std::mutex mutex_;
+  AccessFile access_;
+  std::string access_fault_;  // that was logged last
+  std::unordered_map<std::string, PersonCertificate> certificates_;  // by PEM, of those seen lately
+  std::unordered_map<std::string, Ticket> tickets_;            // by text, of those seen lately
+  RefusalLog log_;
+  using Seat = std::tuple<std::string, std::string, int>;      // room, user, kind
+  std::map<Seat, AuthorId> seats_;
+  struct Member {
+    Seat seat;
+    Role role = Role::none;  // that the room knows of, from when they joined
+  };
+  std::map<std::pair<std::string, AuthorId>, Member> authors_;
+  std::list<std::weak_ptr<Watched>> streams_;
+  GateCounts counts_;
+  std::condition_variable wake_;
+  bool end_ = false;
+  std::thread thread_;
+};
+
+}  // namespace osteon

@@ -1,0 +1,159 @@
+#include "server/net/listener.hpp"
+
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <memory>
+#include <optional>
+#include <system_error>
+
+namespace osteon {
+namespace {
+
+constexpr int kWaiting = 128;       // that the system keeps until they are accepted
+constexpr int kPauseMs = 100;       // when there is no descriptor for a connection
+constexpr int kAcceptedAtOnce = 64;
+
+tl::unexpected<Error> refused_by_system(int reason) {
+  if (reason == EADDRINUSE) return failure(ErrorCode::exists, "the port is in use by another program");
+  return failure(ErrorCode::unavailable, std::generic_category().message(reason));
+}
+
+// A descriptor that listens there; otherwise the reason, negative.
+int listen_at(const addrinfo& address, int port) {
+  sockaddr_storage at{};
+  std::copy_n(reinterpret_cast<const char*>(address.ai_addr), address.ai_addrlen, reinterpret_cast<char*>(&at));
+  (address.ai_family == AF_INET6 ? reinterpret_cast<sockaddr_in6&>(at).sin6_port : reinterpret_cast<sockaddr_in&>(at).sin_port) =
+      htons(static_cast<std::uint16_t>(port));
+  const int socket = ::socket(address.ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (socket < 0) return -errno;
+  const int yes = 1;
+  ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  if (address.ai_family == AF_INET6) ::setsockopt(socket, IPPROTO_IPV6, IPV6_V6ONLY, &yes, sizeof yes);
+  if (::bind(socket, reinterpret_cast<const sockaddr*>(&at), address.ai_addrlen) == 0 && ::listen(socket, kWaiting) == 0) return socket;
+  const int reason = errno;
+  ::close(socket);
+  return -reason;
+}
+
+int port_of(int socket) {
+  sockaddr_storage at{};
+  socklen_t size = sizeof at;
+  if (::getsockname(socket, reinterpret_cast<sockaddr*>(&at), &size) != 0) return 0;
+  return ntohs(at.ss_family == AF_INET6 ? reinterpret_cast<sockaddr_in6&>(at).sin6_port : reinterpret_cast<sockaddr_in&>(at).sin_port);
+}
+
+std::optional<std::uint64_t> inode_of(int descriptor) {
+  struct stat about {};
+  if (::fstat(descriptor, &about) != 0) return {};
+  return about.st_ino;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Listener>> Listener::open(const std::string& host, int port, std::size_t most) {
+  const std::string name = host.starts_with('[') && host.ends_with(']') ? host.substr(1, host.size() - 2) : host;
+  addrinfo hints{}, *found = nullptr;
+  hints.ai_socktype = SOCK_STREAM;
+  hints.ai_flags = AI_PASSIVE;
+  if (const int unknown = ::getaddrinfo(name.c_str(), nullptr, &hints, &found); unknown != 0)
+    return failure(ErrorCode::unavailable, ::gai_strerror(unknown));
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses(found, ::freeaddrinfo);
+  std::unique_ptr<Listener> listener(new Listener(most));
+  listener->port_ = port;
+  int lacking = EADDRNOTAVAIL;
+  for (const addrinfo* address = found; address; address = address->ai_next) {
+    if (address->ai_family != AF_INET && address->ai_family != AF_INET6) continue;
+    // All at one port: the first one's, where the system chooses.
+    const int socket = listen_at(*address, listener->port_);
+    if (socket >= 0) {
+      listener->sockets_.push_back(socket);
+      listener->port_ = port_of(socket);
+    } else if (socket == -EADDRNOTAVAIL || socket == -EAFNOSUPPORT) {
+      lacking = -socket;  // localhost has an address of each family, and a machine may lack one of them
+    } else {
+      return refused_by_system(-socket);
+    }
+  }
+  if (listener->sockets_.empty()) return refused_by_system(lacking);
+  listener->wake_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  if (listener->wake_ < 0) return refused_by_system(errno);
+  return listener;
+}
+
+Listener::~Listener() {
+  stop();
+  if (wake_ >= 0) ::close(wake_);
+}
+
+void Listener::start(std::function<void(int, int)> take) {
+  take_ = std::move(take);
+  thread_ = std::thread([this] { run(); });
+}
+
+void Listener::stop() {
+  if (thread_.joinable()) {
+    const std::uint64_t one = 1;
+    (void)!::write(wake_, &one, sizeof one);
+    thread_.join();
+  }
+  for (const int socket : sockets_) ::close(socket);
+  sockets_.clear();
+}
+
+void Listener::run() {
+  std::vector<pollfd> all;
+  for (const int socket : sockets_) all.push_back({socket, POLLIN, 0});
+  all.push_back({wake_, POLLIN, 0});
+  while (true) {
+    if (::poll(all.data(), all.size(), -1) < 0 && errno != EINTR) return;
+    if (all.back().revents != 0) return;
+    for (std::size_t i = 0; i + 1 < all.size(); ++i)
+      if (all[i].revents != 0) accept_from(all[i].fd);
+  }
+}
+
+void Listener::accept_from(int listening) {
+  for (int i = 0; i < kAcceptedAtOnce; ++i) {
+    const int descriptor = ::accept4(listening, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    if (descriptor < 0) {
+      if (errno == EAGAIN || errno == EWOULDBLOCK) return;
+      if (errno == EINTR || errno == ECONNABORTED) continue;
+      // Without descriptors or memory the caller waits in the system's queue until there are some again.
+      ++failed_;
+      pollfd end{wake_, POLLIN, 0};
+      (void)::poll(&end, 1, kPauseMs);
+      return;
+    }
+    const auto inode = inode_of(descriptor);
+    // Only when it matters is looked which of the others are still there.
+    if (!inode || (taken_.size() >= most_ && still_open() >= most_)) {
+      ++refused_;
+      ::close(descriptor);
+      continue;
+    }
+    const int yes = 1;
+    ::setsockopt(descriptor, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+    taken_.emplace(descriptor, *inode);
+    open_ = taken_.size();
+    ++accepted_;
+    take_(listening, descriptor);
+  }
+}
+
+std::size_t Listener::still_open() {
+  std::erase_if(taken_, [](const auto& connection) { return inode_of(connection.first) != connection.second; });
+  open_ = taken_.size();
+  return taken_.size();
+}
+
+ListenerCounts Listener::counts() const { return {open_, accepted_, refused_, failed_}; }
+
+}  // namespace osteon

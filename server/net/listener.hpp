@@ -1,0 +1,58 @@
+// Accepts connections and hands them on, as many as are allowed at a time. gRPC 1.51 stops listening for good when the process
+// has no descriptor left for a connection (CVE-2023-4785), and counts none: so the server accepts for itself.
+#pragma once
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <set>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "common/core/result.hpp"
+
+namespace osteon {
+
+struct ListenerCounts {
+  std::size_t open = 0;                      // connections, as far as was looked
+  std::uint64_t accepted = 0, refused = 0;   // beyond the limit: closed at once
+  std::uint64_t failed = 0;                  // accept() could not, as without descriptors
+};
+
+class Listener {
+ public:
+  // `host`: a name or an address, [IPv6] in brackets; every address of it is listened on. `port` 0: the system chooses. Errors:
+  // exists (the port is in use), unavailable (the system refuses for the reason in the message).
+  [[nodiscard]] static Result<std::unique_ptr<Listener>> open(const std::string& host, int port, std::size_t most);
+  ~Listener();
+  Listener(const Listener&) = delete;
+  Listener& operator=(const Listener&) = delete;
+
+  [[nodiscard]] int port() const { return port_; }
+  // From now on `take(listening, descriptor)` is called with every connection, which it owns; on a thread of the listener's own.
+  void start(std::function<void(int listening, int descriptor)> take);
+  void stop();  // accepts no more; once
+  [[nodiscard]] ListenerCounts counts() const;
+
+ private:
+  explicit Listener(std::size_t most) : most_(most) {}
+  void run();
+  void accept_from(int listening);
+  [[nodiscard]] std::size_t still_open();
+
+  const std::size_t most_;
+  std::vector<int> sockets_;
+  int wake_ = -1;  // an eventfd that ends the thread
+  int port_ = 0;
+  std::function<void(int, int)> take_;
+  // [thread] Connections handed on: descriptor and inode, by which one that was closed is told from another with its number.
+  std::set<std::pair<int, std::uint64_t>> taken_;
+  std::atomic<std::size_t> open_ = 0;
+  std::atomic<std::uint64_t> accepted_ = 0, refused_ = 0, failed_ = 0;
+  std::thread thread_;
+};
+
+}  // namespace osteon
