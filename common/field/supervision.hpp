@@ -25,13 +25,13 @@ struct ZoneLimit {
 
 struct Supervision {
   bool stopped = false;        // may not cut
-  AuthorId taken_by;           // who holds its tool; null: itself
-  AuthorId guide;              // along whose tool the hand is pulled; null: nobody's
+  AuthorId taken_by{};           // who holds its tool; null: itself
+  AuthorId guide{};              // along whose tool the hand is pulled; null: nobody's
   int guide_share = 0;         // how firmly, 1000: as firmly as the device may
   int force_limit = 0;         // most that the hand is made to feel and cuts with, steps of 0.01 N; 0: no such limit
-  std::optional<ZoneLimit> zone;  // where the tip must be to cut; none: anywhere
-  std::vector<Digest> tools;   // that it may cut with, sorted; none: all
-  std::string words;           // why, shown to the trainee
+  std::optional<ZoneLimit> zone{};  // where the tip must be to cut; none: anywhere
+  std::vector<Digest> tools{};   // that it may cut with, sorted; none: all
+  std::string words{};           // why, shown to the trainee
 
   [[nodiscard]] bool may_cut() const { return !stopped && !taken_by; }
   [[nodiscard]] double force_limit_n() const { return 0.01 * force_limit; }
@@ -42,7 +42,7 @@ inline constexpr int kWholeShare = 1000;
 inline constexpr int kMostForceLimit = 10'000;  // 100 N
 inline constexpr std::size_t kMostLimitedTools = 64, kMostSupervisionWords = 256;
 
-// Error invalid_input: a number out of range, tools unsorted or too many, words too long or not UTF-8. Names the field.
+// Error invalid_input: a number out of range, tools unsorted or too many, words too long. Names the field.
 [[nodiscard]] Result<void> check(const Supervision& supervision);
 
 // Why a hand under it may not make this cut: frozen, taken, forbidden_tool, zone; none: it may.

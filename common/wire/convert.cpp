@@ -349,19 +349,13 @@ Result<Annotation> from_wire(const v1::Annotation& annotation) {
   if (annotation.kind() < v1::ANNOTATION_KIND_POINTER || annotation.kind() > v1::ANNOTATION_KIND_LABEL)
     return bad("drawn.kind", "must be pointer, line or label");
   out.kind = static_cast<AnnotationKind>(annotation.kind());
-  const auto numbers = static_cast<std::size_t>(annotation.points_size());
-  const std::size_t least = out.kind == AnnotationKind::line ? 2 : 1, most = out.kind == AnnotationKind::line ? kMostAnnotationPoints : 1;
-  if (numbers % 3 != 0 || numbers / 3 < least || numbers / 3 > most)
-    return bad("drawn.points", "needs 3 numbers for each of " + std::to_string(least) + " to " + std::to_string(most) + " points, this has " +
-                                   std::to_string(numbers));
+  if (annotation.points_size() % 3 != 0)
+    return bad("drawn.points", "needs 3 numbers for each point, this has " + std::to_string(annotation.points_size()));
   for (int i = 0; i < annotation.points_size(); i += 3)
     out.points.push_back({annotation.points(i), annotation.points(i + 1), annotation.points(i + 2)});
-  if (annotation.words().size() > kMostAnnotationWords)
-    return bad("drawn.words", "are longer than " + std::to_string(kMostAnnotationWords) + " bytes");
-  if (out.kind == AnnotationKind::label && annotation.words().empty()) return bad("drawn.words", "are missing; a label has some");
   out.words = annotation.words();
-  if (annotation.colour() > 0xffffff) return bad("drawn.colour", "has more than 24 bits");
   out.colour = annotation.colour();
+  if (const Result<void> sound = check(out); !sound) return tl::unexpected(sound.error());
   return out;
 }
 

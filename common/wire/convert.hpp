@@ -45,7 +45,7 @@ namespace osteon::wire {
 [[nodiscard]] Result<BlockKey> key_from_wire(const v1::MeshBlock& block);
 [[nodiscard]] Result<Look> from_wire(const v1::Look& look);
 [[nodiscard]] Result<Supervision> from_wire(const v1::Supervision& supervision);  // by check(); tools in any order
-[[nodiscard]] Result<Annotation> from_wire(const v1::Annotation& annotation);     // within the limits of annotation.hpp
+[[nodiscard]] Result<Annotation> from_wire(const v1::Annotation& annotation);     // by check()
 [[nodiscard]] Result<Digest> digest_from_wire(const std::string& bytes);
 
 }  // namespace osteon::wire

@@ -149,7 +149,8 @@ Result<void> Room::can_follow(const RoomRow& row) const {
       if (!one.drawn) return require(drawn.contains(one.id), "there is no such annotation");
       const bool room_for_it =
           drawn.contains(one.id) || (one.id == room.people_.last_annotation() + 1 && drawn.size() < kMostAnnotations);
-      return require(room_for_it && one.drawn->id == one.id && room.knows(one.drawn->author), "the annotation cannot be there");
+      return require(room_for_it && one.drawn->id == one.id && room.knows(one.drawn->author) && check(*one.drawn).has_value(),
+                     "the annotation cannot be there");
     }
     Result<void> operator()(const WordsRow& said) const {
       return require(!said.words.empty() && said.words.size() <= kMostWordsBytes && (!said.to || room.knows(said.to)),

@@ -31,6 +31,7 @@ Result<RoomEvent> Room::supervise(AuthorId by, AuthorId subject, Supervision sup
 
 Result<RoomEvent> Room::annotate(AuthorId by, Annotation drawn) {
   if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
+  if (Result<void> sound = check(drawn); !sound) return tl::unexpected(sound.error());
   drawn.author = by;
   const auto& all = people_.annotations();
   if (drawn.id == 0) drawn.id = people_.replaced_by(drawn);

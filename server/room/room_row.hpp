@@ -73,7 +73,7 @@ struct MarkRow {
   std::string label;
 };
 
-// What holds for a hand from now on. It raises the epoch of the hand's lease.
+// What holds for a hand from now on. Who stops a hand or frees it, takes its tool or gives it back, ends its lease.
 struct SuperviseRow {
   AuthorId subject;
   Supervision supervision;

@@ -80,6 +80,16 @@ std::vector<Cut> any_cuts(Random& random, std::size_t count, bool wild, AuthorId
   return cuts;
 }
 
+Supervision any_supervision(Random& random, std::size_t most_tools) {
+  Supervision one{.stopped = random.unit() < 0.5, .taken_by = {random.index(3)}, .guide = {any(random)},
+                  .guide_share = static_cast<int>(random.index(kWholeShare + 1)),
+                  .force_limit = static_cast<int>(random.index(kMostForceLimit + 1))};
+  if (random.unit() < 0.5) one.zone = ZoneLimit{any_pose(random).position, 1 + static_cast<std::int32_t>(random.index(1 << 20))};
+  for (std::size_t tools = random.index(most_tools + 1); tools > 0; --tools) one.tools.push_back(digest(static_cast<std::uint8_t>(20 - tools)));
+  one.words = std::string(random.index(kMostSupervisionWords + 1), 'w');
+  return one;
+}
+
 wire::SessionRow committed(const Cut& cut) {
   return {.room_seq = {cut.author_seq}, .kind = wire::SessionRowKind::committed, .cut = cut};
 }
@@ -337,7 +347,37 @@ TEST(CutRun, AFullWindowChangesNothing) {
   EXPECT_EQ(back, cuts);
 }
 
-// Rows of three authors, rejections and events of the stream, in packets that are lost, repeated and overtaken and may come
+// The longest supervision that goes in a packet; one of more tools goes over the stream.
+TEST(RowRun, TheLongestSupervisionFitsAPacket) {
+  wire::SessionRow row{.room_seq = {~std::uint64_t{0}}, .kind = wire::SessionRowKind::supervised, .lease_epoch = ~std::uint64_t{0}};
+  constexpr std::int32_t kLow = std::numeric_limits<std::int32_t>::min();
+  row.supervision = {.stopped = true, .taken_by = {~std::uint64_t{0}}, .guide = {~std::uint64_t{0}}, .guide_share = kWholeShare,
+                     .force_limit = kMostForceLimit, .zone = ZoneLimit{{kLow, kLow, kLow}, 1 << 30}, .tools = {},
+                     .words = std::string(kMostSupervisionWords, 'w')};
+  for (std::size_t n = 0; n < wire::kMostToolsInPacket; ++n) row.supervision.tools.push_back(digest(static_cast<std::uint8_t>(n)));
+  ASSERT_TRUE(check(row.supervision));
+  ASSERT_TRUE(wire::fits_a_packet(row));
+  SendWindow window(kWide);
+  const wire::ToolNumbers none;
+  wire::RowSender sender(window, none);
+  ASSERT_TRUE(sender.push(row));
+  EXPECT_LE(window.least_room(0s), kMostPlainBytes - 100);
+  row.supervision.tools.push_back(digest(99));
+  EXPECT_FALSE(wire::fits_a_packet(row));
+}
+
+TEST(RowRun, ASupervisionThatNobodyDecidesSpoilsItsPacket) {
+  v1::DownPacket packet;
+  v1::SupervisedRow& row = *packet.add_supervised();
+  row.set_index(1);
+  EXPECT_TRUE(wire::rows_of(packet, {})) << "one that frees";
+  row.mutable_supervision()->set_guide_share(1001);
+  const auto read = wire::rows_of(packet, {});
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code, ErrorCode::invalid_input);
+}
+
+// Rows of three authors, rejections, supervisions and events of the stream, in packets that are lost, repeated and overtaken and may come
 // before the tools' numbers do: the session's order comes out.
 TEST(RowRun, AnyRowsComeBackInTheSessionsOrder) {
   const wire::ToolNumbers numbers = numbers_1_to_3(), none;
@@ -362,6 +402,10 @@ TEST(RowRun, AnyRowsComeBackInTheSessionsOrder) {
         row.author_seq = any(random);
         row.reason = static_cast<std::uint32_t>(random.index(13));
         row.lease_epoch = any(random);
+      } else if (kind < 0.08) {
+        row.kind = wire::SessionRowKind::supervised;
+        row.lease_epoch = any(random);
+        row.supervision = any_supervision(random, wire::kMostToolsInPacket);
       } else if (kind > 0.1) {
         Cut& cut = last[random.index(3)];
         cut = any_cut(random, cut, random.unit() < 0.1);

@@ -35,7 +35,7 @@ TEST(LinkEnds, EverythingOnceAndInOrderOnAHostileNetwork) {
   std::size_t cuts = 0, by_stream = 0, rows = 0;
   std::vector<double> settled_ms;
   std::uint64_t corrupted = 0, forged = 0;
-  std::size_t most_waiting = 0;
+  std::size_t most_waiting = 0, words = 0, long_words = 0;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     Trial trial({.seed = seed, .quality = hostile()});
     Random random(seed);
@@ -57,6 +57,10 @@ TEST(LinkEnds, EverythingOnceAndInOrderOnAHostileNetwork) {
       cuts += trial.clients[c]->cuts.size();
       rows += trial.clients[c]->rows.size();
       by_stream += trial.clients[c]->rows_by_stream;
+      for (const wire::IndexedRow& row : trial.clients[c]->rows) {
+        words += row.row.kind == wire::SessionRowKind::supervised;
+        long_words += row.row.kind == wire::SessionRowKind::supervised && !wire::fits_a_packet(row.row);
+      }
       forged += trial.sessions[c]->link.half().open_counts().forged + trial.clients[c]->link.half().open_counts().forged;
       most_waiting = std::max(most_waiting, trial.clients[c]->most_waiting);
       EXPECT_EQ(trial.sessions[c]->link.half().counts().malformed, 0u);
@@ -68,6 +72,9 @@ TEST(LinkEnds, EverythingOnceAndInOrderOnAHostileNetwork) {
               "without partition settled after p50 %.0f, most %.0f ms\n",
               cuts, rows, by_stream, static_cast<unsigned long long>(corrupted), static_cast<unsigned long long>(forged),
               share_of(settled_ms, 0.5), share_of(settled_ms, 1.0));
+  EXPECT_GT(words, 100u);
+  EXPECT_GT(long_words, 20u);
+  EXPECT_GT(words - long_words, long_words / 2);
   // Duplicates of spoiled ones count twice; flips in the session or the counter count as something else.
   EXPECT_GT(forged, corrupted / 3);
   EXPECT_LE(most_waiting, 16u * 1024);
@@ -470,6 +477,32 @@ TEST(LinkEnds, ARowDecidesTheOwnCutInIt) {
   std::vector<std::uint64_t> heard;
   while (const auto row = pair.client.take_row()) heard.push_back(row->index);
   EXPECT_EQ(heard, (std::vector<std::uint64_t>{1, 2, 3})) << "the one without a number is not said";
+}
+
+// Whoever is stopped knows it by the packet itself, before the row has its turn.
+TEST(LinkEnds, AnInstructorsWordFreezesAndEndsTheLease) {
+  Pair pair;
+  pair.run(300ms);
+  wire::SessionRow word{.room_seq = {5}, .kind = wire::SessionRowKind::supervised, .lease_epoch = 6, .supervision = {.taken_by = {3}}};
+  EXPECT_TRUE(pair.server.tell(1, word));
+  pair.run(100ms);
+  EXPECT_TRUE(pair.client.frozen());
+  EXPECT_EQ(pair.client.lease_epoch(), 6u);
+  word.lease_epoch = 8;
+  word.supervision = {};
+  for (std::uint8_t n = 0; n <= wire::kMostToolsInPacket; ++n) word.supervision.tools.push_back(Digest{{n}});
+  EXPECT_FALSE(pair.server.tell(2, word)) << "too long: its row goes over the stream, what matters at once does not";
+  pair.run(100ms);
+  EXPECT_FALSE(pair.client.frozen());
+  EXPECT_EQ(pair.client.lease_epoch(), 8u);
+  const auto first = pair.client.take_row();
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->row.supervision, (Supervision{.taken_by = {3}}));
+  EXPECT_FALSE(pair.client.take_row());
+  EXPECT_TRUE(pair.client.offer({2, word}));
+  const auto second = pair.client.take_row();
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->row, word);
 }
 
 // After a long stop the stream brings thousands of rows in a moment.

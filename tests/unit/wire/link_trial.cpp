@@ -218,6 +218,14 @@ void Trial::tick() {
   }
 }
 
+// An instructor's word on one of the clients; every third is too long for a packet.
+wire::SessionRow Trial::supervised(RoomSeq seq) {
+  wire::SessionRow row{.room_seq = seq, .kind = wire::SessionRowKind::supervised, .lease_epoch = seq.value + 1};
+  row.supervision = {.stopped = seq.value % 2 == 0, .force_limit = static_cast<int>(seq.value % 1000), .words = "as agreed"};
+  for (std::uint64_t tool = 1; tool <= seq.value % 9 * 2; ++tool) row.supervision.tools.push_back(tool_of(tool));
+  return row;
+}
+
 void Trial::keep(const std::vector<std::pair<std::size_t, Cut>>& decided, bool event) {
   for (const auto& [author, cut] : decided) {
     const RoomSeq seq{++room_seq_};
@@ -232,7 +240,7 @@ void Trial::keep(const std::vector<std::pair<std::size_t, Cut>>& decided, bool e
   }
   if (event) {
     const RoomSeq seq{++room_seq_};
-    for (std::size_t c = 0; c < kClients; ++c) tell(c, {.room_seq = seq, .kind = wire::SessionRowKind::streamed});
+    for (std::size_t c = 0; c < kClients; ++c) tell(c, seq.value % 3 == c ? supervised(seq) : wire::SessionRow{.room_seq = seq});
   }
   for (std::size_t c = 0; c < kClients; ++c) {
     sessions[c]->link.decided(sessions[c]->kept);

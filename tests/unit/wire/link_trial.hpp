@@ -113,6 +113,7 @@ class Trial {
 
   void make_cuts(std::size_t c);
   static Digest tool_of(std::uint64_t number);
+  static wire::SessionRow supervised(RoomSeq seq);
   Cut drilling(const Client& client, std::uint64_t number);
 
   void turn(std::size_t c);
