@@ -1,6 +1,5 @@
 #include "viewer_client/scene/inbox.hpp"
 
-#include <algorithm>
 #include <utility>
 
 namespace osteon {
@@ -8,36 +7,6 @@ namespace osteon {
 namespace {
 // Arrivals are figures for the log; a render thread that stands still for half a minute keeps the newest of them.
 constexpr std::size_t kMostArrivals = 1024;
-constexpr std::size_t kMostWords = 64;  // as many as the server keeps
-
-// One change that says what the two say one after the other.
-void merge(PeopleChange& into, PeopleChange next) {
-  if (next.complete) {
-    std::vector<SaidWords> words = std::move(into.words);
-    words.insert(words.end(), next.words.begin(), next.words.end());
-    into = std::move(next);
-    into.words = std::move(words);
-  } else {
-    for (Person& person : next.people) {
-      std::erase_if(into.people, [&](const Person& told) { return told.author == person.author; });
-      into.people.push_back(std::move(person));
-    }
-    for (Annotation& drawn : next.annotations) {
-      std::erase_if(into.annotations, [&](const Annotation& told) { return told.id == drawn.id; });
-      std::erase(into.wiped, drawn.id);
-      into.annotations.push_back(std::move(drawn));
-    }
-    for (const std::uint32_t id : next.wiped) {
-      std::erase_if(into.annotations, [&](const Annotation& told) { return told.id == id; });
-      std::erase(into.wiped, id);
-      into.wiped.push_back(id);
-    }
-    into.words.insert(into.words.end(), next.words.begin(), next.words.end());
-    into.room_seq = next.room_seq;
-  }
-  if (into.words.size() > kMostWords) into.words.erase(into.words.begin(), into.words.end() - kMostWords);
-}
-
 }  // namespace
 
 void Inbox::begin_stream() {
@@ -72,13 +41,10 @@ void Inbox::put_tool(Tool tool) {
   next_.tools.push_back(std::move(tool));
 }
 
-void Inbox::put_people(PeopleChange change) {
+void Inbox::put_people(PeopleSeen people) {
   {
     const std::lock_guard lock(mutex_);
-    if (next_.people)
-      merge(*next_.people, std::move(change));
-    else
-      next_.people = std::move(change);
+    next_.people = std::move(people);
     waiting_ = true;
   }
   arrived_.notify_one();

@@ -1,5 +1,4 @@
-// What the network threads hand to the render thread. Bounded: of each block,
-// person and drawing only the newest waits.
+// What the network threads hand to the render thread. Bounded by the surface: of each block only the newest waits.
 #pragma once
 #include <chrono>
 #include <condition_variable>
@@ -12,7 +11,7 @@
 #include "common/core/id.hpp"
 #include "common/mechanics/cutting_state.hpp"
 #include "common/tools/scene_item.hpp"
-#include "viewer_client/scene/person.hpp"
+#include "viewer_client/scene/people_seen.hpp"
 #include "viewer_client/scene/surface_scene.hpp"
 
 namespace osteon {
@@ -37,7 +36,7 @@ struct Delivery {
   std::vector<SceneItem> items;   // with any_states
   std::vector<BodyId> bodies;     // with any_states
   std::vector<Tool> tools;        // that this program did not know
-  std::optional<PeopleChange> people;  // all changes in one
+  std::optional<PeopleSeen> people;
 };
 
 // Any thread may call any function; one mutex, held for a few moves at a time.
@@ -49,7 +48,7 @@ class Inbox {
                 std::uint32_t snapshot_blocks, std::int64_t received_mono_ns);
   void put_states(std::vector<CuttingState> states, std::vector<SceneItem> items = {}, std::vector<BodyId> bodies = {});
   void put_tool(Tool tool);
-  void put_people(PeopleChange change);
+  void put_people(PeopleSeen people);
 
   [[nodiscard]] Delivery take();
   // Returns early when something waits.

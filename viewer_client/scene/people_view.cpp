@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cstdio>
 #include <set>
+#include <utility>
 
 #include "common/tools/cut_body.hpp"
 #include "common/tools/tool.hpp"
@@ -24,7 +25,8 @@ std::string tool_names(const std::vector<Digest>& tools) {
     else
       names += (names.empty() ? "" : ", ") + known->name;
   }
-  if (unknown != 0) names += (names.empty() ? "" : " and ") + std::to_string(unknown) + (unknown == 1 ? " other tool" : " other tools");
+  const std::string others = std::to_string(unknown) + (unknown == 1 ? " other tool" : " other tools");
+  if (unknown != 0) names += (names.empty() ? "" : " and ") + others;
   return names;
 }
 
@@ -71,20 +73,15 @@ std::string wrapped(std::string_view text, std::size_t columns, std::size_t most
   return lines.size() > most ? out + " ..." : out;
 }
 
-void PeopleView::take(const PeopleChange& change, Clock::time_point now) {
-  std::map<AuthorId, Person> before = people_;
-  if (change.complete) {
-    people_.clear();
-    annotations_.clear();
-  }
-  for (const Person& person : change.people) people_[person.author] = person;
-  for (const Annotation& drawn : change.annotations) annotations_[drawn.id] = drawn;
-  for (const std::uint32_t id : change.wiped) annotations_.erase(id);
-  room_seq_ = std::max(room_seq_, change.room_seq);
+void PeopleView::take(const PeopleSeen& seen, AuthorId self, Clock::time_point now) {
+  self_ = self;
+  std::map<AuthorId, PersonSeen> before = std::exchange(people_, {});
+  for (const PersonSeen& person : seen.people) people_[person.author] = person;
+  annotations_ = seen.annotations;
 
-  for (const Person& person : change.people) notice_decision(person, before[person.author].supervision, now);
-  for (const SaidWords& said : change.words) {
-    if (said.place <= newest_words_) continue;  // told again after a connection was lost
+  for (const PersonSeen& person : seen.people) notice_decision(person, before[person.author].supervision, now);
+  for (const WordsSeen& said : seen.words) {
+    if (said.place <= newest_words_) continue;
     newest_words_ = said.place;
     const auto addressee = people_.find(said.to);
     const bool to_us = said.to && (said.to == self_ || (addressee != people_.end() && is_hand(addressee->second)));
@@ -98,9 +95,9 @@ void PeopleView::notice(std::string text, Clock::time_point now) {
   notices_.push_back({now + kShown, std::move(text)});
 }
 
-bool PeopleView::is_hand(const Person& person) const {
+bool PeopleView::is_hand(const PersonSeen& person) const {
   if (hand_.empty()) return false;
-  const Result<Person> ours = find(hand_);
+  const Result<PersonSeen> ours = find(hand_, Fit::hand);
   return ours && ours->author == person.author;
 }
 
@@ -112,47 +109,53 @@ std::string PeopleView::overseer() const {
   return names.size() == 1 ? *names.begin() : "An instructor";
 }
 
-void PeopleView::notice_decision(const Person& person, const Supervision& was, Clock::time_point now) {
+void PeopleView::notice_decision(const PersonSeen& person, const Supervision& was, Clock::time_point now) {
   const Supervision& is = person.supervision;
   if (is == was) return;
   const bool ours = is_hand(person);
   const std::string whom = ours ? "you" : name_of(person.author), whose = ours ? "your" : name_of(person.author) + "'s";
+  const std::string hand = whose + " hand", tool = whose + " tool", by = overseer();
   std::vector<std::string> said;
-  if (is.stopped != was.stopped) said.push_back(overseer() + (is.stopped ? " has stopped " + whose + " hand" : " has set " + whose + " hand free"));
+  if (is.stopped != was.stopped) said.push_back(by + (is.stopped ? " has stopped " + hand : " has set " + hand + " free"));
   if (is.taken_by != was.taken_by)
-    said.push_back(is.taken_by ? name_of(is.taken_by) + " has taken over " + whose + " tool" : overseer() + " has given " + whose + " tool back");
+    said.push_back(is.taken_by ? name_of(is.taken_by) + " has taken over " + tool : by + " has given " + tool + " back");
   if (is.guide != was.guide)
-    said.push_back(is.guide ? overseer() + " leads " + whose + " hand along the tool of " + name_of(is.guide)
-                            : overseer() + " leads " + whose + " hand no more");
+    said.push_back(by + " leads " + hand + (is.guide ? " along the tool of " + name_of(is.guide) : " no more"));
   if (is.force_limit != was.force_limit)
-    said.push_back(overseer() + (is.force_limit != 0 ? " limits " + whose + " force to " + printed("%.2f N", is.force_limit_n())
-                                                     : " limits " + whose + " force no more"));
+    said.push_back(by + " limits " + whose + " force " +
+                   (is.force_limit != 0 ? "to " + printed("%.2f N", is.force_limit_n()) : "no more"));
   if (is.zone != was.zone)
-    said.push_back(overseer() + " lets " + whom + " cut " + (is.zone ? "only within " + radius_text(*is.zone) + " of a point" : "everywhere"));
+    said.push_back(by + " lets " + whom + " cut " +
+                   (is.zone ? "only within " + radius_text(*is.zone) + " of a point" : "everywhere"));
   if (is.tools != was.tools)
-    said.push_back(overseer() + " lets " + whom + " cut with " + (is.tools.empty() ? "every tool" : tool_names(is.tools) + " only"));
+    said.push_back(by + " lets " + whom + " cut with " + (is.tools.empty() ? "every tool" : tool_names(is.tools) + " only"));
   if (is.words != was.words && !is.words.empty()) {
-    if (said.empty()) said.push_back(overseer() + " about " + whose + " hand");
+    if (said.empty()) said.push_back(by + " about " + hand);
     said.back() += ": " + is.words;
   }
   for (std::string& text : said) notice(std::move(text), now);
 }
 
-Result<Person> PeopleView::find(std::string_view who) const {
-  const Person* found = nullptr;
+Result<PersonSeen> PeopleView::find(std::string_view who, Fit fit) const {
+  const PersonSeen* found = nullptr;
   if (who.starts_with('#')) {
     std::uint64_t number = 0;
     const auto [end, error] = std::from_chars(who.data() + 1, who.data() + who.size(), number);
     const auto person = people_.find(AuthorId{number});
     if (error == std::errc{} && end == who.data() + who.size() && person != people_.end()) found = &person->second;
   }
+  const auto rank = [fit](const PersonSeen& person) {
+    const bool fits = fit == Fit::looking ? person.look.has_value() : fit == Fit::hand && person.hand;
+    return std::pair(fits, person.here);
+  };
   std::string known;
   for (const auto& [author, person] : people_) {
-    if (!person.name.empty() && person.name == who && (found == nullptr || person.here || !found->here)) found = &person;
+    if (!person.name.empty() && person.name == who && (found == nullptr || rank(person) >= rank(*found))) found = &person;
     if (person.here) known += (known.empty() ? "" : ", ") + name_of(author);
   }
   if (found != nullptr) return *found;
-  return failure(ErrorCode::not_found, "nobody is called " + std::string(who) + "; there are " + (known.empty() ? "none yet" : known));
+  if (known.empty()) known = "none yet";
+  return failure(ErrorCode::not_found, "nobody is called " + std::string(who) + "; there are " + known);
 }
 
 std::string PeopleView::name_of(AuthorId author) const {
@@ -166,12 +169,6 @@ std::map<AuthorId, std::string> PeopleView::names() const {
   return names;
 }
 
-std::vector<Annotation> PeopleView::annotations() const {
-  std::vector<Annotation> drawn;
-  for (const auto& [id, annotation] : annotations_) drawn.push_back(annotation);
-  return drawn;
-}
-
 std::vector<std::string> PeopleView::notices(Clock::time_point now) const {
   std::vector<std::string> shown;
   for (const Notice& notice : notices_)
@@ -181,7 +178,7 @@ std::vector<std::string> PeopleView::notices(Clock::time_point now) const {
 
 std::string PeopleView::holding() const {
   if (hand_.empty()) return {};
-  const Result<Person> ours = find(hand_);
+  const Result<PersonSeen> ours = find(hand_, Fit::hand);
   if (!ours) return {};
   const Supervision& holds = ours->supervision;
   std::string text;
@@ -192,7 +189,8 @@ std::string PeopleView::holding() const {
   if (holds.force_limit != 0) line("Force: " + printed("%.2f N", holds.force_limit_n()) + " at most");
   if (holds.zone) {
     const auto& at = holds.zone->centre;
-    line("Cut only within " + radius_text(*holds.zone) + printed(" of %.1f %.1f %.1f", kQuantum_mm * at[0], kQuantum_mm * at[1], kQuantum_mm * at[2]));
+    line("Cut only within " + radius_text(*holds.zone) +
+         printed(" of %.1f %.1f %.1f", kQuantum_mm * at[0], kQuantum_mm * at[1], kQuantum_mm * at[2]));
   }
   if (!holds.tools.empty()) line("Cut only with " + tool_names(holds.tools));
   if (!holds.words.empty()) line(holds.words);

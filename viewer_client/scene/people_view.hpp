@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/core/result.hpp"
-#include "viewer_client/scene/person.hpp"
+#include "viewer_client/scene/people_seen.hpp"
 
 namespace osteon {
 
@@ -25,18 +25,17 @@ class PeopleView {
   // `hand`: who sits before this window with a hand, by name or as #NUMBER; empty: nobody.
   explicit PeopleView(std::string hand = {}) : hand_(std::move(hand)) {}
 
-  void take(const PeopleChange& change, Clock::time_point now);
-  // This window's own identity: what is said to it is said "to you".
-  void set_self(AuthorId self) { self_ = self; }
+  // `self`: this window's own identity; what is said to it is said "to you".
+  void take(const PeopleSeen& seen, AuthorId self, Clock::time_point now);
 
-  // By name, or by # and the author's number. Of several of one name those who are here, then the newest.
-  // Error not_found, naming those who are known.
-  [[nodiscard]] Result<Person> find(std::string_view who) const;
+  // By name, or by # and the author's number. Of several of one name - a person's hand and their window - those who fit better,
+  // then those who are here, then the newest. Error not_found, naming those who are here.
+  enum class Fit { anybody, looking, hand };
+  [[nodiscard]] Result<PersonSeen> find(std::string_view who, Fit fit = Fit::anybody) const;
   // "Ada", or "#3" for somebody without a name.
   [[nodiscard]] std::string name_of(AuthorId author) const;
   [[nodiscard]] std::map<AuthorId, std::string> names() const;
-  [[nodiscard]] std::vector<Annotation> annotations() const;  // in the order of their numbers
-  [[nodiscard]] RoomSeq room_seq() const { return room_seq_; }
+  [[nodiscard]] const std::vector<Annotation>& annotations() const { return annotations_; }
 
   // Who said what and what was decided lately, oldest first.
   [[nodiscard]] std::vector<std::string> notices(Clock::time_point now) const;
@@ -48,17 +47,17 @@ class PeopleView {
     Clock::time_point until;
     std::string text;
   };
-  [[nodiscard]] bool is_hand(const Person& person) const;
+  [[nodiscard]] bool is_hand(const PersonSeen& person) const;
   [[nodiscard]] std::string overseer() const;
-  void notice_decision(const Person& person, const Supervision& before, Clock::time_point now);
+  void notice_decision(const PersonSeen& person, const Supervision& before, Clock::time_point now);
   void notice(std::string text, Clock::time_point now);
 
   std::string hand_;
   AuthorId self_{};
-  std::map<AuthorId, Person> people_;
-  std::map<std::uint32_t, Annotation> annotations_;
+  std::map<AuthorId, PersonSeen> people_;
+  std::vector<Annotation> annotations_;
   std::deque<Notice> notices_;
-  RoomSeq room_seq_{}, newest_words_{};
+  RoomSeq newest_words_{};
 };
 
 }  // namespace osteon

@@ -17,7 +17,8 @@ double distance_mm(const Vec3& point, const Vec3& from, const Vec3& to) {
 }
 
 // Marks what is kept of the points between two that are.
-void keep_between(const std::vector<Vec3>& points, std::size_t first, std::size_t last, double tolerance_mm, std::vector<bool>& kept) {
+void keep_between(const std::vector<Vec3>& points, std::size_t first, std::size_t last, double tolerance_mm,
+                  std::vector<bool>& kept) {
   double most_mm = tolerance_mm;
   std::size_t farthest = first;
   for (std::size_t i = first + 1; i < last; ++i) {
@@ -38,8 +39,10 @@ void keep_between(const std::vector<Vec3>& points, std::size_t first, std::size_
 std::array<std::int32_t, 3> in_steps(const Vec3& point_mm) {
   constexpr double kMost = 1 << 30;
   std::array<std::int32_t, 3> steps{};
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    steps[axis] = static_cast<std::int32_t>(std::clamp(std::round(point_mm[static_cast<Eigen::Index>(axis)] / kQuantum_mm), -kMost, kMost));
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double step = std::round(point_mm[static_cast<Eigen::Index>(axis)] / kQuantum_mm);
+    steps[axis] = static_cast<std::int32_t>(std::clamp(step, -kMost, kMost));
+  }
   return steps;
 }
 

@@ -15,11 +15,11 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-constexpr AuthorId kAda{3}, kBerg{4}, kCy{5};
+constexpr AuthorId kAda{3}, kBerg{4}, kCy{5}, kSelf{8};
 const PeopleView::Clock::time_point kNow{};
 
-Person person(AuthorId author, const std::string& name, Role role = Role::trainee) {
-  Person one;
+PersonSeen person(AuthorId author, const std::string& name, Role role = Role::trainee) {
+  PersonSeen one;
   one.author = author;
   one.name = name;
   one.role = role;
@@ -28,58 +28,52 @@ Person person(AuthorId author, const std::string& name, Role role = Role::traine
   return one;
 }
 
-PeopleChange all_three() {
-  PeopleChange change;
-  change.complete = true;
-  change.people = {person(kAda, "Ada"), person(kBerg, "Dr. Berg", Role::instructor), person(kCy, "Cy")};
-  return change;
-}
+PeopleSeen all_three() { return {{person(kAda, "Ada"), person(kBerg, "Dr. Berg", Role::instructor), person(kCy, "Cy")}, {}, {}}; }
 
 // Ada under what was decided about her.
-PeopleChange about_ada(const Supervision& supervision) {
-  PeopleChange change;
-  change.people = {person(kAda, "Ada")};
-  change.people[0].supervision = supervision;
-  return change;
+PeopleSeen about_ada(const Supervision& supervision) {
+  PeopleSeen seen = all_three();
+  seen.people[0].supervision = supervision;
+  return seen;
 }
 
-PeopleChange said(std::uint64_t place, AuthorId from, AuthorId to, const std::string& words) {
-  PeopleChange change;
-  change.words = {{RoomSeq{place}, from, to, words}};
-  return change;
+PeopleSeen said(std::uint64_t place, AuthorId from, AuthorId to, const std::string& words) {
+  PeopleSeen seen = all_three();
+  seen.words = {{RoomSeq{place}, from, to, words}};
+  return seen;
 }
 
 TEST(PeopleView, TheHandIsToldWhatWasDecidedAboutIt) {
   PeopleView view("Ada");
-  view.take(all_three(), kNow);
+  view.take(all_three(), kSelf, kNow);
   EXPECT_THAT(view.notices(kNow), IsEmpty());
   EXPECT_EQ(view.holding(), "");
   Supervision stopped;
   stopped.stopped = true;
   stopped.words = "mind the dura";
-  view.take(about_ada(stopped), kNow);
+  view.take(about_ada(stopped), kSelf, kNow);
   EXPECT_THAT(view.notices(kNow), ElementsAre("Dr. Berg has stopped your hand: mind the dura"));
   EXPECT_EQ(view.holding(), "Your hand is stopped\nmind the dura");
-  view.take(about_ada({}), kNow);
+  view.take(about_ada({}), kSelf, kNow);
   EXPECT_THAT(view.notices(kNow), ElementsAre(testing::_, "Dr. Berg has set your hand free"));
   EXPECT_EQ(view.holding(), "");
 }
 
 TEST(PeopleView, OthersAreToldOfWhom) {
   PeopleView view("Cy");
-  view.take(all_three(), kNow);
+  view.take(all_three(), kSelf, kNow);
   Supervision stopped;
   stopped.stopped = true;
-  view.take(about_ada(stopped), kNow);
+  view.take(about_ada(stopped), kSelf, kNow);
   EXPECT_THAT(view.notices(kNow), ElementsAre("Dr. Berg has stopped Ada's hand"));
   EXPECT_EQ(view.holding(), "") << "it is not Cy's hand";
 }
 
 TEST(PeopleView, EveryKindOfDecisionHasItsSentence) {
   PeopleView view("#3");
-  view.take(all_three(), kNow);
+  view.take(all_three(), kSelf, kNow);
   const auto told = [&](const Supervision& supervision) {
-    view.take(about_ada(supervision), kNow);
+    view.take(about_ada(supervision), kSelf, kNow);
     const auto shown = view.notices(kNow);
     return shown.empty() ? std::string() : shown.back();
   };
@@ -103,50 +97,49 @@ TEST(PeopleView, EveryKindOfDecisionHasItsSentence) {
 
 TEST(PeopleView, WhoDecidedIsNamedOnlyWhereItIsCertain) {
   PeopleView view("Ada");
-  PeopleChange change = all_three();
+  PeopleSeen change = all_three();
   change.people.push_back(person(AuthorId{9}, "Dr. Cho", Role::instructor));
-  view.take(change, kNow);
-  Supervision stopped;
-  stopped.stopped = true;
-  view.take(about_ada(stopped), kNow);
+  view.take(change, kSelf, kNow);
+  change.people[0].supervision.stopped = true;
+  view.take(change, kSelf, kNow);
   EXPECT_THAT(view.notices(kNow), ElementsAre("An instructor has stopped your hand"));
 }
 
 TEST(PeopleView, WhatAlreadyHoldsIsToldToWhoComesLater) {
   PeopleView view("Ada");
-  PeopleChange change = all_three();
+  PeopleSeen change = all_three();
   change.people[0].supervision.stopped = true;
-  view.take(change, kNow);
+  view.take(change, kSelf, kNow);
   EXPECT_EQ(view.notices(kNow).size(), 1u);
   // After a connection was lost everything is told once more: nothing of it is new.
-  view.take(change, kNow + 60s);
+  view.take(change, kSelf, kNow + 60s);
   EXPECT_THAT(view.notices(kNow + 60s), IsEmpty());
   EXPECT_EQ(view.holding(), "Your hand is stopped");
 }
 
 TEST(PeopleView, WordsSayWhoSpeaksToWhom) {
   PeopleView view("Ada");
-  view.set_self(AuthorId{8});
-  view.take(all_three(), kNow);
-  view.take(said(1, kBerg, {}, "good morning"), kNow);
-  view.take(said(2, kBerg, kAda, "slower"), kNow);
-  view.take(said(3, kBerg, AuthorId{8}, "turn the bone"), kNow);
-  view.take(said(4, kCy, kBerg, "may I?"), kNow);
-  view.take(said(5, AuthorId{77}, {}, "hello"), kNow);
-  EXPECT_THAT(view.notices(kNow), ElementsAre("Dr. Berg: good morning", "Dr. Berg to you: slower", "Dr. Berg to you: turn the bone",
-                                              "Cy to Dr. Berg: may I?", "#77: hello"));
-  view.take(said(5, AuthorId{77}, {}, "hello"), kNow);
+  view.take(all_three(), kSelf, kNow);
+  view.take(said(1, kBerg, {}, "good morning"), kSelf, kNow);
+  view.take(said(2, kBerg, kAda, "slower"), kSelf, kNow);
+  view.take(said(3, kBerg, kSelf, "turn the bone"), kSelf, kNow);
+  view.take(said(4, kCy, kBerg, "may I?"), kSelf, kNow);
+  view.take(said(5, AuthorId{77}, {}, "hello"), kSelf, kNow);
+  EXPECT_THAT(view.notices(kNow),
+              ElementsAre("Dr. Berg: good morning", "Dr. Berg to you: slower", "Dr. Berg to you: turn the bone",
+                          "Cy to Dr. Berg: may I?", "#77: hello"));
+  view.take(said(5, AuthorId{77}, {}, "hello"), kSelf, kNow);
   EXPECT_EQ(view.notices(kNow).size(), 5u) << "told again";
-  view.take(said(6, kCy, {}, "one more"), kNow);
+  view.take(said(6, kCy, {}, "one more"), kSelf, kNow);
   EXPECT_EQ(view.notices(kNow).size(), PeopleView::kMostNotices);
   EXPECT_EQ(view.notices(kNow).back(), "Cy: one more");
 }
 
 TEST(PeopleView, NoticesPass) {
   PeopleView view;
-  view.take(all_three(), kNow);
-  view.take(said(1, kBerg, {}, "first"), kNow);
-  view.take(said(2, kBerg, {}, "second"), kNow + PeopleView::kShown / 2);
+  view.take(all_three(), kSelf, kNow);
+  view.take(said(1, kBerg, {}, "first"), kSelf, kNow);
+  view.take(said(2, kBerg, {}, "second"), kSelf, kNow + PeopleView::kShown / 2);
   EXPECT_EQ(view.notices(kNow + PeopleView::kShown - 1ms).size(), 2u);
   EXPECT_THAT(view.notices(kNow + PeopleView::kShown), ElementsAre("Dr. Berg: second"));
   EXPECT_THAT(view.notices(kNow + 2 * PeopleView::kShown), IsEmpty());
@@ -154,12 +147,12 @@ TEST(PeopleView, NoticesPass) {
 
 TEST(PeopleView, PeopleAreFoundByNameOrNumber) {
   PeopleView view;
-  PeopleChange change = all_three();
-  Person gone = person(AuthorId{9}, "Ada");
+  PeopleSeen change = all_three();
+  PersonSeen gone = person(AuthorId{9}, "Ada");
   gone.here = false;
   change.people.push_back(gone);
   change.people.push_back(person(AuthorId{10}, ""));
-  view.take(change, kNow);
+  view.take(change, kSelf, kNow);
   EXPECT_EQ(view.find("Ada")->author, kAda) << "who is here";
   EXPECT_EQ(view.find("#9")->author, AuthorId{9});
   EXPECT_EQ(view.find("Dr. Berg")->author, kBerg);
@@ -174,69 +167,46 @@ TEST(PeopleView, PeopleAreFoundByNameOrNumber) {
   // Who came back under the same name is the newer one.
   change.people[0].here = false;
   change.people[3].here = true;
-  view.take(change, kNow);
+  view.take(change, kSelf, kNow);
   EXPECT_EQ(view.find("Ada")->author, AuthorId{9});
 }
 
-TEST(PeopleView, DrawingsComeGoAndAreReplaced) {
-  PeopleView view;
-  PeopleChange change;
-  change.annotations = {{.id = 2, .words = "b"}, {.id = 1, .words = "a"}};
-  change.room_seq = RoomSeq{7};
-  view.take(change, kNow);
-  ASSERT_EQ(view.annotations().size(), 2u);
-  EXPECT_EQ(view.annotations()[0].words, "a");
-  EXPECT_EQ(view.room_seq(), RoomSeq{7});
-  PeopleChange next;
-  next.annotations = {{.id = 2, .words = "c"}};
-  next.wiped = {1};
-  view.take(next, kNow);
-  ASSERT_EQ(view.annotations().size(), 1u);
-  EXPECT_EQ(view.annotations()[0].words, "c");
-  EXPECT_EQ(view.room_seq(), RoomSeq{7});
-  PeopleChange anew;
-  anew.complete = true;
-  view.take(anew, kNow);
-  EXPECT_TRUE(view.annotations().empty()) << "another server has none of them";
+TEST(PeopleView, OfOneNameWhoFitsBetterIsMeant) {
+  PeopleView view("Ada");
+  PeopleSeen seen = all_three();
+  PersonSeen window = person(AuthorId{2}, "Ada");  // older than her hand
+  window.hand = false;
+  window.look = Look{};
+  seen.people.push_back(window);
+  seen.people.push_back(person(AuthorId{9}, "Ada"));
+  seen.people.back().hand = false;
+  seen.people[0].supervision.stopped = true;
+  view.take(seen, kSelf, kNow);
+  EXPECT_EQ(view.find("Ada", PeopleView::Fit::looking)->author, AuthorId{2});
+  EXPECT_EQ(view.find("Ada", PeopleView::Fit::hand)->author, kAda);
+  EXPECT_EQ(view.find("Ada")->author, AuthorId{9});
+  EXPECT_EQ(view.holding(), "Your hand is stopped");
 }
 
-TEST(Inbox, SaysSeveralChangesOfPeopleAsOne) {
+TEST(PeopleView, DrawingsAreThoseOfTheRoom) {
+  PeopleView view;
+  PeopleSeen seen;
+  seen.annotations = {{.id = 1, .words = "a"}, {.id = 2, .words = "b"}};
+  view.take(seen, kSelf, kNow);
+  EXPECT_EQ(view.annotations(), seen.annotations);
+  view.take({}, kSelf, kNow);
+  EXPECT_TRUE(view.annotations().empty());
+}
+
+TEST(Inbox, KeepsTheNewestOfThePeople) {
   Inbox inbox;
   EXPECT_FALSE(inbox.take().people);
-  PeopleChange first = all_three();
-  first.annotations = {{.id = 1}, {.id = 2}};
-  first.words = {{RoomSeq{1}, kBerg, {}, "one"}};
-  PeopleChange second = about_ada({.stopped = true});
-  second.annotations = {{.id = 3}};
-  second.wiped = {1};
-  second.words = {{RoomSeq{2}, kBerg, {}, "two"}};
-  second.room_seq = RoomSeq{9};
-  inbox.put_people(first);
-  inbox.put_people(second);
-  PeopleView together, one_by_one;
-  together.take(*inbox.take().people, kNow);
-  one_by_one.take(first, kNow);
-  one_by_one.take(second, kNow);
-  EXPECT_EQ(together.annotations(), one_by_one.annotations());
-  EXPECT_EQ(together.annotations().size(), 2u);
-  EXPECT_TRUE(together.find("Ada")->supervision.stopped);
-  EXPECT_EQ(together.room_seq(), RoomSeq{9});
-  EXPECT_THAT(together.notices(kNow), testing::IsSupersetOf({"Dr. Berg: one", "Dr. Berg: two"}));
-  EXPECT_FALSE(inbox.take().people);
-  // What was wiped and drawn anew stands; a whole list drops what came before it, but no words.
-  inbox.put_people(second);
-  PeopleChange again;
-  again.annotations = {{.id = 1}};
-  inbox.put_people(again);
-  EXPECT_TRUE(inbox.take().people->wiped.empty());
-  inbox.put_people(second);
   inbox.put_people(all_three());
-  const PeopleChange last = inbox.take().people.value_or(PeopleChange{});
-  EXPECT_TRUE(last.complete);
-  EXPECT_TRUE(last.annotations.empty());
-  EXPECT_EQ(last.words.size(), 1u);
-  for (std::uint64_t i = 0; i < 1000; ++i) inbox.put_people(said(i, kAda, {}, "again"));
-  EXPECT_EQ(inbox.take().people->words.size(), 64u);
+  inbox.put_people(about_ada({.stopped = true}));
+  const Delivery delivery = inbox.take();
+  ASSERT_TRUE(delivery.people);
+  EXPECT_TRUE(delivery.people->people[0].supervision.stopped);
+  EXPECT_FALSE(inbox.take().people);
 }
 
 TEST(Wrapped, BreaksAtBlanksAndCutsOff) {
