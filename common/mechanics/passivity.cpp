@@ -30,7 +30,8 @@ Vec3 rotation_vector(const Eigen::Quaterniond& q) {
 // Of the mount itself behind a load that grows: damping over stiffness, the slower of both ways.
 double lag_of(const MountParams& m) {
   constexpr double kSI = 1e-3;
-  return 2.0 * m.damping * std::sqrt(kSI * std::max(m.mass_kg / m.stiffness_n_per_mm, m.inertia_kg_mm2 / m.stiffness_nmm_per_rad));
+  const double place = m.mass_kg / m.stiffness_n_per_mm, turn = m.inertia_kg_mm2 / m.stiffness_nmm_per_rad;
+  return 2.0 * m.damping * std::sqrt(kSI * std::max(place, turn));
 }
 
 double smoothed_lag(double lag_s, double sample_s) {
@@ -162,14 +163,13 @@ void ShownBone::step(const Load& load, double dt_s) noexcept {
     others_mj_ = std::max(0.0, others_mj_ + own_mj_);
     own_mj_ = 0.0;
   }
-  give_away();
-}
 
-void ShownBone::give_away() noexcept {
-  const double spare_mj = own_mj_ - params_.kept_mj;
-  if (spare_mj <= 0.0) return;
+  // What was granted is handed on while it is not wanted here: who is short of it gets it in the end.
+  const double spare_mj = std::max(0.0, own_mj_ - params_.kept_mj);
+  const double handed_on_mj = held_back_ || net_mj < 0.0 ? 0.0 : std::min(1.0, dt_s / params_.hand_on_s) * others_mj_;
   own_mj_ -= spare_mj;
-  given_mj_ += spare_mj;
+  others_mj_ -= handed_on_mj;
+  given_mj_ += spare_mj + handed_on_mj;
 }
 
 BonePush ShownBone::push() noexcept {

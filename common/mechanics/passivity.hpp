@@ -11,8 +11,8 @@
 //
 // A step of the shown bone that would overdraw it is held back as far as it gives energy. Nothing is forgotten by that: the
 // pose told is where the bone goes as soon as that is paid for, or costs nothing as the hand lets go. What its hand has put in,
-// but for a little, a client gives away; the server grants it to the others, who need it to be pushed back. Totals that never
-// fall are told, so that loss and order do no harm. Over all users, for any line and any hand:
+// but for a little, a client gives away; the server grants it to the others, who need it to be pushed back and hand on what
+// they do not. Totals that never fall are told, so that loss and order do no harm. Over all users, for any line and any hand:
 //
 //   sum of put in >= sum of released - sum of allowances
 //
@@ -94,6 +94,7 @@ struct ShownBoneParams {
   double allowance_mj = 2.0;             // that may be released unpaid, in all
   double kept_mj = 2.0;                  // of what this hand put in; the rest is given away at once
   double granted_most_mj = 50.0;         // of what others gave, at hand
+  double hand_on_s = 0.5;                // time constant with which that is given away again while it is not wanted
   double silent_s = 0.5;                 // without a place told for so long the bone stands
 };
 
@@ -128,7 +129,6 @@ class ShownBone {
     Vec3 mm = Vec3::Zero();
     Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
   };
-  void give_away() noexcept;
 
   ShownBoneParams params_;
   Place told_, smooth_, shown_;     // the newest pose, after one pass, after both

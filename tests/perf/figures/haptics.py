@@ -88,4 +88,27 @@ def blackout(run):
     }
 
 
-GROUPS = {"haptic_tick": tick, "haptic_blackout": blackout, "haptic_stability": stability}
+def mount(run):
+    """Two users on one bone, a million ticks over each line; the same numbers on every machine."""
+    run.say("mount: two users push a bone against each other, a million ticks over each of four lines")
+    out = json.loads(run.output("osteon-mount", 10_000_000 if run.soak else 1_000_000, progress=True))
+    names = ("kind", "line_ms", "rests", "worst_percent", "mean_percent", "made_mj", "force_n", "growth", "held_back",
+             "put_in_mj", "released_mj", "low_pass_s")
+    run.tables.append(("two users on a bone on its mount", [names] + [tuple(r[n] for n in names) for r in out["runs"]]))
+    controlled = [r for r in out["runs"] if r["kind"] != "uncontrolled"]
+    values = {
+        "mount_ticks": Measured(min(r["ticks"] for r in controlled)),
+        "mount_made_of_allowance": Measured(max(r["made_mj"] / r["allowance_mj"] for r in controlled)),
+        "mount_account": Measured(max(r["account_mj"] for r in controlled)),
+        "mount_growth": Measured(max(r["growth"] for r in controlled)),
+        "mount_uncontrolled": Measured(max(r["made_mj"] for r in out["runs"] if r["kind"] == "uncontrolled"),
+                                       max(r["made_mj"] for r in controlled)),
+    }
+    for r in controlled:
+        if r["kind"] == "push":
+            values[f"mount_rest_error_{r['line_ms']}ms"] = Measured(r["worst_percent"], r["mean_percent"])
+            values[f"mount_rests_{r['line_ms']}ms"] = Measured(r["rests"])
+    return values
+
+
+GROUPS = {"haptic_tick": tick, "haptic_blackout": blackout, "haptic_stability": stability, "haptic_mount": mount}

@@ -301,6 +301,24 @@ FIGURES = [
     Figure("stability_six_torque_late", "nmm", "the cut's own torque later than 10 ms after the pedal", "haptic_stability",
            ("==", 0), full=True),
     Figure("stability_six_torque_largest", "nmm", "the largest torque", "haptic_stability", full=True),
+    # Two users who push a bone on its mount against each other, on virtual time: lines of 0, 50 and 150 ms one way, and one of
+    # either; but for the first with 30 ms of jitter and 30 % loss.
+    *[figure for line, what in (("0", "lines without delay"), ("50", "lines of 50 ms"), ("150", "lines of 150 ms"),
+                                ("0_and_150", "a line without delay and one of 150 ms")) for figure in (
+        Figure(f"mount_rest_error_{line}ms", "percent", f"{what}: largest error of what either feels of the other at rest, "
+               "against the closed form of two springs on the mount", "haptic_mount", ("<=", 5.0), baseline="mean", full=True),
+        Figure(f"mount_rests_{line}ms", "count", f"{what}: pushes at whose ends that was measured", "haptic_mount", (">=", 30),
+               full=True))],
+    Figure("mount_ticks", "count", "ticks over each of these lines, of hands that push, that never rest, and that are three "
+           "times as stiff", "haptic_mount", (">=", 1_000_000), full=True),
+    Figure("mount_made_of_allowance", "ratio", "most that the bones shown ever gave both hands beyond what both put in, over "
+           "what they are allowed to, once", "haptic_mount", ("<=", 1.000001), full=True),
+    Figure("mount_account", "mj", "what clients tell of energy against the work reckoned from outside", "haptic_mount",
+           ("<=", 1e-3), full=True),
+    Figure("mount_growth", "ratio", "largest force in the second half of the ticks over that in the first", "haptic_mount",
+           ("<=", 1.5), full=True),
+    Figure("mount_uncontrolled", "mj", "what the stiff hands would be given without the controller", "haptic_mount",
+           (">=", 100.0), baseline="most with it", full=True),
     # The whole tick, and the loop beside a network that falls silent for 10 s.
     *[figure for work, what in (
         ("drill", "drilling with a 3.2 mm drill"), ("burr", "burring with a 5 mm burr"), ("pin", "driving a pin"),

@@ -68,6 +68,9 @@ struct User {
   double force_n = 0, face_x_mm = 0;
   Load load;
   double put_in_mj = 0;
+
+  // How far the place of the face has gone along the push.
+  double face_now_mm() const { return side * (bone.pose_world_bone().point(face_mm).x() - face_mm.x()); }
 };
 
 // Where the hand's rest place is, of a push that begins at from_s of the cycle and is over after 7/8 of it.
@@ -128,7 +131,7 @@ TwoUsersResult push_each_other(const TwoUsersRun& run) {
         user.face_mm = {-10.0 * user.side, run.arm_mm, 0.0};
       }
       if (uniform(0.0, 1.0) < 0.5) users[1].from_s = users[0].from_s, users[1].ramp_s = users[0].ramp_s;
-      for (User& user : users) user.face_x_mm = user.side * (user.bone.pose_world_bone().point(user.face_mm).x() - user.face_mm.x());
+      for (User& user : users) user.face_x_mm = user.face_now_mm();
     }
 
     for (std::size_t i = 0; i < 2; ++i) {
@@ -147,8 +150,9 @@ TwoUsersResult push_each_other(const TwoUsersRun& run) {
       HandCommand command;
       command.axis = Vec3::UnitX();
       command.target_mm.x() = in_cycle_s < 0.0 ? -User::kApart_mm : wanted_mm(user, in_cycle_s, run.cycle_s);
-      if (run.shaken) command.target_mm.x() += 2.0 * std::sin(6.283 * (0.6 + 1.7 * static_cast<double>(i)) * now_s) * uniform(0.5, 1.0);
-      const double face_mm = user.side * (user.bone.pose_world_bone().point(user.face_mm).x() - user.face_mm.x());
+      const double hertz = 0.6 + 1.7 * static_cast<double>(i);
+      if (run.shaken) command.target_mm.x() += 2.0 * std::sin(6.283 * hertz * now_s) * uniform(0.5, 1.0);
+      const double face_mm = user.face_now_mm();
       const double deep_mm = user.hand.position_mm().x() - face_mm;
       const double speed = user.hand.velocity_mm_per_s().x() - (face_mm - user.face_x_mm) / kDt;
       user.face_x_mm = face_mm;

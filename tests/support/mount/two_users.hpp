@@ -24,7 +24,7 @@ struct TwoUsersRun {
 
 struct TwoUsersResult {
   int rests = 0;                    // ends of pushes at which both were measured
-  double worst_error = 0;           // of the force that either felt against the closed form, as a part of what the other made of it
+  double worst_error = 0;           // of either's force against the closed form, as a part of what the other made of it
   double mean_error = 0;
   double least_other_n = 1e300;     // the least that one made of what the other felt
   double most_created_mj = 0;       // at any time: what both bones gave, less what both hands put in
