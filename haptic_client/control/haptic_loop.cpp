@@ -24,6 +24,7 @@ HapticLoop::HapticLoop(const LoopParams& params, std::vector<ToolModel> tools)
     : params_(params),
       tools_(std::move(tools)),
       ledger_(EnergyParams{.dt_s = params.dt_s, .turn_arm_mm = Proxy::kTurnArm_mm}),
+      guide_pull_(guide_pull_params(params.device_n_per_mm, params.continuous_n, params.dt_s)),
       turn_arm_mm_(params.peak_nmm > 0.0 ? Proxy::kTurnArm_mm : 0.0) {
   effects_.reserve(tools_.size());
   for (const ToolModel& model : tools_) effects_.emplace_back(model.tool, model.wear);
@@ -41,6 +42,7 @@ void HapticLoop::take_up(int tool, const Pose& pose_bone_tool, const WorkspaceMa
   coupling_.reset(pose_bone_tool.position_mm, pose_bone_tool.position_mm);
   ledger_.reset();
   motor_.reset();
+  guide_pull_.reset();
   if (!effects_.empty()) effects_[static_cast<std::size_t>(tool)].take_up();
   shown_ = {};
   motor_nmm_.setZero();
@@ -57,6 +59,9 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   if (input.periods > 3) report.events |= kMissedTicks;
   const bool follows = input.room == RoomLink::follows;
   if (!follows) report.events |= kRoomHeld;
+  const bool may_work = overseer_.may_cut(tool_, proxy_.pose().position_mm);
+  if (!may_work) report.events |= kForbidden;
+  const bool works = follows && may_work;
 
   // While the clutch is held the tool stays; letting go ties the handle to the tool where it now is, without force.
   if (clutched_ && !input.clutch) mapping_.anchor(input.pose_device_tool.position_mm, proxy_.pose().position_mm);
@@ -89,8 +94,13 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
     report.events |= kGuided;
   }
 
-  spindle_.step(model.spindle, follows && placed_ ? input.spindle_rpm : 0.0, torque_nmm_, params_.dt_s);
+  spindle_.step(model.spindle, works && placed_ ? input.spindle_rpm : 0.0, torque_nmm_, params_.dt_s);
   if (spindle_.stalled) report.events |= kStalled;
+
+  // Of the force that is felt and cut with, as physical force.
+  const double s = params_.force_scale;
+  const double device_n = (input.device_warm ? params_.continuous_n : params_.peak_n) / s;
+  const double limit_n = overseer_.limit_n(device_n, shown_.force_n.norm() / s, slow_n(input) / s);
 
   const Pose proxy_before = proxy_.pose();
   double paid_n_per_mm = coupling_n_per_mm_;
@@ -100,11 +110,12 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
     const bool cuts_waiting = proxy_.sweeps_full() || pieces_.size() >= 60;
     if (cuts_waiting) report.events |= kCutsWaiting;
     // Cutting spends no more than the hand has put in.
-    const double at_handle = params_.force_scale / mapping_.scale();
+    const double at_handle = s / mapping_.scale();
     const double stretch_mm = (pose_bone_wanted.position_mm - proxy_before.position_mm).norm();
     paid_n_per_mm = ledger_.paid_n_per_mm(at_handle * coupling_n_per_mm_, stretch_mm) / at_handle;
+    if (limit_n < device_n) paid_n_per_mm = std::min(paid_n_per_mm, limit_n / stretch_mm);
     step = proxy_.step(model, patch, pose_bone_wanted, spindle_.rpm, paid_n_per_mm,
-                       follows && !input.clutch && !cuts_waiting, params_.dt_s,
+                       works && !input.clutch && !cuts_waiting, params_.dt_s,
                        {guides, guiding_.held() ? guiding_.guide_id() : 0u,
                         params_.tool_effects ? &effects_[static_cast<std::size_t>(tool_)] : nullptr});
   }
@@ -138,21 +149,19 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
                                        : CuttingPhase::idle;
 
   // The coupling's spring, as far as the device could ever show it.
-  const double s = params_.force_scale;
-  const double limit_n = input.device_warm ? params_.continuous_n : params_.peak_n;
   CouplingMoment moment;
   moment.handle_mm = pose_bone_device.position_mm;
   moment.proxy_before_mm = proxy_before.position_mm;
   moment.proxy_mm = proxy_.pose().position_mm;
   moment.stiffness_n_per_mm = coupling_n_per_mm_;
-  moment.limit_n = limit_n / s;
+  moment.limit_n = limit_n;
   moment.energy_scale = s / mapping_.scale();
   moment.fell_short = fell_short_;
   moment.touching = (step.contact || step.breakthrough || held_back) && step.covered && !input.clutch;
   // A torque goes to the handle as the work of a force does, so that one store holds both: where the workspace is larger than
   // the bone, levers seem longer.
   moment.stiffness_nmm_per_rad = turn_arm_mm_ * turn_arm_mm_ * coupling_n_per_mm_;
-  moment.limit_nmm = (input.device_warm ? params_.continuous_nmm : params_.peak_nmm) / moment.energy_scale;
+  moment.limit_nmm = (input.device_warm ? params_.continuous_nmm : params_.peak_nmm) / moment.energy_scale * (limit_n / device_n);
   if (step.contact) {
     moment.turn_before_rad = between(proxy_before, pose_bone_wanted).turn_rad;
     moment.turn_rad = step.turn_rad;
@@ -214,15 +223,16 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   // turn, as much at its arm.
   const double hand_mm = norm_mm(between(device_, report.pose_bone_device), turn_arm_mm_);
   const double by_hand_n = 2.0 * s * coupling_n_per_mm_ * hand_mm;
-  const double slow_n = params_.slew_n_per_ms * 1e3 * params_.dt_s * input.periods;
+  const double slow = slow_n(input);
+  const Vec3 before_n = shown_.force_n;
   // Safety zeros and free air come at once.
   const Vec3 turn_nmm = moment.energy_scale * (coupling.turn_spring_nmm + coupling.turn_damping_nmm);
   Wrench wanted;
   if (moment.touching && safe) {
     wanted.force_n = s * (coupling.spring_n + coupling.damping_n + coupling.cutting_lag_n);
-    wanted.force_n = slewed(ramp_ * clamped(wanted.force_n, limit_n), shown_.force_n, by_hand_n + slow_n, report);
+    wanted.force_n = slewed(ramp_ * clamped(wanted.force_n, limit_n), shown_.force_n, by_hand_n + slow, report);
     wanted.torque_nmm = slewed(ramp_ * clamped(turn_nmm, limit_nmm), shown_.torque_nmm,
-                               turn_arm_mm_ * (by_hand_n / mapping_.scale() + slow_n), report);
+                               turn_arm_mm_ * (by_hand_n / mapping_.scale() + slow), report);
   }
   const auto share = [](const Vec3& shown, double whole) { return whole > 0.0 ? std::min(1.0, shown.norm() / whole) : 0.0; };
   const Wrench damping{
@@ -241,7 +251,7 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
 
   // The motor's port, beside the ledger, in what the limit leaves.
   MotorMoment motor;
-  motor.pedal = input.spindle_rpm > 0.0 && input.room == RoomLink::follows && safe;
+  motor.pedal = input.spindle_rpm > 0.0 && input.room == RoomLink::follows && !(report.events & kForbidden) && safe;
   motor.spindle_rpm = spindle_.rpm;
   motor.teeth = model.tool.teeth;
   motor.normal_n = shown_.force_n / s;
@@ -254,7 +264,10 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   if (!params_.motor_effects || !safe) motor_n.setZero();
   motor_n = clamped(motor_n, std::max(0.0, limit_n - shown_.force_n.norm()));
   report.motor_device_n = mapping_.to_device(motor_n);
-  report.force_device_n = report.coupling_device_n + report.motor_device_n;
+  // What the contact leaves of the growth that nobody's hand causes is the pull's.
+  const double grown_n = growth(shown_.force_n, before_n).norm() - by_hand_n;
+  lead(input, std::max(0.0, limit_n - shown_.force_n.norm() - motor_n.norm()), std::clamp(slow - grown_n, 0.0, slow), report);
+  report.force_device_n = report.coupling_device_n + report.motor_device_n + report.guide_device_n;
 
   // So too the moment of the cut, never a force: no more than the force shown would be at the arm of a turn, and no faster
   // than force grows that the hand did not cause.
@@ -262,19 +275,45 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
                                    std::max(0.0, limit_nmm - shown_.torque_nmm.norm()));
   Vec3 motor_nmm = Vec3::Zero();
   if (params_.motor_effects && safe) motor_nmm = ramp_ * motor_.open() * moment.energy_scale * cut_nmm;
-  motor_nmm_ = clamped(clamped(motor_nmm, motor_nmm_.norm() + turn_arm_mm_ * slow_n), most_nmm);
+  motor_nmm_ = clamped(clamped(motor_nmm, motor_nmm_.norm() + turn_arm_mm_ * slow), most_nmm);
   report.motor_device_nmm = mapping_.to_device(motor_nmm_);
   report.torque_device_nmm = report.coupling_device_nmm + report.motor_device_nmm;
 }
 
-Vec3 HapticLoop::slewed(const Vec3& wanted, const Vec3& now, double most, LoopReport& report) noexcept {
-  // Lessening what there is comes at once: what counts is the way from the nearest part of what is shown now.
+void HapticLoop::lead(const LoopInput& input, double room_n, double slew_n, LoopReport& report) noexcept {
+  const Oversight& oversight = overseer_.now();
+  GuideSeen seen = guide_seen_;
+  seen.there &= static_cast<bool>(oversight.guide);
+  guide_pull_.see(seen);
+  const Vec3& guide_mm = guide_pull_.smoothed_mm();
+  GuideMoment moment;
+  moment.handle_mm = input.pose_device_tool.position_mm;
+  moment.guide_mm = mapping_.pose_device_tool({guide_mm, Eigen::Quaterniond::Identity()}).position_mm;
+  moment.share = input.room == RoomLink::over ? 0.0 : oversight.guide_share;
+  moment.room_n = room_n;
+  moment.slew_n = slew_n;
+  moment.safe = placed_ && input.device_ok && input.periods <= 3 && !input.clutch;
+  report.guide_device_n = guide_pull_.step(moment);
+  if (!guide_pull_.pulls()) return;
+  report.events |= kHandGuided;
+  report.guide_distance_mm = (guide_mm - report.pose_bone_device.position_mm).norm();
+}
+
+double HapticLoop::slow_n(const LoopInput& input) const noexcept {
+  return params_.slew_n_per_ms * 1e3 * params_.dt_s * input.periods;
+}
+
+// Lessening what there is comes at once: what counts is the way from the nearest part of what is shown now.
+Vec3 HapticLoop::growth(const Vec3& wanted, const Vec3& now) noexcept {
   const double square = now.squaredNorm();
-  const double kept = square > 0.0 ? std::clamp(wanted.dot(now) / square, 0.0, 1.0) : 0.0;
-  const Vec3 from = kept * now, step = wanted - from;
+  return wanted - (square > 0.0 ? std::clamp(wanted.dot(now) / square, 0.0, 1.0) : 0.0) * now;
+}
+
+Vec3 HapticLoop::slewed(const Vec3& wanted, const Vec3& now, double most, LoopReport& report) noexcept {
+  const Vec3 step = growth(wanted, now);
   if (step.norm() <= most) return wanted;
   report.events |= kSlewLimited;
-  return from + step * (most / step.norm());
+  return wanted - step + step * (most / step.norm());
 }
 
 void HapticLoop::record(const ToolModel& model, const ProxyStep& step, LoopReport& report) noexcept {
@@ -285,10 +324,12 @@ void HapticLoop::record(const ToolModel& model, const ProxyStep& step, LoopRepor
   }
   if (!recorder_.recording()) return;
   // A tool that stands rubs with its points, its faces a little within the bone: that is no cut.
-  if (step.may_cut) recorder_.add(proxy_.cut_pose());
+  // Nor is what the room would refuse.
+  const bool taken = step.may_cut && overseer_.takes(proxy_.cut_pose().position_mm);
+  if (taken) recorder_.add(proxy_.cut_pose());
   quiet_ticks_ = step.near_bone ? 0 : quiet_ticks_ + 1;
 
-  const bool over = quiet_ticks_ >= kQuietTicks || !step.may_cut;
+  const bool over = quiet_ticks_ >= kQuietTicks || !taken;
   if (!recorder_.due() && !over) return;
   CutPiece piece;
   if (recorder_.close(piece)) {

@@ -14,8 +14,10 @@
 #include "common/runtime/event_queue.hpp"
 #include "haptic_client/control/coupling.hpp"
 #include "haptic_client/control/cut_recorder.hpp"
+#include "haptic_client/control/guide_pull.hpp"
 #include "haptic_client/control/guiding.hpp"
 #include "haptic_client/control/motor_port.hpp"
+#include "haptic_client/control/oversight.hpp"
 #include "haptic_client/control/proxy.hpp"
 #include "haptic_client/control/workspace_mapping.hpp"
 
@@ -74,9 +76,11 @@ enum LoopEvent : std::uint32_t {
   kEnergyLimited = 1024, // the passivity monitor cut the force
   kRamping = 2048,       // after connecting, or as the room is over
   kRoomHeld = 4096,      // the room takes no cuts: the spindle stands
+  kForbidden = 8192,     // an instructor does not let this tool cut here now: the spindle stands
+  kHandGuided = 16384,   // another's hand leads this one
 };
 // Bits up to the last of them.
-inline constexpr std::size_t kLoopEvents = std::bit_width(std::uint32_t{kRoomHeld});
+inline constexpr std::size_t kLoopEvents = std::bit_width(std::uint32_t{kHandGuided});
 
 struct LoopReport {
   Vec3 force_device_n = Vec3::Zero();    // to write to the device, device frame
@@ -85,7 +89,8 @@ struct LoopReport {
   double cutting_work_mj = 0;            // of that force over the way cut in this tick, physical
   double pushed_back_mj = 0;             // that a cut's force would have given the tool in a tick that turning undid; not shown
   Vec3 coupling_device_n = Vec3::Zero(); // what of force_device_n is the coupling's: passive
-  Vec3 motor_device_n = Vec3::Zero();    // the rest, the motor's: active, within s · mu · normal force
+  Vec3 motor_device_n = Vec3::Zero();    // of the motor: active, within s · mu · normal force
+  Vec3 guide_device_n = Vec3::Zero();    // the rest, of a hand that leads this one: what that one's motion pays for
   Vec3 torque_physical_nmm = Vec3::Zero();  // of the bone on the tool about its tip, bone frame; not scaled
   Vec3 torque_device_nmm = Vec3::Zero();    // to write to a device that shows torque, device frame: the sum of these
   Vec3 coupling_device_nmm = Vec3::Zero();  // of the turn's spring: passive, in the ledger
@@ -94,6 +99,7 @@ struct LoopReport {
   Pose pose_bone_proxy, pose_bone_device;
   Vec3 offset_mm = Vec3::Zero();         // of the handle's place, bone frame: slack, and what returned bone would have stretched
   EnergyReport energy;                   // of the coupling, at the handle
+  double guide_distance_mm = 0;          // while led: from the handle's place to that of the hand that leads it, bone frame
   double guide_play_mm = 0;              // while guided: how far the tip may be off the opening's middle
   double spindle_rpm = 0, feed_mm_per_s = 0, density_g_cm3 = 0, engaged = 0, torque_nmm = 0;
   double across_n = 0;                   // of the law, across the feed; the hand feels it through the motor's port
@@ -111,6 +117,10 @@ class HapticLoop {
 
   // [haptic] Takes up a tool in free air, with the handle at a place of the device.
   void take_up(int tool, const Pose& pose_bone_tool, const WorkspaceMapping& mapping) noexcept;
+  // [haptic] What holds from the next tick on, until told otherwise.
+  void oversee(const Oversight& oversight) noexcept { overseer_.set(oversight); }
+  void oversee(const StopFlag& flag) noexcept { overseer_.set(flag); }
+  void see_guide(const GuideSeen& seen) noexcept { guide_seen_ = seen; }  // of whom the oversight names
   // [haptic] `patch`: the newest there is; `guides`: those that stand on the bone.
   LoopReport tick(const LoopInput& input, const Patch& patch, std::span<const PlacedGuide> guides = {}) noexcept;
 
@@ -121,6 +131,9 @@ class HapticLoop {
   // [haptic]
   [[nodiscard]] const WorkspaceMapping& mapping() const noexcept { return mapping_; }
   [[nodiscard]] std::uint64_t cuts_closed() const noexcept { return cuts_closed_; }
+  // [haptic]
+  [[nodiscard]] const Overseer& overseer() const noexcept { return overseer_; }
+  [[nodiscard]] const EnergyReport& guide_energy() const noexcept { return guide_pull_.energy(); }
   // [haptic] K_c of the tool in hand, physical: where the tool moves m mm for each mm of the handle, the device shows
   // m · s · K_c, which its k limits.
   [[nodiscard]] double coupling_n_per_mm() const noexcept { return coupling_n_per_mm_; }
@@ -133,6 +146,11 @@ class HapticLoop {
   // the cut, physical.
   void show(const LoopInput& input, const ToolModel& model, const CouplingForce& coupling, const CouplingMoment& moment,
             const Vec3& cut_nmm, LoopReport& report) noexcept;
+  // The pull of another's hand, in what limit and slew leave.
+  void lead(const LoopInput& input, double room_n, double slew_n, LoopReport& report) noexcept;
+  // Growth of force on the device in this tick that no hand caused.
+  [[nodiscard]] double slow_n(const LoopInput& input) const noexcept;
+  [[nodiscard]] static Vec3 growth(const Vec3& wanted, const Vec3& now) noexcept;
   // A force or torque, `now` what is shown, that rises by no more than `most`.
   [[nodiscard]] static Vec3 slewed(const Vec3& wanted, const Vec3& now, double most, LoopReport& report) noexcept;
 
@@ -157,6 +175,9 @@ class HapticLoop {
   Coupling coupling_;
   EnergyLedger ledger_;
   MotorPort motor_;
+  Overseer overseer_;
+  GuidePull guide_pull_;
+  GuideSeen guide_seen_;
   Wrench shown_;                          // of the coupling, rendered in the last tick, bone frame
   Vec3 motor_nmm_ = Vec3::Zero();         // of the motor, likewise
   double turn_arm_mm_ = 0;                // of a turn that does work at the handle; zero where no torque is shown

@@ -347,6 +347,8 @@ TEST(Recording, NamesItsEvents) {
   EXPECT_EQ(named(kEnergyLimited), "energy limited");
   EXPECT_EQ(named(kRamping), "ramping");
   EXPECT_EQ(named(kRoomHeld), "room held");
+  EXPECT_EQ(named(kForbidden), "forbidden");
+  EXPECT_EQ(named(kHandGuided), "hand guided");
   EXPECT_EQ(names.size(), kLoopEvents);
 }
 

@@ -1,0 +1,48 @@
+#include "haptic_client/control/oversight.hpp"
+
+#include <algorithm>
+
+namespace osteon::haptic {
+
+Oversight oversight_of(const Supervision& supervision, RoomSeq place, std::uint64_t lease_epoch,
+                       std::span<const ToolModel> tools) {
+  Oversight out;
+  out.room_seq = place;
+  out.lease_epoch = lease_epoch;
+  out.stopped = supervision.stopped;
+  out.taken_by = supervision.taken_by;
+  out.guide = supervision.guide;
+  out.guide_share = static_cast<double>(supervision.guide_share) / kWholeShare;
+  out.force_limit_n = supervision.force_limit_n();
+  out.zone = supervision.zone;
+  out.some_tools = !supervision.tools.empty();
+  for (std::size_t i = 0; i < std::min(tools.size(), Oversight::kMostTools); ++i)
+    out.forbidden[i] = out.some_tools && !std::ranges::binary_search(supervision.tools, tools[i].tool.hash());
+  return out;
+}
+
+bool Overseer::may_cut(int tool, const Vec3& tip_mm) const noexcept {
+  if (stopped()) return false;
+  const auto index = static_cast<std::size_t>(tool);
+  if (now_.some_tools && (index >= Oversight::kMostTools || now_.forbidden[index])) return false;
+  if (!now_.zone) return true;
+  const Vec3 centre_mm(now_.zone->centre[0], now_.zone->centre[1], now_.zone->centre[2]);
+  return (tip_mm - kQuantum_mm * centre_mm).norm() <= kQuantum_mm * now_.zone->radius - kEdge_mm;
+}
+
+bool Overseer::takes(const Vec3& tip_mm) const noexcept {
+  return !now_.zone || now_.zone->contains(quantise(Pose{tip_mm, Eigen::Quaterniond::Identity()}).position);
+}
+
+double Overseer::limit_n(double device_n, double felt_n, double slew_n) noexcept {
+  if (now_.force_limit_n > 0.0) {
+    const double from_n = cap_n_ ? *cap_n_ : std::min(device_n, std::max(felt_n, now_.force_limit_n));
+    cap_n_ = std::clamp(now_.force_limit_n, from_n - slew_n, from_n + slew_n);
+  } else if (cap_n_) {
+    *cap_n_ += slew_n;
+    if (*cap_n_ >= device_n) cap_n_.reset();
+  }
+  return cap_n_ ? std::min(*cap_n_, device_n) : device_n;
+}
+
+}  // namespace osteon::haptic

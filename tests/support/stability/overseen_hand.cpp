@@ -1,0 +1,140 @@
+#include "tests/support/stability/overseen_hand.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/support/allocation_counter.hpp"
+#include "tests/support/scenes/bones.hpp"
+
+namespace osteon::test {
+namespace {
+
+using namespace haptic;
+
+constexpr double kPitch_mm = 0.5;
+constexpr int kPatchTicks = 10;
+
+// 30 mm wide, its upper face at z = 0, entered along +z.
+Case block() {
+  const auto distance = [](const Vec3& p) {
+    return std::max({std::abs(p.x()) - 15.0, std::abs(p.y()) - 8.0, -p.z(), p.z() - 12.0});
+  };
+  return make_bone({{-17, -10, -4}, {17, 10, 14}}, kPitch_mm, distance, [](const Vec3&) { return 1.9; });
+}
+
+Vec3 growth(const Vec3& now, const Vec3& before) {
+  const double square = before.squaredNorm();
+  return now - (square > 0.0 ? std::clamp(now.dot(before) / square, 0.0, 1.0) : 0.0) * before;
+}
+
+}  // namespace
+
+OverseenHand::OverseenHand(const OverseenRun& run)
+    : run_(run), bone_(block()), replica_(bone_, BodyId{}), room_(bone_, run.delay_ms), rotation_(Eigen::Quaterniond::Identity()) {
+  const SimulatedDeviceParams device = run.weak ? *find_simulated_device("simulated-3.3N") : SimulatedDeviceParams{};
+  LoopParams params = loop_params(device.limits, 0.0);
+  params.ramp_s = 1e-9;
+  params.slew_n_per_ms = run.slew_n_per_ms;
+  loop_ = std::make_unique<HapticLoop>(params, std::vector<ToolModel>{ToolModel(*find_tool(run.tool), bone_.pitch_mm())});
+  const Pose start{{0, 0, -3}, rotation_};
+  WorkspaceMapping mapping;
+  mapping.align(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized())), run.weak ? 0.5 : 1.0, Vec3::Zero(),
+                start.position_mm);
+  loop_->take_up(0, start, mapping);
+  device_ = std::make_unique<SimulatedDevice>(device);
+  device_->take(scaled(expert_hand(), params.force_scale, mapping.scale()), mapping.pose_device_tool(start).position_mm);
+  builder_.build(replica_.bodies(), loop_->tool(0), start, patch_);
+  command.target_mm = start.position_mm;
+}
+
+void OverseenHand::decide(const Supervision& supervision) {
+  // As the room does: a lease is granted anew where the hand may cut from now on, or may no more.
+  if (now_.stopped != supervision.stopped || now_.taken_by != supervision.taken_by) room_.undo(0), ++epoch_;
+  now_ = supervision;
+  decided_.push_back({ticks_ + run_.delay_ms, supervision, epoch_});
+}
+
+LoopReport OverseenHand::tick() {
+  for (; !decided_.empty() && decided_.front().due <= ticks_; decided_.pop_front()) {
+    const ToolModel tools[] = {loop_->tool(0)};
+    loop_->oversee(oversight_of(decided_.front().supervision, RoomSeq{++decisions_}, decided_.front().epoch, tools));
+  }
+  ++ticks_;
+  const WorkspaceMapping& mapping = loop_->mapping();
+  HandCommand device_command = command;
+  device_command.target_mm = mapping.pose_device_tool({command.target_mm, rotation_}).position_mm;
+  device_command.axis = mapping.to_device(command.axis);
+  device_->command(device_command, mapping.pose_device_tool({Vec3::Zero(), rotation_}).rotation, pedal ? kSpindlePedal : 0u);
+  device_->step(1e-3);
+  const DeviceReading reading = device_->read();
+  LoopInput input;
+  input.pose_device_tool = reading.pose_device_tool;
+  input.spindle_rpm = pedal ? std::max(1000.0, loop_->tool(0).tool.spindle_rpm) : 0.0;
+  {
+    const AllocationCounter heap;
+    loop_->see_guide(guide);
+    last_ = loop_->tick(input, patch_);
+    crossed_.allocations += heap.count();
+  }
+  device_->write(DeviceOutput{last_.force_device_n, last_.torque_device_nmm});
+  see(last_, reading.pose_device_tool.position_mm);
+  follow();
+  return last_;
+}
+
+void OverseenHand::run(int ticks, const std::function<void(const LoopReport&)>& each) {
+  for (int i = 0; i < ticks; ++i) {
+    const LoopReport report = tick();
+    if (each) each(report);
+  }
+}
+
+void OverseenHand::see(const LoopReport& report, const Vec3& handle_mm) {
+  const LoopParams& params = loop_->params();
+  const Vec3 moved_mm = seen_ ? Vec3(handle_mm - handle_mm_) : Vec3(Vec3::Zero());
+  // The hand's motion raises the coupling's spring and damping; the pull it does not raise at all.
+  const double k = params.force_scale * loop_->coupling_n_per_mm() * loop_->mapping().scale();
+  const double by_hand_n = k * (2.0 * moved_mm.norm() + moved_before_mm_);
+  const double coupling_n = std::max(0.0, growth(report.coupling_device_n, coupling_n_).norm() - by_hand_n);
+  const double guide_n = growth(report.guide_device_n, guide_n_).norm();
+  // Against what is meant to be the limit, whatever the loop was told.
+  constexpr double kSlew_n = 0.5;
+  crossed_.step_over_slew = std::max(crossed_.step_over_slew, (coupling_n + guide_n) / kSlew_n);
+  crossed_.fall_n = std::max(crossed_.fall_n, force_n_.norm() - report.force_device_n.norm());
+
+  const double cut_mj = params.force_scale / loop_->mapping().scale() * report.cutting_work_mj;
+  episode_mj_ += coupling_n_.dot(moved_mm) + cut_mj;
+  const bool touching = report.phase == CuttingPhase::rubbing || report.phase == CuttingPhase::cutting;
+  crossed_.touching += touching;
+  crossed_.cutting += report.phase == CuttingPhase::cutting;
+  if (!touching && report.coupling_device_n.isZero()) {
+    crossed_.worst_mj = std::max(crossed_.worst_mj, episode_mj_);
+    episode_mj_ = 0.0;
+  }
+  crossed_.led_mj = std::max(crossed_.led_mj, loop_->guide_energy().worst_mj);
+
+  coupling_n_ = report.coupling_device_n;
+  guide_n_ = report.guide_device_n;
+  force_n_ = report.force_device_n;
+  handle_mm_ = handle_mm;
+  moved_before_mm_ = moved_mm.norm();
+  seen_ = true;
+}
+
+void OverseenHand::follow() {
+  CutPiece piece;
+  while (loop_->take_piece(piece)) {
+    const Cut cut = cut_of(piece, loop_->tool(0), AuthorId{1}, room_.lease_epoch());
+    replica_.add_own(cut);
+    room_.send(cut);
+    cuts_.push_back(cut);
+  }
+  room_.tick(replica_);
+  if (ticks_ % kPatchTicks != 0) return;
+  for (const ChangedLeaves& change : replica_.take_changes()) builder_.changed(kPitch_mm, change.level, change.origins);
+  builder_.build(replica_.bodies(), loop_->tool(0), last_.pose_bone_proxy, patch_);
+  patch_.own_cuts = replica_.last_own();
+  patch_.room_seq = replica_.room_seq();
+}
+
+}  // namespace osteon::test
