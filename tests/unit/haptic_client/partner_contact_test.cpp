@@ -85,9 +85,11 @@ TEST(PartnerContact, FeelsNothingThatDoesNotTouch) {
 }
 
 TEST(PartnerContact, IsBoundedAndGrowsSlowly) {
-  const PartnerParams params;
+  PartnerParams params;
+  params.most_n = 2.0;
   Pair pair;
-  double before_n = 0.0;
+  pair.contact = PartnerContact(params);
+  double before_n = 0.0, most_n = 0.0;
   for (int i = 0; i < 2000; ++i) {
     // A partner that jumps in and out, and a hand that does.
     const PartnerTool partner = pair.partner(facing((i / 130) % 2 ? -4.0 : 5.0));
@@ -96,7 +98,9 @@ TEST(PartnerContact, IsBoundedAndGrowsSlowly) {
     EXPECT_LE(now_n, params.most_n + 1e-9);
     EXPECT_LE(now_n - before_n, params.most_n_per_s * kTick + 1e-9);
     before_n = now_n;
+    most_n = std::max(most_n, now_n);
   }
+  EXPECT_GT(most_n, 1.9);
 }
 
 TEST(PartnerContact, IsSofterWhereTheLineIsLonger) {

@@ -178,6 +178,25 @@ TEST(ShownBone, CountsGrantsOfTheNewSessionOnly) {
   EXPECT_EQ(bone.granted_mj(), 10.0);
 }
 
+// A grant that nobody here wants goes to the others, all of it and once.
+TEST(ShownBone, HandsOnWhatItDoesNotNeed) {
+  ShownBoneParams params;
+  ShownBone bone(params);
+  BoneSeen seen;
+  for (int i = 0; i < 10'000; ++i) {
+    if (i % 8 == 0 && i < 9'000) {
+      ++seen.seen_seq;
+      seen.energy_mj = i > 0 ? 20.0 : 0.0;
+      bone.see(seen);
+    }
+    bone.step({}, kTick);
+    ASSERT_NEAR(bone.funds_mj() + bone.given_mj(), params.allowance_mj + bone.granted_mj(), 1e-9);
+  }
+  EXPECT_EQ(bone.granted_mj(), 20.0);
+  EXPECT_NEAR(bone.given_mj(), 20.0, 1e-3);
+  EXPECT_GE(bone.push().energy_mj, 19.99);
+}
+
 TEST(ShownBone, DoesNotAllocate) {
   ShownBone bone{ShownBoneParams{}};
   BoneSeen seen;
