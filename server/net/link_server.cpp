@@ -69,6 +69,18 @@ void SessionLink::know_tool(std::uint32_t number, const Digest& tool) {
   link_.tools().add(number, tool);
 }
 
+bool SessionLink::set_partners(std::span<const CuttingState> partners) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!link_.alive(now_of_links())) return false;
+    std::vector<wire::HeardState> heard;
+    for (const CuttingState& state : partners) heard.push_back({state, 0});
+    link_.set_partners(heard);
+  }
+  if (server_) server_->wake();
+  return true;
+}
+
 void SessionLink::close() {
   const std::lock_guard told(told_mutex_);
   sink_ = nullptr;

@@ -42,6 +42,8 @@ class SessionLink {
   // goes over the stream alone.
   bool tell(std::uint64_t index, const wire::SessionRow& row);
   void know_tool(std::uint32_t number, const Digest& tool);
+  // Newest states of others' tools. False: nothing gets through now, so they are for the stream to tell.
+  bool set_partners(std::span<const CuttingState> partners);
   // Nothing is told to the sink any more once this returns.
   void close();
 

@@ -1,5 +1,6 @@
 #include "server/net/outbox.hpp"
 
+#include <algorithm>
 #include <iterator>
 #include <utility>
 
@@ -74,6 +75,8 @@ bool SessionOutbox::add(RoomSeq place, Bytes row) {
   if (!takes(place)) return true;
   if (rows_.size() >= kMaxRows) return false;
   rows_.push_back({++index_, std::move(row)});
+  places_.emplace_back(index_, place);
+  if (places_.size() > kMaxRows) places_.pop_front();
   return true;
 }
 
@@ -83,8 +86,11 @@ bool SessionOutbox::add_answer(Bytes row) {
   return true;
 }
 
-void SessionOutbox::arrived(std::uint64_t index) {
+RoomSeq SessionOutbox::arrived(std::uint64_t index) {
   std::erase_if(rows_, [&](const Row& row) { return row.index != 0 && row.index <= index; });
+  RoomSeq newest;
+  for (; !places_.empty() && places_.front().first <= index; places_.pop_front()) newest = places_.front().second;
+  return newest;
 }
 
 MessageParts SessionOutbox::take() {
@@ -114,6 +120,36 @@ MessageParts SessionOutbox::take() {
   v1::SessionResponse number;
   number.set_index(row.index);
   return {row.bytes, serialised(number)};
+}
+
+void PartnerOutbox::offer(const std::vector<CuttingState>& all, bool by_stream) {
+  std::erase_if(partners_, [&](const auto& known) {
+    return std::ranges::find(all, known.first, &CuttingState::author) == all.end();
+  });
+  for (const CuttingState& state : all) {
+    const auto known = partners_.find(state.author);
+    if (known == partners_.end()) {
+      if (partners_.size() < kMost) partners_[state.author] = {state, by_stream};
+      continue;
+    }
+    Partner& partner = known->second;
+    partner.waits = by_stream && (partner.waits || partner.state.state_seq != state.state_seq);
+    partner.state = state;
+  }
+}
+
+std::optional<CuttingState> PartnerOutbox::take(Clock::time_point now) {
+  for (auto& [author, partner] : partners_) {
+    if (!partner.waits || now < partner.next) continue;
+    partner.waits = false;
+    partner.next = now + kApart;
+    return partner.state;
+  }
+  return std::nullopt;
+}
+
+bool PartnerOutbox::waits() const {
+  return std::ranges::any_of(partners_, [](const auto& entry) { return entry.second.waits; });
 }
 
 }  // namespace osteon

@@ -1,16 +1,20 @@
 // What waits for one subscriber while a message to it is in flight: bounded, newest wins. Free of gRPC, so that a slow
 // reader is tested without one.
 #pragma once
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/core/id.hpp"
 #include "common/field/field_hash.hpp"
+#include "common/mechanics/cutting_state.hpp"
 #include "common/surface/mesh_block.hpp"
 
 namespace google::protobuf {
@@ -74,8 +78,11 @@ class SessionOutbox {
   [[nodiscard]] bool takes(RoomSeq place) const { return place > contained_; }
   // Of the newest row that was taken.
   [[nodiscard]] std::uint64_t index() const { return index_; }
-  // The reader has rows up to this number by another way: those that still wait need not be sent.
-  void arrived(std::uint64_t index);
+  // The reader has rows up to this number by another way: those that still wait need not be sent. Gives the place of the
+  // newest row that it is known to have; null: nobody knows.
+  RoomSeq arrived(std::uint64_t index);
+  // All that goes before the rows has been taken.
+  [[nodiscard]] bool begun() const { return leaves_known_ && !complete_; }
   // An answer outside the order: the first outcome of a cut that was sent again.
   [[nodiscard]] bool add_answer(Bytes row);
   [[nodiscard]] MessageParts take();
@@ -93,7 +100,30 @@ class SessionOutbox {
     Bytes bytes;
   };
   std::deque<Row> rows_;
+  std::deque<std::pair<std::uint64_t, RoomSeq>> places_;  // of rows that the reader is not known to have
   std::uint64_t index_ = 0;
+};
+
+// Newest states of others' tools that go over a session's stream, where datagrams do not get through.
+class PartnerOutbox {
+ public:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::size_t kMost = 16;                    // as many as a link tells of
+  static constexpr std::chrono::nanoseconds kApart{1'000'000'000 / 30};
+
+  // All there are; those that are gone need not be told. `by_stream` false: they go another way, so that nothing waits.
+  void offer(const std::vector<CuttingState>& all, bool by_stream);
+  // The next one that is due.
+  [[nodiscard]] std::optional<CuttingState> take(Clock::time_point now);
+  [[nodiscard]] bool waits() const;
+
+ private:
+  struct Partner {
+    CuttingState state;
+    bool waits = true;
+    Clock::time_point next{};
+  };
+  std::map<AuthorId, Partner> partners_;
 };
 
 }  // namespace osteon

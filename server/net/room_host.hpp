@@ -18,6 +18,7 @@
 #include "server/net/cut_figures.hpp"
 #include "server/net/room_keeper.hpp"
 #include "server/net/outbox.hpp"
+#include "server/net/people_board.hpp"
 #include "server/net/playback.hpp"
 #include "server/net/state_board.hpp"
 #include "server/net/stream_sink.hpp"
@@ -37,6 +38,10 @@ class SessionSink : public StreamSink {
   virtual void offer(RoomSeq place, const Bytes& row) = 0;  // a whole SessionResponse
   // The same, with what goes in few bytes of it.
   virtual void offer(RoomSeq place, const Bytes& row, const wire::SessionRow& /*fast*/) { offer(place, row); }
+  // [thread of the tools' states] All tools' newest states. True: some of it is owed, and wants to be told again soon.
+  virtual bool show_partners(const std::vector<CuttingState>& /*states*/) { return false; }
+  // What holds for the hand from the beginning, as a row that has no number: after begin().
+  virtual void hold(const wire::SessionRow& /*supervised*/) {}
   // A tool's number in few bytes: after begin() for those of the room, and before the row that adds another.
   virtual void know_tool(std::uint32_t /*number*/, const Digest& /*tool*/) {}
   virtual void answer(const Bytes& row) = 0;                // the same, outside the room's order
@@ -111,9 +116,11 @@ class RoomHost {
   void run_slowly(std::function<void()> job);
   // `answer` is called when it is durable, on the committing thread. Error unavailable: the room has stopped or keeps nothing
   // any more.
-  void join(MemberKind kind, const std::string& name, const Digest& secret, std::function<void(const Result<AuthorId>&)> answer);
+  void join(MemberKind kind, const std::string& name, const Digest& secret, Role role,
+            std::function<void(const Result<AuthorId>&)> answer);
   // The same; waits, so not on the tick or the committing thread, nor of a driven host.
-  [[nodiscard]] Result<AuthorId> join(MemberKind kind, const std::string& name = {}, const Digest& secret = {});
+  [[nodiscard]] Result<AuthorId> join(MemberKind kind, const std::string& name = {}, const Digest& secret = {},
+                                      Role role = Role::none);
   // Whether an earlier connection may go on. `kept`: what it was told is safe, if anything. Errors: invalid_input (not the
   // secret of which the author has the digest), unavailable (the room has lost what was said to be safe).
   [[nodiscard]] Result<void> resume(AuthorId author, const Digest& secret, const std::optional<JournalHead>& kept);
@@ -135,6 +142,8 @@ class RoomHost {
   void look(AuthorId viewer, const Look& from);
   [[nodiscard]] bool draws_near() const;  // what Detail has come to mean here
   void watch_cutting(CuttingSink& sink);
+  // Whoever watches it, says how far they have heard, or asks who is there.
+  [[nodiscard]] PeopleBoard& people();
   // Afterwards the sink hears nothing more. Unknown sinks are none of its business.
   void leave(SessionSink& sink);
   void leave(MeshSink& sink);

@@ -88,6 +88,29 @@ Bytes scene_row(RoomSeq place, const std::vector<SceneItem>& items) {
   return serialised(response);
 }
 
+Bytes supervised_row(RoomSeq place, const Supervision& supervision, std::uint64_t lease_epoch) {
+  v1::SessionResponse response;
+  response.mutable_supervised()->set_room_seq(place.value);
+  *response.mutable_supervised()->mutable_supervision() = wire::to_wire(supervision);
+  response.mutable_supervised()->set_lease_epoch(lease_epoch);
+  return serialised(response);
+}
+
+Bytes said_row(RoomSeq place, AuthorId from, const WordsRow& words) {
+  v1::SessionResponse response;
+  response.mutable_said()->set_room_seq(place.value);
+  response.mutable_said()->set_from(from.value);
+  response.mutable_said()->set_to(words.to.value);
+  response.mutable_said()->set_words(words.words);
+  return serialised(response);
+}
+
+Bytes partner_row(const CuttingState& state) {
+  v1::SessionResponse response;
+  *response.mutable_partner() = wire::to_wire(state);
+  return serialised(response);
+}
+
 Bytes noted_row(RoomSeq place, const std::string& mark) {
   v1::SessionResponse response;
   response.mutable_noted()->set_room_seq(place.value);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/link/sealed.hpp"
+#include "common/mechanics/cutting_state.hpp"
 #include "server/journal/chain.hpp"
 #include "server/net/outbox.hpp"
 #include "server/room/room.hpp"
@@ -23,6 +24,10 @@ namespace osteon {
 [[nodiscard]] Bytes redial_row(std::chrono::milliseconds after, const std::string& why);
 [[nodiscard]] Bytes tool_row(RoomSeq place, const Tool& tool, std::uint32_t number);
 [[nodiscard]] Bytes scene_row(RoomSeq place, const std::vector<SceneItem>& items);
+// What an instructor has decided; `place` null: what held before.
+[[nodiscard]] Bytes supervised_row(RoomSeq place, const Supervision& supervision, std::uint64_t lease_epoch);
+[[nodiscard]] Bytes said_row(RoomSeq place, AuthorId from, const WordsRow& words);
+[[nodiscard]] Bytes partner_row(const CuttingState& state);
 [[nodiscard]] Bytes noted_row(RoomSeq place, const std::string& mark);
 [[nodiscard]] MessageParts change_rows(const RoomEvent& event);  // at least one; each of a bounded size
 

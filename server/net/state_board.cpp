@@ -46,6 +46,11 @@ std::size_t StateBoard::streams() const {
   return streams_.size();
 }
 
+void StateBoard::tell_hands(TellHands tell) {
+  const std::lock_guard lock(states_mutex_);
+  tell_hands_ = std::move(tell);
+}
+
 void StateBoard::offer(CuttingState state) {
   const std::lock_guard lock(states_mutex_);
   Shown& shown = states_[state.author];
@@ -101,6 +106,14 @@ void StateBoard::run() {
     lock.unlock();
     tell(Clock::now());
     lock.lock();
+    if (!tell_hands_) continue;
+    const TellHands tell = tell_hands_;
+    std::vector<CuttingState> states;
+    for (const auto& [author, shown] : states_) states.push_back(shown.state);
+    lock.unlock();
+    const bool owed = tell(states);
+    lock.lock();
+    owed_ |= owed;
   }
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 #include <chrono>
 #include <condition_variable>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -22,6 +23,8 @@ namespace osteon {
 class CuttingSink : public StreamSink {
  public:
   virtual void offer(const Bytes& message) = 0;  // a whole WatchCuttingResponse; newest wins
+  // Whose stream it is; null: nobody knows.
+  [[nodiscard]] virtual AuthorId author() const { return {}; }
   // It wants them no closer together, on average.
   [[nodiscard]] virtual std::chrono::nanoseconds apart() const { return {}; }
 };
@@ -44,6 +47,10 @@ class StateBoard {
   void leave(CuttingSink& sink);
   void end_streams(const std::string& why);  // those open now and those that come later
   [[nodiscard]] std::size_t streams() const;
+
+  // Whoever holds a tool is told of the others' on the board's thread: true, and it is called again with the next tick.
+  using TellHands = std::function<bool(const std::vector<CuttingState>&)>;
+  void tell_hands(TellHands tell);
 
   void offer(CuttingState state);  // newest of its author wins
   void session_over(AuthorId author);
@@ -80,6 +87,7 @@ class StateBoard {
   bool changed_ = false;      // since it was made
   bool due_ = false;          // to be told
   bool owed_ = false;         // someone lacks the newest, who wants it later
+  TellHands tell_hands_;
   bool end_ = false;
 
   std::thread thread_;

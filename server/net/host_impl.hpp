@@ -1,0 +1,149 @@
+// The inside of a RoomHost, for its own sources.
+#pragma once
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <shared_mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "server/net/host_parts.hpp"
+#include "server/net/job_thread.hpp"
+#include "server/net/mesh_room.hpp"
+#include "server/net/people_board.hpp"
+#include "server/net/piece_watch.hpp"
+#include "server/net/room_host.hpp"
+#include "server/net/room_rows.hpp"
+#include "server/net/state_board.hpp"
+
+namespace osteon {
+
+[[nodiscard]] Error only_to_be_watched();
+
+// Who watches a playback is no row of it, so their numbers must not be those of the room that is shown.
+inline constexpr std::uint64_t kFirstWatcherOfPlayback = 1ull << 40;
+
+// Lock order: copy_mutex, then room_mutex, then sessions_mutex or that of the surface or the board, then a stream's own, then
+// that of the people or the jobs.
+// queue_mutex, pieces_mutex, stats_mutex and that of the figures are never held with another.
+struct RoomHost::Impl {
+  using Clock = RoomHost::Clock;
+
+  Impl(Room r, HostRates rates, Detail detail, RoomKeeper* k, std::optional<Playback> p)
+      : keeper(k), room(std::move(r)),
+        rates_(rates),
+        room_began(Clock::now() - std::chrono::duration_cast<Clock::duration>(room.time())),
+        people(room, names_of(k)),
+        mesh(room, room_mutex, {rates.mesh, rates.looks}, detail, [this] { return board.tool_tips_mm(); }),
+        committer(k ? [k](std::span<const RoomRow> rows) { return k->write(rows); } : Committer::Write{},
+                  [this](const Error& why) { close_room(why); }, !driven()) {
+    authors = room.authors();
+    if (p) player.emplace(std::move(*p), room.time());
+    board.tell_hands([this](const std::vector<CuttingState>& states) { return tell_hands(states); });
+  }
+  [[nodiscard]] static std::map<std::uint32_t, std::string> names_of(RoomKeeper* keeper);
+
+  [[nodiscard]] bool driven() const { return rates_.tick.count() == 0; }
+  // Of a playback they are among its rows.
+  [[nodiscard]] bool looks_for_pieces() const { return rates_.pieces.count() > 0 && !player; }
+  void run_ticks();
+  // Whether anything was decided.
+  bool tick(std::chrono::nanoseconds now, bool last);
+  bool play(std::chrono::nanoseconds now);
+  void run_pieces();
+  void decide(QueuedCut& queued);
+  void decide(QueuedEvent& queued);
+  void later(Committer::Tell tell) { tells.push_back(std::move(tell)); }  // [tick] when what was decided is durable
+  [[nodiscard]] MessageParts rows_of(const RoomEvent& event);
+  // What goes to some of the sessions in place of the row that the others get.
+  struct Personal {
+    AuthorId to;  // null: to all
+    Bytes row;    // null: there is none
+    wire::SessionRow fast;
+    [[nodiscard]] bool is_for(AuthorId author) const { return row && (!to || to == author); }
+  };
+  [[nodiscard]] static Personal personal_row(const RoomEvent& event);
+  // Whether any hand still lacks some of it.
+  bool tell_hands(const std::vector<CuttingState>& states);
+  [[nodiscard]] std::uint32_t number_of(const Digest& tool);
+  void tell_kept(std::chrono::nanoseconds now);
+  void note_changed(Clock::time_point arrived) {
+    if (!driven()) mesh.changed(arrived);
+  }
+  void close_room(const Error& why);
+  [[nodiscard]] std::optional<Error> closed() const;
+  void end_sessions(const std::string& why, bool to_return = false);
+  void show_scene();
+  void read_leaves(std::vector<FieldLeaf>& leaves);
+
+  // All bodies at one place of the order, copied while the room went on.
+  struct BoneCopy {
+    RoomSeq room_seq;
+    RoomCounts counts;
+    std::map<BodyId, CutField> bodies;
+    std::vector<SceneItem> items;
+  };
+  enum class Bodies { that_exist, all };
+  BoneCopy copy_bone(Bodies which = Bodies::that_exist);
+  void ask_for_split(Separation found);
+
+  RoomKeeper* const keeper;  // null: nothing is kept
+  std::optional<Player> player;           // of a playback, from the beginning; used by the tick thread alone
+  std::atomic<std::uint64_t> next_watcher{kFirstWatcherOfPlayback};  // of a playback
+  Room room;
+  std::shared_mutex room_mutex;
+  std::optional<std::vector<Cut>> meanwhile;  // under room_mutex: cuts applied since copy_bone() began to copy
+  const HostRates rates_;
+  const Clock::time_point room_began;     // the room's time 0, as if it had never been closed
+  std::atomic<std::uint64_t> room_seq{0}, authors{0};
+  std::atomic<bool> stopping{false};
+
+  std::mutex numbers_mutex;  // never held with another that is taken within
+  std::map<Digest, std::uint32_t> tool_numbers;
+
+  std::mutex queue_mutex;
+  std::vector<Queued> queue;
+  bool queue_closed = false;  // the last tick has taken what was queued
+
+  mutable std::mutex sessions_mutex;
+  Audience<SessionSink> sessions;
+  std::map<AuthorId, SessionSink*> open_authors;
+
+  PeopleBoard people;
+  StateBoard board;
+  MeshRoom mesh;
+
+  std::mutex pieces_mutex;
+  std::condition_variable pieces_wake;
+  bool pieces_due = true, pieces_end = false;
+  std::uint64_t looks_begun = 0, looks_done = 0;  // under pieces_mutex
+  bool look_wanted = false;                       // someone waits for the next one
+  PieceWatch pieces{room, room_mutex, [this](std::vector<FieldLeaf>& leaves) { read_leaves(leaves); }};  // of the piece thread
+
+  JobThread jobs;
+
+  mutable std::mutex stats_mutex;
+  TickStats stats;
+  RoomCounts counts;
+  CutFigures figures;
+
+  std::optional<std::string> ended;       // under sessions_mutex: why new sessions end at once
+  bool may_return = false;                // under sessions_mutex: so that they come again
+  Bytes redial;                           // under sessions_mutex: what sessions are told when the process is to stop
+  std::mutex copy_mutex;                  // held while the bone is copied: of a stopped host by whoever asks
+  std::optional<BoneStatus> last_status;  // under copy_mutex
+  std::vector<Queued> batch;              // of the tick thread
+  std::vector<Committer::Tell> tells;     // of the tick thread
+  std::chrono::nanoseconds next_kept{};   // of the tick thread: when it is next said how much is kept
+  Committer committer;                    // the last member with a thread: it tells the others
+
+  std::thread tick_thread, piece_thread;
+};
+
+}  // namespace osteon

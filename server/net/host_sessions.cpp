@@ -1,0 +1,341 @@
+// Who comes to a room, what is decided of what they ask, and what everybody is told of it.
+#include <algorithm>
+#include <charconv>
+#include <future>
+#include <iterator>
+#include <memory>
+
+#include "common/wire/convert.hpp"
+#include "server/net/host_impl.hpp"
+
+namespace osteon {
+namespace {
+
+using Clock = RoomHost::Clock;
+
+}  // namespace
+
+Error only_to_be_watched() {
+  return {ErrorCode::unavailable, "this room shows what happened in another: it can be watched, with osteon-viewer, and not changed"};
+}
+
+// A name that cannot be read now is shown as nobody's.
+std::map<std::uint32_t, std::string> RoomHost::Impl::names_of(RoomKeeper* keeper) {
+  std::map<std::uint32_t, std::string> names;
+  if (keeper == nullptr) return names;
+  const Result<std::vector<Person>> people = keeper->people();
+  if (!people) return names;
+  for (const Person& person : *people) {
+    std::uint32_t number = 0;
+    const char* end = person.pseudonym.data() + person.pseudonym.size();
+    if (std::from_chars(person.pseudonym.data(), end, number).ptr == end) names[number] = person.label;
+  }
+  return names;
+}
+
+void RoomHost::Impl::decide(QueuedCut& queued) {
+  if (closed() || player) return later([sink = queued.sink](const Result<void>&) { sink->decided(); });
+  const Clock::time_point taken = Clock::now();
+  Result<Outcome> outcome = [&] {
+    const std::unique_lock lock(room_mutex);
+    Result<Outcome> decision = room.submit(queued.cut);
+    room_seq = room.room_seq().value;
+    if (meanwhile && decision && decision->committed() && !decision->repeated) meanwhile->push_back(queued.cut);
+    return decision;
+  }();
+  if (!outcome)
+    return later([sink = queued.sink, why = outcome.error()](const Result<void>&) {
+      sink->refuse(why);
+      sink->decided();
+    });
+  if (!outcome->report.changed_leaves.empty()) note_changed(queued.arrived);
+  const Clock::time_point done = Clock::now();
+  const bool newly = outcome->committed() && !outcome->repeated;
+  if (newly) figures.committed(queued.arrived, taken, done);
+  if (!outcome->committed() && !outcome->repeated) figures.rejected(outcome->rejection);
+  const Bytes row = outcome->committed() ? cut_row(outcome->room_seq, queued.cut)
+                                         : rejection_row(outcome->room_seq, queued.cut.author_seq, outcome->lease_epoch,
+                                                         outcome->rejection);
+  tell_kept(room.time());
+  wire::SessionRow fast{.room_seq = outcome->room_seq, .kind = wire::SessionRowKind::committed};
+  if (outcome->committed()) {
+    fast.cut = queued.cut;
+  } else {
+    fast.kind = wire::SessionRowKind::rejected;
+    fast.author_seq = queued.cut.author_seq;
+    fast.reason = static_cast<std::uint32_t>(outcome->rejection);
+    fast.lease_epoch = outcome->lease_epoch;
+  }
+  later([this, sink = queued.sink, row, fast = std::move(fast), place = outcome->room_seq, repeated = outcome->repeated,
+         to_all = outcome->committed(), newly, done](const Result<void>& durable) {
+    const Clock::time_point kept = Clock::now();
+    if (durable) {
+      const std::lock_guard lock(sessions_mutex);
+      // The author may have come back on another stream meanwhile.
+      const auto author = open_authors.find(sink->author());
+      if (!repeated && to_all)
+        sessions.each([&](SessionSink& one) { one.offer(place, row, fast); });
+      else if (author != open_authors.end())
+        repeated ? author->second->answer(row) : author->second->offer(place, row, fast);
+    }
+    if (durable && newly) figures.told(done, kept, Clock::now());
+    if (durable && newly) people.took_cut(sink->author());
+    sink->decided();
+  });
+}
+
+void RoomHost::Impl::decide(QueuedEvent& queued) {
+  Result<RoomEvent> event = [&]() -> Result<RoomEvent> {
+    if (const std::optional<Error> why = closed()) return tl::unexpected(*why);
+    if (player) return tl::unexpected(only_to_be_watched());
+    const std::unique_lock lock(room_mutex);
+    Result<RoomEvent> decision = queued.change(room);
+    room_seq = room.room_seq().value;
+    return decision;
+  }();
+  MessageParts rows;
+  Personal personal;
+  if (event && event->room_seq) {
+    rows = rows_of(*event);
+    personal = personal_row(*event);
+    event->leaves.clear();
+    if (event->scene || event->bone) show_scene();
+    if (event->bone) note_changed(queued.arrived);
+  }
+  later([this, rows = std::move(rows), personal = std::move(personal), event = std::move(event),
+         answer = std::move(queued.answer)](const Result<void>& durable) {
+    if (!durable) return answer(tl::unexpected(durable.error()));
+    if (event) people.take(*event);
+    {
+      const std::lock_guard lock(sessions_mutex);
+      if (event && event->tool && event->room_seq) {
+        const std::uint32_t number = number_of(event->tool->hash);
+        sessions.each([&](SessionSink& sink) { sink.know_tool(number, event->tool->hash); });
+      }
+      for (const Bytes& row : rows)
+        sessions.each([&](SessionSink& sink) {
+          if (personal.is_for(sink.author()))
+            sink.offer(event->room_seq, personal.row, personal.fast);
+          else
+            sink.offer(event->room_seq, row, {.room_seq = event->room_seq, .kind = wire::SessionRowKind::streamed});
+        });
+    }
+    answer(event);
+  });
+}
+
+// [tick] Every second, what a client may hold the room to.
+void RoomHost::Impl::tell_kept(std::chrono::nanoseconds now) {
+  if (!keeper || now < next_kept) return;
+  next_kept = now + std::chrono::seconds(1);
+  later([this](const Result<void>& durable) {
+    if (!durable) return;
+    const Bytes row = kept_row(keeper->head());
+    const std::lock_guard lock(sessions_mutex);
+    sessions.each([&](SessionSink& sink) { sink.answer(row); });
+  });
+}
+
+// [any thread] Tools are numbered as they come to be told, the same for all sessions.
+std::uint32_t RoomHost::Impl::number_of(const Digest& tool) {
+  const std::lock_guard lock(numbers_mutex);
+  return tool_numbers.emplace(tool, static_cast<std::uint32_t>(tool_numbers.size() + 1)).first->second;
+}
+
+// [tick] What every session hears of an event that is not a cut. Only this thread changes the room.
+MessageParts RoomHost::Impl::rows_of(const RoomEvent& event) {
+  MessageParts rows;
+  if (event.tool) rows.push_back(tool_row(event.room_seq, event.tool->tool, number_of(event.tool->hash)));
+  if (event.bone) rows = change_rows(event);
+  if (event.scene) rows.push_back(scene_row(event.room_seq, room.items()));
+  if (rows.empty()) rows.push_back(noted_row(event.room_seq, event.mark));  // so that the order has no gap
+  return rows;
+}
+
+RoomHost::Impl::Personal RoomHost::Impl::personal_row(const RoomEvent& event) {
+  if (const auto* decided = std::get_if<SuperviseRow>(&event.people))
+    return {decided->subject, supervised_row(event.room_seq, decided->supervision, event.lease_epoch),
+            {.room_seq = event.room_seq, .kind = wire::SessionRowKind::supervised, .lease_epoch = event.lease_epoch,
+             .supervision = decided->supervision}};
+  if (const auto* said = std::get_if<WordsRow>(&event.people))
+    return {said->to, said_row(event.room_seq, event.author, *said), {.room_seq = event.room_seq}};
+  return {};
+}
+
+// [thread of the board]
+bool RoomHost::Impl::tell_hands(const std::vector<CuttingState>& states) {
+  bool owed = false;
+  const std::lock_guard lock(sessions_mutex);
+  sessions.each([&](SessionSink& sink) { owed |= sink.show_partners(states); });
+  return owed;
+}
+
+void RoomHost::Impl::end_sessions(const std::string& why, bool to_return) {
+  const std::lock_guard lock(sessions_mutex);
+  ended = why;
+  may_return = to_return;
+  sessions.each([&](SessionSink& sink) { to_return ? sink.replaced(why) : sink.end(why); });
+}
+
+Result<void> RoomHost::resume(AuthorId author, const Digest& secret, const std::optional<JournalHead>& kept) {
+  if (impl_->player) return tl::unexpected(only_to_be_watched());
+  {
+    const std::shared_lock lock(impl_->room_mutex);
+    if (!impl_->room.proves(author, secret))
+      return failure(ErrorCode::invalid_input, "author " + std::to_string(author.value) +
+                                                   " of an earlier connection is not known here by that secret; join anew");
+  }
+  if (!kept || !impl_->keeper) return {};
+  return impl_->keeper->check_witness(*kept);
+}
+
+void RoomHost::join(MemberKind kind, const std::string& name, const Digest& secret, Role role,
+                    std::function<void(const Result<AuthorId>&)> answer) {
+  if (impl_->player) {
+    if (kind == MemberKind::watcher) return answer(AuthorId{impl_->next_watcher++});
+    return answer(tl::unexpected(only_to_be_watched()));
+  }
+  std::uint32_t person = 0;
+  if (impl_->keeper && !name.empty()) {
+    const Result<std::uint32_t> known = impl_->keeper->person(name);
+    if (!known) return answer(tl::unexpected(known.error()));
+    person = *known;
+  }
+  queue_event(
+      [=](Room& room) -> Result<RoomEvent> {
+        RoomEvent event;
+        event.kind = EventKind::join;
+        event.author = room.join(kind, person, secret, role);
+        event.room_seq = room.room_seq();
+        return event;
+      },
+      [this, kind, name, role, answer = std::move(answer)](const Result<RoomEvent>& event) {
+        if (!event) return answer(tl::unexpected(event.error()));
+        impl_->people.joined(event->author, name, role, kind == MemberKind::surgeon);
+        impl_->authors = std::max<std::uint64_t>(impl_->authors, event->author.value);
+        answer(event->author);
+      });
+}
+
+Result<AuthorId> RoomHost::join(MemberKind kind, const std::string& name, const Digest& secret, Role role) {
+  std::promise<Result<AuthorId>> answer;
+  join(kind, name, secret, role, [&](const Result<AuthorId>& author) { answer.set_value(author); });
+  return answer.get_future().get();
+}
+
+Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, const Digest& secret) {
+  if (impl_->player) return tl::unexpected(only_to_be_watched());
+  std::vector<FieldLeaf> leaves;
+  MessageParts before;
+  bool again = false;
+  {
+    // Held until the sink is listed: every row after `contained` is committed, and so offered, later.
+    const std::shared_lock room_lock(impl_->room_mutex);
+    if (!impl_->room.may_cut(sink->author()))
+      return failure(ErrorCode::invalid_input, "open.author " + std::to_string(sink->author().value) +
+                                                   " has not joined this room as a haptic client; call Join first");
+    for (const BodyId body : impl_->room.bodies())
+      std::ranges::move(impl_->room.find_field(body)->leaf_places(), std::back_inserter(leaves));
+    const std::vector<const ToolBox::Entry*> tools = impl_->room.tools()->entries();
+    for (const ToolBox::Entry* entry : tools) before.push_back(tool_row(RoomSeq{}, entry->tool, impl_->number_of(entry->hash)));
+    before.push_back(scene_row(impl_->room.room_seq(), impl_->room.items()));
+    // Whatever holds for the hand, it knows before it could cut; also that nothing does any more.
+    const People::Supervised& held = impl_->room.people().supervised(sink->author());
+    const std::uint64_t lease_epoch = impl_->room.lease_epoch(sink->author());
+    if (held.place) before.push_back(supervised_row(RoomSeq{}, held.supervision, lease_epoch));
+    v1::SessionResponse complete;
+    complete.mutable_complete()->set_room_seq(impl_->room.room_seq().value);
+    complete.mutable_complete()->set_lease_epoch(lease_epoch);
+    complete.mutable_complete()->set_decided_author_seq(impl_->room.decided(sink->author()));
+    for (const BodyId body : impl_->room.bodies()) complete.mutable_complete()->add_bodies(body.value);
+    const std::lock_guard lock(impl_->sessions_mutex);
+    SessionSink*& open = impl_->open_authors[sink->author()];
+    if (open && !impl_->room.proves(sink->author(), secret))
+      return failure(ErrorCode::invalid_input,
+                     "open.author " + std::to_string(sink->author().value) + " has an open session; join again for another");
+    if (open) {
+      open->replaced("another connection of the same client has taken its place");
+      impl_->sessions.remove(*open);
+      again = true;
+    }
+    open = sink.get();
+    impl_->sessions.add(*sink);
+    sink->begin(impl_->room.room_seq(), std::move(before), serialised(complete));
+    for (const ToolBox::Entry* entry : tools) sink->know_tool(impl_->number_of(entry->hash), entry->hash);
+    if (held.place)
+      sink->hold({.kind = wire::SessionRowKind::supervised, .lease_epoch = lease_epoch, .supervision = held.supervision});
+    if (impl_->redial) sink->answer(impl_->redial);
+    if (impl_->ended) impl_->may_return ? sink->replaced(*impl_->ended) : sink->end(*impl_->ended);
+  }
+  if (!again) impl_->people.came(sink->author());
+  impl_->read_leaves(leaves);
+  if (!impl_->keeper) {
+    sink->set_leaves(std::move(leaves));
+    return {};
+  }
+  // They hold what may not be kept yet, and `complete` says that it is decided: nobody hears of it before it is kept.
+  queue_event([](Room&) { return RoomEvent{}; },
+              [sink, leaves = std::move(leaves)](const Result<RoomEvent>& kept) mutable {
+                if (kept) sink->set_leaves(std::move(leaves));
+              });
+  return {};
+}
+
+void RoomHost::watch_mesh(MeshSink& sink, const std::optional<Look>& look) {
+  impl_->people.came(sink.author());
+  if (look) impl_->people.looked(sink.author(), *look);
+  impl_->mesh.watch(sink, look);
+}
+void RoomHost::look(AuthorId viewer, const Look& from) {
+  impl_->mesh.look(viewer, from);
+  impl_->people.looked(viewer, from);
+}
+bool RoomHost::draws_near() const { return impl_->mesh.draws_near(); }
+void RoomHost::watch_cutting(CuttingSink& sink) {
+  impl_->people.came(sink.author());
+  impl_->board.watch(sink);
+}
+void RoomHost::leave(MeshSink& sink) {
+  impl_->mesh.leave(sink);
+  impl_->people.went(sink.author());
+}
+void RoomHost::leave(CuttingSink& sink) {
+  impl_->board.leave(sink);
+  impl_->people.went(sink.author());
+}
+PeopleBoard& RoomHost::people() { return impl_->people; }
+void RoomHost::offer_state(CuttingState state) { impl_->board.offer(std::move(state)); }
+
+void RoomHost::leave(SessionSink& sink) {
+  bool was_open = false;
+  {
+    const std::lock_guard lock(impl_->sessions_mutex);
+    was_open = impl_->sessions.remove(sink);
+    if (was_open) impl_->open_authors.erase(sink.author());
+  }
+  if (!was_open) return;
+  impl_->board.session_over(sink.author());
+  impl_->people.went(sink.author());
+}
+
+void RoomHost::ask_to_redial(std::chrono::milliseconds after, const std::string& why) {
+  const std::lock_guard lock(impl_->sessions_mutex);
+  impl_->redial = redial_row(after, why);
+  impl_->sessions.each([&](SessionSink& sink) { sink.answer(impl_->redial); });
+}
+
+void RoomHost::send_away(const std::string& why) {
+  impl_->end_sessions(why, true);
+  impl_->mesh.end_streams(why);
+  impl_->board.end_streams(why);
+  impl_->people.end_streams(why);
+}
+
+void RoomHost::end_streams(const std::string& why) {
+  impl_->end_sessions(why);
+  impl_->mesh.end_streams(why);
+  impl_->board.end_streams(why);
+  impl_->people.end_streams(why);
+}
+
+}  // namespace osteon

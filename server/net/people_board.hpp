@@ -1,0 +1,114 @@
+// Who is in a room, what was decided about whom, what is drawn and what was said lately: what WatchPeople tells, and each
+// reader as far as their role goes.
+#pragma once
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/access/role.hpp"
+#include "common/core/id.hpp"
+#include "common/surface/look.hpp"
+#include "server/net/outbox.hpp"
+#include "server/net/stream_sink.hpp"
+#include "server/room/room.hpp"
+
+namespace osteon {
+
+class PeopleSink : public StreamSink {
+ public:
+  virtual void changed() = 0;  // there may be news(): it asks for them when it can send
+};
+
+// How far a reader has come.
+struct PeopleCursor {
+  std::uint64_t revision = 0, words = 0;
+  std::set<std::uint32_t> annotations;
+  bool begun = false;
+};
+
+// What a reader may be told beside what concerns themselves.
+struct PeopleRights {
+  bool others_supervision = true, others_words = true;
+};
+
+// Any thread. Lock order: that of the streams, then a stream's own, then that of the people.
+class PeopleBoard {
+ public:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::size_t kMostWords = 64;    // said last
+  static constexpr std::size_t kMostAbsent = 256;  // people who are not here, those who were here last
+  static constexpr std::chrono::milliseconds kApart{100};
+
+  // `names`: of people by their pseudonym, as far as they are known.
+  PeopleBoard(const Room& room, const std::map<std::uint32_t, std::string>& names);
+
+  void joined(AuthorId author, const std::string& name, Role role, bool hand);
+  void came(AuthorId author);  // one more session or stream of theirs; of nobody: nothing
+  void went(AuthorId author);
+  void take(const RoomEvent& event);  // supervise, annotation, words; of another kind: nothing
+  void took_cut(AuthorId author);
+  void heard(AuthorId author, RoomSeq place);
+  void looked(AuthorId author, const Look& from);
+
+  // Of those who have a hand, here or not, and may be overseen together: instructors are not among them.
+  [[nodiscard]] std::vector<AuthorId> hands_overseen() const;
+  [[nodiscard]] RoomSeq heard_of(AuthorId author) const;
+
+  // The sink hears of every change until it leaves or all streams end.
+  void watch(PeopleSink& sink);
+  void leave(PeopleSink& sink);
+  void end_streams(const std::string& why);  // those open now and those that come later
+  [[nodiscard]] std::size_t streams() const;
+  // [tick] Readers hear at most every kApart that there is something new.
+  void publish(RoomSeq room_seq, Clock::time_point now);
+
+  // A whole WatchPeopleResponse of what the reader lacks; null: nothing. The newest of each person and annotation, and of
+  // words those that are still here.
+  [[nodiscard]] Bytes news(PeopleCursor& cursor, AuthorId reader, const PeopleRights& rights) const;
+
+ private:
+  struct Entry {
+    std::uint64_t revision = 0;
+    std::string name;
+    Role role = Role::none;
+    bool hand = false;
+    int streams = 0;
+    Supervision supervision;
+    RoomSeq decided, heard;
+    std::optional<Look> look;
+    std::uint32_t cuts = 0;
+    std::uint64_t last_here = 0;  // revision
+  };
+  struct Drawn {
+    std::uint64_t revision = 0;
+    Annotation annotation;
+  };
+  struct Said {
+    std::uint64_t number = 0;
+    RoomSeq place;
+    AuthorId from, to;
+    std::string words;
+  };
+  Entry* change(AuthorId author);  // under mutex_; null: nobody is known by that
+
+  mutable std::mutex streams_mutex_;
+  std::vector<PeopleSink*> sinks_;
+  std::optional<std::string> ended_;
+  Clock::time_point next_{};  // of the tick
+
+  mutable std::mutex mutex_;
+  std::uint64_t revision_ = 1, told_ = 0;
+  std::map<AuthorId, Entry> people_;
+  std::map<std::uint32_t, Drawn> annotations_;
+  std::deque<Said> words_;
+  std::uint64_t words_said_ = 0;
+  RoomSeq room_seq_;
+};
+
+}  // namespace osteon

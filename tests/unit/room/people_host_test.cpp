@@ -1,0 +1,354 @@
+// What a host tells of its people: to whom a word goes, what holds for a hand that comes, how far it has heard, and what readers
+// are told who may not hear everything.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <future>
+#include <map>
+#include <mutex>
+
+#include "common/wire/convert.hpp"
+#include "osteon/v1/people.pb.h"
+#include "server/net/people_board.hpp"
+#include "server/net/room_host.hpp"
+#include "tests/unit/room/cuts.hpp"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+
+// Keeps what a session is told.
+class HeardSession final : public SessionSink {
+ public:
+  explicit HeardSession(AuthorId author) : author_(author) {}
+  AuthorId author() const override { return author_; }
+  void begin(RoomSeq, MessageParts before, Bytes complete) override {
+    for (const Bytes& part : before) take(part, before_);
+    complete_ = parsed(complete);
+  }
+  void set_leaves(std::vector<FieldLeaf>) override {}
+  void offer(RoomSeq place, const Bytes& row) override {
+    const std::lock_guard lock(mutex_);
+    take(row, rows_);
+    places_.push_back(place);
+    fast_.push_back({});
+  }
+  void offer(RoomSeq place, const Bytes& row, const wire::SessionRow& fast) override {
+    offer(place, row);
+    const std::lock_guard lock(mutex_);
+    fast_.back() = fast;
+  }
+  void hold(const wire::SessionRow& supervised) override { held_ = supervised; }
+  bool show_partners(const std::vector<CuttingState>& states) override {
+    const std::lock_guard lock(mutex_);
+    partners_ = states;
+    return false;
+  }
+  void answer(const Bytes&) override {}
+  void refuse(const Error& why) override { ADD_FAILURE() << why.message; }
+  void decided() override {}
+  void end(const std::string&) override {}
+  std::size_t waiting() const override { return 0; }
+
+  std::vector<v1::SessionResponse> before_;
+  v1::SessionResponse complete_;
+  std::optional<wire::SessionRow> held_;
+  std::vector<v1::SessionResponse> rows() const {
+    const std::lock_guard lock(mutex_);
+    return rows_;
+  }
+  std::vector<wire::SessionRow> fast() const {
+    const std::lock_guard lock(mutex_);
+    return fast_;
+  }
+  std::vector<RoomSeq> places() const {
+    const std::lock_guard lock(mutex_);
+    return places_;
+  }
+  std::vector<CuttingState> partners() const {
+    const std::lock_guard lock(mutex_);
+    return partners_;
+  }
+
+ private:
+  static v1::SessionResponse parsed(const Bytes& bytes) {
+    v1::SessionResponse response;
+    EXPECT_TRUE(response.ParseFromString(*bytes));
+    return response;
+  }
+  static void take(const Bytes& bytes, std::vector<v1::SessionResponse>& into) { into.push_back(parsed(bytes)); }
+
+  const AuthorId author_;
+  mutable std::mutex mutex_;
+  std::vector<v1::SessionResponse> rows_;
+  std::vector<wire::SessionRow> fast_;
+  std::vector<RoomSeq> places_;
+  std::vector<CuttingState> partners_;
+};
+
+// A driven host: what is asked of it is decided at once.
+struct Lesson {
+  Lesson() : host(Room(test::test_block()), {.tick = 0ns, .mesh = 1s, .pieces = 0ns}, {}) {
+    instructor = join("Ada", Role::instructor);
+    trainee = join("Ben", Role::trainee);
+    other = join("Cy", Role::trainee);
+    for (const AuthorId author : {trainee, other}) {
+      sessions[author] = std::make_shared<HeardSession>(author);
+      EXPECT_TRUE(host.open_session(sessions[author]));
+    }
+  }
+  AuthorId join(const std::string& name, Role role) {
+    AuthorId author;
+    host.join(MemberKind::surgeon, name, {}, role, [&](const Result<AuthorId>& given) { author = given.value(); });
+    tick();
+    return author;
+  }
+  void tick() { host.tick(now += 8ms); }
+  Result<RoomEvent> ask(std::function<Result<RoomEvent>(Room&)> what) {
+    std::optional<Result<RoomEvent>> answer;
+    host.queue_event(std::move(what), [&](const Result<RoomEvent>& decided) { answer = decided; });
+    tick();
+    return answer.value();
+  }
+  Result<RoomEvent> supervise(AuthorId subject, const Supervision& word) {
+    return ask([&](Room& room) { return room.supervise(instructor, subject, word); });
+  }
+  v1::WatchPeopleResponse news(PeopleCursor& cursor, AuthorId reader, const PeopleRights& rights = {}) {
+    v1::WatchPeopleResponse response;
+    if (const Bytes bytes = host.people().news(cursor, reader, rights)) EXPECT_TRUE(response.ParseFromString(*bytes));
+    return response;
+  }
+  static const v1::Person* person(const v1::WatchPeopleResponse& news, AuthorId author) {
+    const auto found = std::ranges::find(news.people(), author.value, &v1::Person::author);
+    return found == news.people().end() ? nullptr : &*found;
+  }
+
+  std::chrono::nanoseconds now{};
+  RoomHost host;
+  AuthorId instructor, trainee, other;
+  std::map<AuthorId, std::shared_ptr<HeardSession>> sessions;
+};
+
+TEST(PeopleHost, AWordGoesToItsHandAndLeavesNoGapForOthers) {
+  Lesson lesson;
+  const auto frozen = lesson.supervise(lesson.trainee, {.stopped = true, .words = "stop"});
+  ASSERT_TRUE(frozen);
+  const auto own = lesson.sessions[lesson.trainee]->rows(), others = lesson.sessions[lesson.other]->rows();
+  ASSERT_EQ(own.size(), 1u);
+  ASSERT_EQ(others.size(), 1u);
+  ASSERT_TRUE(own.back().has_supervised());
+  EXPECT_EQ(own.back().supervised().room_seq(), frozen->room_seq.value);
+  EXPECT_TRUE(own.back().supervised().supervision().stopped());
+  EXPECT_EQ(own.back().supervised().lease_epoch(), lesson.host.lease_epoch(lesson.trainee));
+  const wire::SessionRow fast = lesson.sessions[lesson.trainee]->fast().back();
+  EXPECT_EQ(fast.kind, wire::SessionRowKind::supervised);
+  EXPECT_TRUE(fast.supervision.stopped);
+  EXPECT_EQ(fast.lease_epoch, lesson.host.lease_epoch(lesson.trainee));
+  ASSERT_TRUE(others.back().has_noted());
+  EXPECT_EQ(others.back().noted().room_seq(), frozen->room_seq.value);
+
+  ASSERT_TRUE(lesson.ask([&](Room& room) { return room.say(lesson.instructor, lesson.other, "go on"); }));
+  EXPECT_TRUE(lesson.sessions[lesson.trainee]->rows().back().has_noted());
+  ASSERT_TRUE(lesson.sessions[lesson.other]->rows().back().has_said());
+  EXPECT_EQ(lesson.sessions[lesson.other]->rows().back().said().words(), "go on");
+  ASSERT_TRUE(lesson.ask([&](Room& room) { return room.say(lesson.instructor, {}, "all"); }));
+  ASSERT_TRUE(lesson.ask([&](Room& room) { return room.annotate(lesson.instructor, {.points = {{1, 2, 3}}}); }));
+  for (const auto& [author, session] : lesson.sessions) {
+    const auto rows = session->rows();
+    EXPECT_EQ(rows[rows.size() - 2].said().words(), "all");
+    EXPECT_TRUE(rows.back().has_noted()) << "a drawing";
+    const auto places = session->places();
+    for (std::size_t i = 1; i < places.size(); ++i) EXPECT_EQ(places[i].value, places[i - 1].value + 1) << "no gap";
+  }
+}
+
+TEST(PeopleHost, WhoComesIsToldFirstWhatHolds) {
+  Lesson lesson;
+  const AuthorId away = lesson.join("Di", Role::trainee);
+  ASSERT_TRUE(lesson.supervise(away, {.taken_by = lesson.instructor}));
+  const auto comes = [&] {
+    const auto session = std::make_shared<HeardSession>(away);
+    EXPECT_TRUE(lesson.host.open_session(session));
+    return session;
+  };
+  const auto first = comes();
+  const auto told = std::ranges::find_if(first->before_, [](const auto& row) { return row.has_supervised(); });
+  ASSERT_NE(told, first->before_.end());
+  EXPECT_EQ(told->supervised().room_seq(), 0u);
+  EXPECT_EQ(told->supervised().supervision().taken_by(), lesson.instructor.value);
+  EXPECT_EQ(told->supervised().lease_epoch(), first->complete_.complete().lease_epoch());
+  ASSERT_TRUE(first->held_) << "and its link, for the flag";
+  EXPECT_FALSE(first->held_->supervision.may_cut());
+  lesson.host.leave(*first);
+
+  // Freed while it was away: it must not go on believing otherwise.
+  ASSERT_TRUE(lesson.supervise(away, {}));
+  const auto second = comes();
+  ASSERT_TRUE(second->held_);
+  EXPECT_TRUE(second->held_->supervision.may_cut());
+  EXPECT_EQ(std::ranges::count_if(lesson.sessions[lesson.trainee]->before_, [](const auto& row) { return row.has_supervised(); }), 0)
+      << "of whom nobody has decided anything";
+}
+
+TEST(PeopleHost, WhatIsDecidedIsPendingUntilItIsHeard) {
+  Lesson lesson;
+  PeopleCursor cursor;
+  const v1::WatchPeopleResponse first = lesson.news(cursor, lesson.instructor);
+  EXPECT_TRUE(first.complete());
+  ASSERT_EQ(first.people_size(), 3);
+  const v1::Person* ben = Lesson::person(first, lesson.trainee);
+  EXPECT_EQ(ben->name(), "Ben");
+  EXPECT_EQ(ben->role(), v1::ROLE_TRAINEE);
+  EXPECT_TRUE(ben->here() && ben->hand());
+  EXPECT_FALSE(ben->has_supervision());
+  EXPECT_FALSE(Lesson::person(first, lesson.instructor)->here()) << "joined, and no stream is open";
+
+  const RoomSeq place = lesson.supervise(lesson.trainee, {.stopped = true})->room_seq;
+  v1::WatchPeopleResponse next = lesson.news(cursor, lesson.instructor);
+  EXPECT_FALSE(next.complete());
+  ASSERT_EQ(next.people_size(), 1) << "nobody else has changed";
+  EXPECT_EQ(next.people(0).decided_room_seq(), place.value);
+  EXPECT_LT(next.people(0).heard_room_seq(), place.value);
+  EXPECT_TRUE(next.people(0).supervision().stopped());
+  EXPECT_EQ(lesson.host.people().news(cursor, lesson.instructor, {}), nullptr) << "all is told";
+
+  lesson.host.people().heard(lesson.trainee, place);
+  lesson.host.people().heard(lesson.trainee, RoomSeq{1});
+  next = lesson.news(cursor, lesson.instructor);
+  ASSERT_EQ(next.people_size(), 1);
+  EXPECT_EQ(next.people(0).heard_room_seq(), place.value) << "what was heard later was said earlier";
+
+  lesson.host.leave(*lesson.sessions[lesson.trainee]);
+  next = lesson.news(cursor, lesson.instructor);
+  ASSERT_EQ(next.people_size(), 1);
+  EXPECT_FALSE(next.people(0).here());
+  EXPECT_TRUE(next.people(0).hand());
+}
+
+TEST(PeopleHost, AReaderIsToldWhatConcernsThem) {
+  Lesson lesson;
+  ASSERT_TRUE(lesson.supervise(lesson.trainee, {.stopped = true}));
+  ASSERT_TRUE(lesson.ask([&](Room& room) { return room.say(lesson.instructor, lesson.other, "secret"); }));
+  ASSERT_TRUE(lesson.ask([&](Room& room) { return room.say(lesson.instructor, {}, "open"); }));
+  ASSERT_TRUE(lesson.ask([&](Room& room) { return room.say(lesson.other, lesson.instructor, "why?"); }));
+  const PeopleRights trainees{.others_supervision = false, .others_words = false};
+  const auto told = [&](AuthorId reader, const PeopleRights& rights) {
+    PeopleCursor cursor;
+    return lesson.news(cursor, reader, rights);
+  };
+  EXPECT_FALSE(Lesson::person(told(lesson.other, trainees), lesson.trainee)->has_supervision());
+  EXPECT_TRUE(Lesson::person(told(lesson.trainee, trainees), lesson.trainee)->has_supervision()) << "their own";
+  EXPECT_TRUE(Lesson::person(told(lesson.instructor, {}), lesson.trainee)->has_supervision());
+  EXPECT_EQ(told(lesson.trainee, trainees).words_size(), 1);
+  EXPECT_EQ(told(lesson.other, trainees).words_size(), 3);
+  EXPECT_EQ(told(lesson.instructor, {}).words_size(), 3);
+}
+
+TEST(PeopleHost, DrawingsComeAndGoAndWordsAreBounded) {
+  Lesson lesson;
+  PeopleCursor cursor;
+  (void)lesson.news(cursor, lesson.instructor);
+  const auto draw = [&](std::int32_t x) { return lesson.ask([&](Room& room) { return room.annotate(lesson.instructor, {.points = {{x, 2, 3}}}); }); };
+  ASSERT_TRUE(draw(1));
+  ASSERT_TRUE(draw(7));
+  v1::WatchPeopleResponse news = lesson.news(cursor, lesson.instructor);
+  ASSERT_EQ(news.annotations_size(), 1) << "the newest pointer alone";
+  EXPECT_EQ(news.annotations(0).points(0), 7);
+  ASSERT_TRUE(lesson.ask([&](Room& room) { return room.wipe_off(lesson.instructor, 1); }));
+  news = lesson.news(cursor, lesson.instructor);
+  ASSERT_EQ(news.wiped_size(), 1);
+  EXPECT_EQ(news.wiped(0), 1u);
+  // Drawn and wiped off between two looks: nobody need know.
+  ASSERT_TRUE(draw(9));
+  ASSERT_TRUE(lesson.ask([&](Room& room) { return room.wipe_off(lesson.instructor, 2); }));
+  news = lesson.news(cursor, lesson.instructor);
+  EXPECT_EQ(news.annotations_size() + news.wiped_size(), 0);
+
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(lesson.ask([&](Room& room) { return room.say(lesson.instructor, {}, std::to_string(i)); }));
+  news = lesson.news(cursor, lesson.instructor);
+  ASSERT_EQ(news.words_size(), static_cast<int>(PeopleBoard::kMostWords));
+  EXPECT_EQ(news.words(news.words_size() - 1).words(), "99") << "the newest";
+}
+
+// However many have come and gone, a reader is told of a bounded number.
+TEST(PeopleBoard, ThoseWhoWereHereLongestAgoAreLeftOut) {
+  Room room(test::test_block());
+  for (int i = 0; i < 600; ++i) (void)room.join(MemberKind::surgeon);
+  PeopleBoard board(room, {});
+  const auto count = [&] {
+    PeopleCursor cursor;
+    v1::WatchPeopleResponse news;
+    EXPECT_TRUE(news.ParseFromString(*board.news(cursor, {}, {})));
+    return news;
+  };
+  EXPECT_EQ(count().people_size(), static_cast<int>(PeopleBoard::kMostAbsent));
+  EXPECT_EQ(count().people(0).author(), 600 - PeopleBoard::kMostAbsent + 1);
+  board.came(AuthorId{3});
+  EXPECT_EQ(count().people(0).author(), 3u) << "who is here is told in any case";
+  board.went(AuthorId{3});
+  EXPECT_EQ(count().people(0).author(), 3u) << "and was here last";
+}
+
+CuttingState state(std::uint64_t author, std::uint64_t seq) {
+  CuttingState one;
+  one.author = {author};
+  one.state_seq = seq;
+  return one;
+}
+
+TEST(PartnerOutbox, TellsTheNewestThirtyTimesASecond) {
+  PartnerOutbox outbox;
+  const PartnerOutbox::Clock::time_point start{};
+  int told = 0;
+  std::uint64_t newest = 0;
+  for (std::uint64_t ms = 0; ms < 1000; ++ms) {
+    outbox.offer({state(1, ms + 1)}, true);
+    EXPECT_TRUE(outbox.waits());
+    if (const auto one = outbox.take(start + std::chrono::milliseconds(ms))) {
+      ++told;
+      newest = one->state_seq;
+      EXPECT_EQ(newest, ms + 1) << "never an older one";
+    }
+  }
+  EXPECT_GE(told, 28);
+  EXPECT_LE(told, 31);
+  // The last one is still owed, and comes.
+  EXPECT_NE(newest, 1000u);
+  EXPECT_EQ(outbox.take(start + 2s)->state_seq, 1000u);
+  EXPECT_FALSE(outbox.waits());
+  outbox.offer({state(1, 1000)}, true);
+  EXPECT_FALSE(outbox.waits()) << "the same again";
+}
+
+TEST(PartnerOutbox, HoldsNothingOfWhatGoesAnotherWayOrOfWhoIsGone) {
+  PartnerOutbox outbox;
+  outbox.offer({state(1, 1), state(2, 1)}, false);
+  EXPECT_FALSE(outbox.waits());
+  outbox.offer({state(1, 2), state(2, 1)}, true);
+  EXPECT_EQ(outbox.take({})->author, AuthorId{1});
+  EXPECT_FALSE(outbox.take({}));
+  outbox.offer({state(2, 2)}, true);
+  outbox.offer({}, true);
+  EXPECT_FALSE(outbox.waits());
+  std::vector<CuttingState> many;
+  for (std::uint64_t author = 1; author <= 40; ++author) many.push_back(state(author, 1));
+  outbox.offer(many, true);
+  std::size_t told = 0;
+  while (outbox.take({})) ++told;
+  EXPECT_EQ(told, PartnerOutbox::kMost);
+}
+
+TEST(PeopleHost, HandsAreToldOfOthersTools) {
+  RoomHost host(Room(test::test_block()), {.tick = 2ms, .mesh = 50ms, .pieces = 0ns}, {});
+  const auto one = std::make_shared<HeardSession>(host.join(MemberKind::surgeon).value());
+  ASSERT_TRUE(host.open_session(one));
+  host.offer_state(state(77, 5));
+  const auto told = [&] { return std::ranges::any_of(one->partners(), [](const CuttingState& s) { return s.state_seq == 5; }); };
+  for (int i = 0; i < 2000 && !told(); ++i) std::this_thread::sleep_for(5ms);
+  EXPECT_TRUE(told());
+  host.stop();
+}
+
+}  // namespace
+}  // namespace osteon
