@@ -20,6 +20,7 @@ find_package(VTK 9.1 REQUIRED COMPONENTS
   InteractionStyle RenderingCore RenderingOpenGL2 RenderingFreeType RenderingAnnotation)
 
 pkg_check_modules(grpc REQUIRED IMPORTED_TARGET grpc++)
+pkg_check_modules(microhttpd REQUIRED IMPORTED_TARGET libmicrohttpd)
 pkg_check_modules(sodium REQUIRED IMPORTED_TARGET libsodium)
 pkg_check_modules(sqlite REQUIRED IMPORTED_TARGET sqlite3)
 pkg_check_modules(hdf5 REQUIRED IMPORTED_TARGET hdf5-serial)

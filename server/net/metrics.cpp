@@ -1,12 +1,16 @@
 #include "server/net/metrics.hpp"
 
-#include <prometheus/collectable.h>
-#include <prometheus/exposer.h>
+#include <arpa/inet.h>
+#include <microhttpd.h>
+#include <netinet/in.h>
 #include <prometheus/metric_family.h>
+#include <prometheus/text_serializer.h>
 
 #include <array>
-#include <exception>
+#include <cerrno>
 #include <map>
+#include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -127,44 +131,56 @@ void tell_room(Page& page, OpenRoom& room, bool draining) {
                  static_cast<double>(health.rejections[i]));
 }
 
-class Figures final : public prometheus::Collectable {
- public:
-  Figures(RoomServer& server, fs::path certificate) : server_(server), certificate_(std::move(certificate)) {}
+std::vector<MetricFamily> figures_of(RoomServer& server, const fs::path& certificate) {
+  Page page;
+  const bool draining = server.rooms().draining().has_value();
+  const auto rooms = server.rooms().open_rooms();
+  page.gauge("osteon_rooms", "Open rooms.", {}, static_cast<double>(rooms.size()));
+  page.gauge("osteon_draining", "1 once the server lets nobody in any more.", {}, draining ? 1 : 0);
+  auto refusals = server.rooms().refusals.counts();
+  for (const char* known : {"version", "request", "room", "draining"}) refusals.try_emplace(known, 0u);
+  for (const auto& [reason, count] : refusals)
+    page.counter("osteon_refusals_total", "Callers turned away at the door.", {{"reason", reason}}, static_cast<double>(count));
+  if (!certificate.empty())
+    if (const Result<double> days = certificate_days_left(certificate))
+      page.gauge("osteon_certificate_days_left", "Until the server's certificate is over.", {}, *days);
+  const LinkServerHealth links = server.link_health();
+  const char* paths = "Fast paths, and those over which datagrams have come lately.";
+  page.gauge("osteon_links", paths, {{"state", "open"}}, static_cast<double>(links.links));
+  page.gauge("osteon_links", paths, {{"state", "alive"}}, static_cast<double>(links.alive));
+  page.counter("osteon_strange_datagrams_total", "Datagrams that nobody with a key has sent.", {},
+               static_cast<double>(links.strangers));
+  for (const std::shared_ptr<OpenRoom>& room : rooms) tell_room(page, *room, draining);
+  return page.take();
+}
 
-  std::vector<MetricFamily> Collect() const override {
-    Page page;
-    const bool draining = server_.rooms().draining().has_value();
-    const auto rooms = server_.rooms().open_rooms();
-    page.gauge("osteon_rooms", "Open rooms.", {}, static_cast<double>(rooms.size()));
-    page.gauge("osteon_draining", "1 once the server lets nobody in any more.", {}, draining ? 1 : 0);
-    auto refusals = server_.rooms().refusals.counts();
-    for (const char* known : {"version", "request", "room", "draining"}) refusals.try_emplace(known, 0u);
-    for (const auto& [reason, count] : refusals)
-      page.counter("osteon_refusals_total", "Callers turned away at the door.", {{"reason", reason}}, static_cast<double>(count));
-    if (!certificate_.empty())
-      if (const Result<double> days = certificate_days_left(certificate_))
-        page.gauge("osteon_certificate_days_left", "Until the server's certificate is over.", {}, *days);
-    const LinkServerHealth links = server_.link_health();
-    page.gauge("osteon_links", "Fast paths, and those over which datagrams have come lately.", {{"state", "open"}},
-               static_cast<double>(links.links));
-    page.gauge("osteon_links", "", {{"state", "alive"}}, static_cast<double>(links.alive));
-    page.counter("osteon_strange_datagrams_total", "Datagrams that nobody with a key has sent.", {},
-                 static_cast<double>(links.strangers));
-    for (const std::shared_ptr<OpenRoom>& room : rooms) tell_room(page, *room, draining);
-    return page.take();
-  }
-
- private:
-  RoomServer& server_;
-  const fs::path certificate_;
-};
+constexpr unsigned kMostConnections = 16, kPatience_s = 5;
 
 }  // namespace
 
 struct Metrics::Impl {
-  std::shared_ptr<Figures> figures;  // shared with the exposer's questions under way
-  std::unique_ptr<prometheus::Exposer> exposer;
+  RoomServer& server;
+  const fs::path certificate;
   std::string address;
+  MHD_Daemon* daemon = nullptr;
+
+  ~Impl() {
+    if (daemon) MHD_stop_daemon(daemon);
+  }
+  // [the HTTP library's thread]
+  static MHD_Result answer(void* self, MHD_Connection* connection, const char* url, const char* method, const char*, const char*,
+                           std::size_t*, void**) {
+    const Impl& own = *static_cast<Impl*>(self);
+    std::string text = "the figures are at /metrics\n";
+    const bool found = std::string_view(url) == "/metrics" && std::string_view(method) == "GET";
+    if (found) text = prometheus::TextSerializer().Serialize(figures_of(own.server, own.certificate));
+    MHD_Response* response = MHD_create_response_from_buffer(text.size(), text.data(), MHD_RESPMEM_MUST_COPY);
+    if (!response) return MHD_NO;
+    MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8");
+    const MHD_Result queued = MHD_queue_response(connection, found ? MHD_HTTP_OK : MHD_HTTP_NOT_FOUND, response);
+    MHD_destroy_response(response);
+    return queued;
+  }
 };
 
 Metrics::Metrics(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -177,21 +193,29 @@ Result<std::unique_ptr<Metrics>> Metrics::start(const std::string& listen, RoomS
   if (!at) return tl::unexpected(at.error());
   if (!is_loopback(at->host))
     return failure(ErrorCode::invalid_input, "--metrics " + listen +
-                                                 " is reachable from other machines, and whoever reaches it may read it; "
-                                                 "use a port, or one with 127.0.0.1, [::1] or localhost");
-  auto impl = std::make_unique<Impl>();
+                                                 " is reachable from other machines, and whoever reaches it may read it; use a "
+                                                 "port, or one with 127.0.0.1, [::1] or localhost");
+  sockaddr_in v4{};
+  sockaddr_in6 v6{};
+  v4.sin_family = AF_INET;
+  v6.sin6_family = AF_INET6;
+  v4.sin_port = v6.sin6_port = htons(static_cast<std::uint16_t>(at->port));
+  v6.sin6_addr = in6addr_loopback;
+  const bool is_v6 = at->host == "[::1]";
   const std::string host = at->host == "localhost" ? "127.0.0.1" : at->host;
-  impl->figures = std::make_shared<Figures>(server, certificate);
-  try {
-    // A thread for who asks, and one for who asks meanwhile.
-    impl->exposer = std::make_unique<prometheus::Exposer>(host + ":" + std::to_string(at->port), 2);
-    impl->exposer->RegisterCollectable(impl->figures);
-  } catch (const std::exception& error) {
-    return failure(ErrorCode::unavailable, "--metrics " + listen + " cannot be listened on (" + error.what() +
-                                               "); choose another port, or 0 for a free one");
-  }
-  const std::vector<int> ports = impl->exposer->GetListeningPorts();
-  impl->address = host + ":" + std::to_string(ports.empty() ? at->port : ports.front());
+  if (!is_v6) ::inet_pton(AF_INET, host.c_str(), &v4.sin_addr);
+  const sockaddr* place = is_v6 ? reinterpret_cast<const sockaddr*>(&v6) : reinterpret_cast<const sockaddr*>(&v4);
+
+  auto impl = std::unique_ptr<Impl>(new Impl{server, certificate, {}});
+  errno = 0;
+  impl->daemon = MHD_start_daemon(MHD_USE_INTERNAL_POLLING_THREAD | (is_v6 ? MHD_USE_IPv6 : MHD_NO_FLAG), 0, nullptr, nullptr,
+                                  &Impl::answer, impl.get(), MHD_OPTION_SOCK_ADDR, place, MHD_OPTION_CONNECTION_LIMIT,
+                                  kMostConnections, MHD_OPTION_CONNECTION_TIMEOUT, kPatience_s, MHD_OPTION_END);
+  if (!impl->daemon)
+    return failure(ErrorCode::unavailable, "--metrics " + listen + " cannot be listened on: " + std::generic_category().message(errno) +
+                                               "; choose another port, or 0 for a free one");
+  const MHD_DaemonInfo* bound = MHD_get_daemon_info(impl->daemon, MHD_DAEMON_INFO_BIND_PORT);
+  impl->address = host + ":" + std::to_string(bound ? bound->port : at->port);
   return std::unique_ptr<Metrics>(new Metrics(std::move(impl)));
 }
 
