@@ -1,5 +1,6 @@
 #include "haptic_client/app/client.hpp"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <condition_variable>
@@ -11,6 +12,7 @@
 #include <thread>
 #include <variant>
 
+#include "common/field/rejection.hpp"
 #include "common/runtime/event_queue.hpp"
 #include "common/runtime/latest_value.hpp"
 #include "common/runtime/log.hpp"
@@ -64,7 +66,39 @@ struct SceneSet {
 struct Interrupted {
   std::string why;  // the line to the room is down, and is being made again
 };
-using FromRoom = std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, SceneSet, Noted, Interrupted>;
+using FromRoom =
+    std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, SceneSet, HandSupervised, WordsSaid, Noted, Interrupted>;
+
+// Others' tools, as they were heard of last.
+struct Partners {
+  static constexpr std::size_t kMost = 16;
+  struct Partner {
+    AuthorId author;  // null: none
+    std::uint64_t state_seq = 0;
+    Pose pose_bone_tool, pose_bone_device;
+    std::int64_t heard_ns = 0;
+  };
+  std::array<Partner, kMost> of;
+};
+
+GuideSeen guide_among(const Partners& partners, AuthorId guide) {
+  for (const Partners::Partner& partner : partners.of)
+    if (guide && partner.author == guide) return {true, partner.state_seq, partner.pose_bone_device.position_mm};
+  return {};
+}
+
+// What holds, in words; empty: nothing.
+std::string words_of(const Supervision& now) {
+  std::string words;
+  const auto add = [&](const std::string& one) { words += (words.empty() ? "" : ", ") + one; };
+  if (now.stopped) add("stopped");
+  if (now.taken_by) add("tool taken by " + std::to_string(now.taken_by.value));
+  if (now.guide) add("led by " + std::to_string(now.guide.value) + " with a share of " + std::to_string(now.guide_share));
+  if (now.force_limit > 0) add("no more than " + std::to_string(now.force_limit) + " hundredths of a newton");
+  if (now.zone) add("within a ball only");
+  if (!now.tools.empty()) add("with " + std::to_string(now.tools.size()) + " tools only");
+  return words;
+}
 
 // Where the tool is, for the replica's thread.
 struct ToolPlace {
@@ -117,6 +151,8 @@ class Client {
     outcome_.recording = recorder_.finish(
         {to_hex(replica_.hash()), replica_.room_seq().value, outcome_.rows_dropped, outcome_.lost.has_value()});
     if (const Result<void> written = log_.finish(); !written && !outcome_.lost) outcome_.lost = written.error();
+    outcome_.oversight.insert(outcome_.oversight.end(), loop_notes_.begin(), loop_notes_.end());
+    std::ranges::stable_sort(outcome_.oversight, {}, &OversightNote::mono_ns);
     outcome_.coupling_n_per_mm = session_.loop().coupling_n_per_mm();
     outcome_.workspace_scale = session_.loop().mapping().scale();
     outcome_.steps = session_.results();
@@ -169,9 +205,41 @@ class Client {
     events.rejected = [pass](RoomSeq place, std::uint64_t seq, std::uint64_t lease, const std::string& why) {
       pass(Rejected{place, seq, lease, why});
     };
+    events.supervised = [this, pass](const HandSupervised& decided) {
+      // At once to the loop, which may not wait for what the replica has to do before.
+      oversights_.store(oversight_of(decided.supervision, decided.place, decided.lease_epoch, session_.plan().tools));
+      pass(decided);
+    };
+    events.stop_flag = [this](std::uint64_t lease_epoch, bool frozen) { stop_flag_ = packed(StopFlag{lease_epoch, frozen}); };
+    events.said = [pass](const WordsSaid& said) { pass(said); };
+    events.partner = [this](const CuttingState& state) { hear_partner(state); };
     events.interrupted = [pass](const Error& why) { pass(Interrupted{why.message}); };
     events.lost = [this](const Error& why) { give_up(why); };
     room_.open(std::move(events));
+  }
+
+  // On whichever thread the session passes it on; one at a time.
+  void hear_partner(const CuttingState& state) {
+    // The one heard of longest ago makes room.
+    Partners::Partner* place = &heard_partners_.of[0];
+    for (Partners::Partner& partner : heard_partners_.of) {
+      if (partner.author == state.author) {
+        place = &partner;
+        break;
+      }
+      if (partner.heard_ns < place->heard_ns) place = &partner;
+    }
+    *place = {state.author, state.state_seq, state.pose_bone_tool, state.pose_bone_device, ns(Clock::now())};
+    partners_.store(heard_partners_);
+  }
+
+  // [haptic] What an instructor has decided and what leads the hand.
+  void oversee() {
+    HapticLoop& loop = session_.loop();
+    if (oversights_.refresh()) loop.oversee(oversights_.value());
+    loop.oversee(unpacked(stop_flag_.load(std::memory_order_relaxed)));
+    partners_.refresh();
+    loop.see_guide(guide_among(partners_.value(), loop.overseer().now().guide));
   }
 
   // Spindle and force run down and the client ends with this.
@@ -193,6 +261,7 @@ class Client {
 
   // [haptic] Nothing here allocates, locks, logs or waits, its own sleep apart.
   void haptic_thread() {
+    outcome_.began_ns = ns(Clock::now());
     outcome_.realtime = try_realtime(kPriority);
     realtime_refused_ = !outcome_.realtime;
     PeriodicTimer timer(kTick, kSpin);
@@ -206,6 +275,7 @@ class Client {
       const bool follows = room_health_.load(std::memory_order_relaxed) == RoomHealth::follows;
       if (!follows) ++outcome_.held_for_room_ticks;
       guides_.refresh();
+      oversee();
       const RoomLink room = over ? RoomLink::over : follows ? RoomLink::follows : RoomLink::held;
       const SessionTick now = session_.tick(patches_.value(), room, periods, &guides_.value());
       items_left_.store(session_.left().size(), std::memory_order_release);
@@ -361,6 +431,24 @@ class Client {
     lease_epoch_ = epoch;
     replica_.lease(epoch);
   }
+  void take(const HandSupervised& decided) {
+    replica_.note(decided.place);
+    follow_lease(decided.lease_epoch);
+    const std::string words = words_of(decided.supervision);
+    // Where a line begins and nothing holds, nothing is said.
+    if (words.empty() && !supervised_) return;
+    supervised_ = !words.empty();
+    const std::string what = words.empty() ? "free" : words;
+    log::info("an instructor decides", {{"room_seq", decided.place.value}, {"what", what}, {"words", decided.supervision.words}});
+    outcome_.oversight.push_back({ns(Clock::now()), decided.place.value, what});
+    if (!decided.supervision.words.empty())
+      outcome_.words.push_back({ns(Clock::now()), decided.place.value, 0, decided.supervision.words});
+  }
+  void take(const WordsSaid& said) {
+    replica_.note(said.place);
+    log::info("words", {{"room_seq", said.place.value}, {"from", said.from.value}, {"words", said.words}});
+    outcome_.words.push_back({ns(Clock::now()), said.place.value, said.from.value, said.words});
+  }
   void take(const Noted& noted) { replica_.note(noted.place); }
   void take(const SceneSet& scene) {
     replica_.note(scene.place);
@@ -385,6 +473,11 @@ class Client {
     confirm(rejected.author_seq, RoomSeq{});
     const bool fell = replica_.reject(rejected.place, rejected.author_seq);
     follow_lease(rejected.lease_epoch);
+    // An instructor's word that was on its way when this was cut.
+    const auto because = [&](Rejection reason) { return rejected.reason == sentence(reason); };
+    if (because(Rejection::frozen)) return static_cast<void>(++outcome_.cuts_stopped);
+    if (because(Rejection::taken)) return static_cast<void>(++outcome_.cuts_taken);
+    if (because(Rejection::zone) || because(Rejection::forbidden_tool)) return static_cast<void>(++outcome_.cuts_elsewhere);
     if (!fell) return;  // it had fallen with an undo, or with one before it
     // One now and then gives its bone back; a room that takes none makes further work pointless.
     constexpr int kMostInARow = 20;
@@ -450,6 +543,7 @@ class Client {
         any = true;
         log_.write(row, tool_name(row));
         note_range(row);
+        note_oversight(row);
         recorder_.push(row);
       }
       if (realtime_refused_.exchange(false))
@@ -488,6 +582,22 @@ class Client {
     if (!sentence.empty()) log::warn("force law outside its range", {{"tool", model.tool.name}, {"because", sentence}});
   }
 
+  // What the loop makes of it, tick by tick: when it stopped is known to the millisecond.
+  void note_oversight(const TickRow& row) {
+    const LoopReport& r = row.report;
+    const bool forbidden = (r.events & kForbidden) != 0, led = (r.events & kHandGuided) != 0;
+    if (forbidden != was_forbidden_) loop_notes_.push_back({row.mono_ns, 0, forbidden ? "may not cut" : "may cut"});
+    if (led != was_led_) loop_notes_.push_back({row.mono_ns, 0, led ? "is led" : "is led no more"});
+    was_forbidden_ = forbidden;
+    was_led_ = led;
+    outcome_.forbidden_ticks += forbidden;
+    if (forbidden || led) outcome_.overseen_step_n = std::max(outcome_.overseen_step_n, row.force_rendered_n - force_before_n_);
+    force_before_n_ = row.force_rendered_n;
+    if (!led) return;
+    outcome_.guide_mm = r.guide_distance_mm;
+    outcome_.guide_most_mm = std::max(outcome_.guide_most_mm, r.guide_distance_mm);
+  }
+
   [[nodiscard]] CuttingState state_of(const TickRow& row) const {
     const LoopReport& r = row.report;
     CuttingState state;
@@ -513,6 +623,8 @@ class Client {
                 row.depth_mm, r.force_physical_n.norm(), r.feed_mm_per_s, r.spindle_rpm, name(r.phase));
     if (r.out_of_range != 0) std::printf(", outside the range of its law: %s", out_of_range_words(r.out_of_range).c_str());
     const RoomHealth health = room_health_;
+    if (r.events & kForbidden) std::printf(", stopped by an instructor");
+    if (r.events & kHandGuided) std::printf(", led, %.1f mm off", r.guide_distance_mm);
     if (health != RoomHealth::follows) std::printf(", held: %s, %zu cuts unconfirmed", name(health), unconfirmed_.load());
     if (live_.refresh()) {
       const TickStats now = live_.value().since(told_);
@@ -540,6 +652,10 @@ class Client {
   LatestValue<ToolPlace> places_;  // haptic → replica
   LatestValue<std::vector<PlacedGuide>> guides_;  // all that stands in the room's scene, replica → haptic
   std::map<Digest, std::shared_ptr<const SolidLattice>> solids_;  // of its definitions; replica thread
+  LatestValue<Oversight> oversights_;             // what an instructor has decided, session → haptic
+  std::atomic<std::uint64_t> stop_flag_{0};       // the newest datagram's word on it, likewise
+  LatestValue<Partners> partners_;                // others' tools, session → haptic
+  Partners heard_partners_;                       // of the session's
   EventQueue<TickRow, 2048> rows_; // haptic → reporter
   LatestValue<TickStats> live_;    // haptic → reporter, once a second
   TickStats told_;                 // reporter: of the last line
@@ -562,7 +678,12 @@ class Client {
   TickRow row_;
   const Site* site_ = nullptr;
   bool taken_up_ = false;
+  // Reporter thread.
+  bool was_forbidden_ = false, was_led_ = false;
+  double force_before_n_ = 0;
+  std::vector<OversightNote> loop_notes_;
   // Replica thread.
+  bool supervised_ = false;        // something was decided about this hand
   std::uint64_t lease_epoch_;      // of the room, as far as it was heard
   std::deque<Cut> unsent_;         // as bounded as what is unconfirmed
   Pose built_at_;

@@ -23,6 +23,18 @@ struct ClientOptions {
   bool status = false;     // a line each second on standard output
 };
 
+// Something that an instructor decided about the hand, or what the hand's loop made of it.
+struct OversightNote {
+  std::int64_t mono_ns = 0;
+  std::uint64_t room_seq = 0;  // of the decision; 0: the loop's own
+  std::string what;
+};
+struct WordsNote {
+  std::int64_t mono_ns = 0;
+  std::uint64_t room_seq = 0, from = 0;
+  std::string words;
+};
+
 struct ClientOutcome {
   bool stopped = false;                  // by a signal, before the plan was done
   std::optional<Error> lost;             // why it ended before its time: the room, or a log on a full disk
@@ -38,6 +50,13 @@ struct ClientOutcome {
   double removed_total_mm3 = 0;
   std::uint64_t rejected = 0, patches = 0, uncovered_ticks = 0, cuts_waiting_ticks = 0, rows_dropped = 0;
   std::uint64_t held_for_room_ticks = 0;  // in which the spindle was held because the room did not follow
+  std::vector<OversightNote> oversight;   // as they came
+  std::vector<WordsNote> words;
+  std::int64_t began_ns = 0;              // of these times, the session's first
+  std::uint64_t forbidden_ticks = 0;      // in which the tool might not cut
+  std::uint64_t cuts_stopped = 0, cuts_taken = 0, cuts_elsewhere = 0;  // refused as stopped; as somebody else's tool; as of place or tool
+  double overseen_step_n = 0;             // largest growth of the force shown in a tick, while anything was decided about the hand
+  double guide_mm = 0, guide_most_mm = 0; // from the hand that leads this one: when it did last, and at most
   FastPathHealth fast_path;
   std::uint64_t interruptions = 0;        // of the line to the room, after which it stood again
   double patch_p50_us = 0, patch_p99_us = 0;

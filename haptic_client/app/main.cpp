@@ -28,6 +28,7 @@ constexpr const char* kProgram = "osteon-haptic";
 
 struct Options {
   RoomSessionOptions room;
+  wire::DoorArguments door;
   double patience_s = 5.0;
   std::optional<double> force_scale;
   std::filesystem::path cut_log, summary;
@@ -88,6 +89,28 @@ json step_summary(const ReadyStep& step, const std::vector<ToolModel>& tools, co
   return out;
 }
 
+// What an instructor decided about the hand, and what became of it. Times: from the loop's first tick on.
+json oversight_of(const ClientOutcome& outcome) {
+  const auto seconds = [&](std::int64_t mono_ns) { return 1e-9 * static_cast<double>(mono_ns - outcome.began_ns); };
+  json notes = json::array(), words = json::array();
+  for (const OversightNote& note : outcome.oversight) {
+    notes.push_back({{"at_s", seconds(note.mono_ns)}, {"what", note.what}});
+    if (note.room_seq != 0) notes.back()["room_seq"] = note.room_seq;
+  }
+  for (const WordsNote& note : outcome.words)
+    words.push_back({{"at_s", seconds(note.mono_ns)}, {"room_seq", note.room_seq}, {"from", note.from}, {"words", note.words}});
+  return {{"oversight", notes},
+          {"words", words},
+          {"overseen",
+           {{"forbidden_s", 1e-3 * static_cast<double>(outcome.forbidden_ticks)},
+            {"cuts_stopped", outcome.cuts_stopped},
+            {"cuts_taken", outcome.cuts_taken},
+            {"cuts_elsewhere", outcome.cuts_elsewhere},
+            {"force_step_n", outcome.overseen_step_n},
+            {"guide_mm", outcome.guide_mm},
+            {"guide_most_mm", outcome.guide_most_mm}}}};
+}
+
 json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string_view device, int losses) {
   const TickStats& ticks = outcome.ticks;
   json outside = json::object();
@@ -96,7 +119,7 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string
   json steps = json::array();
   for (std::size_t i = 0; i < plan.steps.size(); ++i)
     steps.push_back(step_summary(plan.steps[i], plan.tools, outcome.steps[i], outcome.removed_mm3[i]));
-  return {{"device", device},
+  json summary = {{"device", device},
           {"device_losses", losses},
           {"device_limits",
            {{"peak_n", outcome.limits.peak_n},
@@ -147,6 +170,8 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string
           {"room_seq", outcome.room_seq.value},
           {"stopped", outcome.stopped},
           {"lost", outcome.lost ? json(outcome.lost->message) : json(nullptr)}};
+  summary.update(oversight_of(outcome));
+  return summary;
 }
 
 // What a person should know of the devices, as it happens.
@@ -195,6 +220,9 @@ Result<void> run(Options& options, const StopSignal& stop) {
     return failure(ErrorCode::invalid_input, "--scale must be a number above 0 and at most 1");
   if (!(options.patience_s >= 0.0 && options.patience_s <= 3600.0))
     return failure(ErrorCode::invalid_input, "--patience must be from 0 to 3600 seconds");
+  const Result<wire::Door> door = wire::door_of(options.door);
+  if (!door) return tl::unexpected(door.error());
+  options.room.door = *door;
   if (Result<void> usable = check_outputs(options); !usable) return usable;
   Result<HandChoice> hand = HandChoice::make(options.hand, tell);
   if (!hand) return tl::unexpected(hand.error());
@@ -250,6 +278,8 @@ int main(int argc, char** argv) {
       kProgram);
   app.add_option("--server", options.room.address, "HOST:PORT of osteon-server")->required();
   app.add_option("--room", options.room.room, "Name of the room; not needed where the server has one");
+  wire::add_door_options(app, options.door);
+  app.add_option("--name", options.room.name, "How others in the room see you called")->capture_default_str();
   app.add_option("--plan", options.hand.plan, "JSON file with the steps of a simulated surgeon");
   app.add_option("--tool", options.hand.tool,
                  "The tool for your own hand, of the box or of the server's --tools, e.g. drill-3.2; no --plan then");

@@ -23,20 +23,18 @@ Time now_of_links() {
 }  // namespace
 
 Result<std::unique_ptr<FastPath>> FastPath::open(const std::string& host, std::uint16_t port, const SessionKeys& keys,
-                                                 std::uint64_t first_author_seq, std::function<void(wire::IndexedRow)> row,
-                                                 std::function<void()> dead) {
+                                                 std::uint64_t first_author_seq, FastPathEvents events) {
   const Result<Endpoint> server = find_endpoint(host, port);
   if (!server) return tl::unexpected(server.error());
   const bool v4 = server->high == 0 && server->low >> 32 == 0xffff;
   Result<std::unique_ptr<UdpPort>> socket = UdpPort::open({.address = v4 ? "0.0.0.0" : "::"});
   if (!socket) return tl::unexpected(socket.error());
-  return std::unique_ptr<FastPath>(
-      new FastPath(std::move(*socket), *server, keys, first_author_seq, std::move(row), std::move(dead)));
+  return std::unique_ptr<FastPath>(new FastPath(std::move(*socket), *server, keys, first_author_seq, std::move(events)));
 }
 
 FastPath::FastPath(std::unique_ptr<UdpPort> port, const Endpoint& server, const SessionKeys& keys, std::uint64_t first_author_seq,
-                   std::function<void(wire::IndexedRow)> row, std::function<void()> dead)
-    : port_(std::move(port)), server_(server), row_(std::move(row)), dead_(std::move(dead)), link_(keys, first_author_seq),
+                   FastPathEvents events)
+    : port_(std::move(port)), server_(server), events_(std::move(events)), link_(keys, first_author_seq),
       pushed_(first_author_seq - 1) {
   thread_ = std::thread([this] { run(); });
 }
@@ -99,13 +97,25 @@ FastPathHealth FastPath::health() const {
   return health;
 }
 
+void FastPath::take_partners(Time now, std::vector<CuttingState>& newer) {
+  for (const wire::HeardState& heard : link_.partners(now)) {
+    std::uint64_t& told = partners_[heard.state.author];
+    if (heard.state.state_seq <= told) continue;
+    told = heard.state.state_seq;
+    newer.push_back(heard.state);
+  }
+}
+
 void FastPath::run() {
   DatagramBuffer buffer;
   std::vector<wire::IndexedRow> rows;
-  bool was_alive = false;
+  std::vector<CuttingState> partners;
+  bool was_alive = false, was_frozen = false;
+  std::uint64_t was_epoch = 0;
   while (true) {
     Time wait = kLongestWait;
-    bool died = false;
+    bool died = false, frozen = false, came = false;
+    std::uint64_t epoch = 0;
     {
       const std::lock_guard lock(mutex_);
       if (end_) return;
@@ -113,7 +123,11 @@ void FastPath::run() {
         const std::optional<Datagram> datagram = port_->receive(buffer);
         if (!datagram) break;
         link_.receive(datagram->bytes, now_of_links());
+        came = true;
       }
+      frozen = link_.frozen();
+      epoch = link_.lease_epoch();
+      if (came && events_.partner) take_partners(now_of_links(), partners);
       while (std::optional<wire::IndexedRow> row = link_.take_row()) rows.push_back(std::move(*row));
       const Time now = now_of_links();
       if (const auto bytes = link_.send(now, buffer); !bytes.empty()) port_->send(server_, bytes);
@@ -121,9 +135,15 @@ void FastPath::run() {
       died = was_alive && !link_.alive(now);
       was_alive = link_.alive(now);
     }
-    for (wire::IndexedRow& row : rows) row_(std::move(row));
+    // Before all that may have to wait.
+    if ((frozen != was_frozen || epoch != was_epoch) && events_.stop_flag) events_.stop_flag(epoch, frozen);
+    was_frozen = frozen;
+    was_epoch = epoch;
+    for (wire::IndexedRow& row : rows) events_.row(std::move(row));
     rows.clear();
-    if (died) dead_();
+    for (const CuttingState& partner : partners) events_.partner(partner);
+    partners.clear();
+    if (died) events_.dead();
     port_->wait(wait);
   }
 }

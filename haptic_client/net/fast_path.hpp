@@ -2,11 +2,13 @@
 #pragma once
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "common/core/result.hpp"
 #include "common/link/sealed.hpp"
@@ -16,14 +18,22 @@
 
 namespace osteon {
 
-// One for each stream: keys and numbers begin anew with it. Any thread, except from within `row` and `dead`.
+// What a fast path calls, on its own thread.
+struct FastPathEvents {
+  std::function<void(wire::IndexedRow)> row;  // of the session, in order
+  // Datagrams do not get through any more, so that what went only in them has to go over the stream.
+  std::function<void()> dead;
+  std::function<void(const CuttingState&)> partner{};  // a newer state of another's tool
+  // Whether the newest datagram says that the hand may not cut, where that has changed or the lease's epoch has.
+  std::function<void(std::uint64_t lease_epoch, bool frozen)> stop_flag{};
+};
+
+// One for each stream: keys and numbers begin anew with it. Any thread, except from within what it calls.
 class FastPath {
  public:
-  // `row`: a row of the session, in order, on this path's thread. `dead`: datagrams do not get through any more, so that what
-  // went only in them has to go over the stream. Error: not_found (the server's name), unavailable (no socket).
+  // Error: not_found (the server's name), unavailable (no socket).
   [[nodiscard]] static Result<std::unique_ptr<FastPath>> open(const std::string& host, std::uint16_t port, const SessionKeys& keys,
-                                                              std::uint64_t first_author_seq,
-                                                              std::function<void(wire::IndexedRow)> row, std::function<void()> dead);
+                                                              std::uint64_t first_author_seq, FastPathEvents events);
   ~FastPath();  // stops
   // Nothing is called any more once it returns; not from within what is called.
   void stop();
@@ -41,16 +51,18 @@ class FastPath {
 
  private:
   FastPath(std::unique_ptr<UdpPort> port, const Endpoint& server, const SessionKeys& keys, std::uint64_t first_author_seq,
-           std::function<void(wire::IndexedRow)> row, std::function<void()> dead);
+           FastPathEvents events);
   void run();
+  // What of others' tools is newer than what was told of them.
+  void take_partners(wire::ClientLink::Time now, std::vector<CuttingState>& newer);
 
   const std::unique_ptr<UdpPort> port_;
   const Endpoint server_;
-  const std::function<void(wire::IndexedRow)> row_;
-  const std::function<void()> dead_;
+  const FastPathEvents events_;
   mutable std::mutex mutex_;
   wire::ClientLink link_;
   std::uint64_t pushed_;  // newest cut that the link was given
+  std::map<AuthorId, std::uint64_t> partners_;  // state_seq of what was told of each; of its thread
   bool end_ = false;
   std::thread thread_;
 };

@@ -9,6 +9,8 @@
 #include "common/core/result.hpp"
 #include "common/field/cut.hpp"
 #include "common/field/field_hash.hpp"
+#include "common/field/supervision.hpp"
+#include "common/mechanics/cutting_state.hpp"
 #include "common/tools/scene_item.hpp"
 
 namespace osteon {
@@ -30,6 +32,20 @@ struct BonePart {
   bool last = false;               // part of the event
 };
 
+// An instructor has decided about the caller's hand: all that holds from now on.
+struct HandSupervised {
+  RoomSeq place;                  // 0: it held when the stream began
+  Supervision supervision;
+  std::uint64_t lease_epoch = 0;  // of the caller's lease from now on; cuts of an earlier one will be rejected
+};
+
+// Words of somebody in the room.
+struct WordsSaid {
+  RoomSeq place;
+  AuthorId from, to;  // to: null for all
+  std::string words;
+};
+
 // What comes down. Called on the session's own thread, one after the other: the scene, every leaf, then `complete`, then
 // events in room_seq order; one may come as a change and as a scene. When the line breaks, `interrupted`, and once it is
 // made again, all of that anew: the scene, every leaf, `complete`, and cuts that were sent and not decided are sent again.
@@ -42,6 +58,14 @@ struct RoomEvents {
   std::function<void(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason)> rejected;
   std::function<void(BonePart&& part)> change;
   std::function<void(RoomSeq place, const std::vector<SceneItem>& items)> scene;  // all that stand from now on
+  // Once with each `complete`, just before or after it, and whenever something is decided.
+  std::function<void(const HandSupervised& decided)> supervised;
+  std::function<void(const WordsSaid& said)> said;
+  std::function<void(const CuttingState& partner)> partner;  // newest state of another's tool; outside the order
+  // The newest datagram's word on whether the caller's hand is stopped, where it has changed; its row may come later. Of one
+  // that is older than the newest row (by its lease's epoch) nothing holds. Called from another thread, at any time until
+  // close(): it may not wait.
+  std::function<void(std::uint64_t lease_epoch, bool frozen)> stop_flag;
   std::function<void(RoomSeq place)> noted;  // a tool was added, somebody came, a mark was set
   std::function<void(const Error& why)> interrupted;
   std::function<void(const Error& why)> lost;  // for good: the room is over, or knows this client no more

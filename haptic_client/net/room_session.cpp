@@ -32,6 +32,7 @@ namespace fs = std::filesystem;
 
 constexpr auto kCloseTime = 1s;
 constexpr std::chrono::milliseconds kLongestRedial = 10s;  // of a wait that a server asks for
+constexpr auto kTellHeard = 250ms;  // between two words on how far this client has come
 constexpr auto kCaseSilence = 60s;  // a whole case takes no longer on one machine
 
 Error cannot_cache(const fs::path& path, const std::string& why) {
@@ -208,6 +209,8 @@ struct RoomSession::Impl {
   mutable std::mutex fast_mutex;
   std::shared_ptr<FastPath> fast;             // of the present stream; held by those who use it just now
 
+  std::atomic<std::uint64_t> heard{0};        // place of the newest event that was passed on
+
   mutable std::mutex mutex;
   std::condition_variable wake;
   Line* line = nullptr;                       // the open one
@@ -225,17 +228,29 @@ void RoomSession::Impl::write(Line& open) {
   bool written = open.stream->Write(request);
   std::optional<Cut> cut;
   std::optional<CuttingState> state;
+  std::uint64_t told = 0;
+  auto tell_at = std::chrono::steady_clock::now();
   while (written) {
     {
       std::unique_lock lock(mutex);
-      wake.wait(lock, [&] { return underway.something_to_send() || closing || over || line != &open || redial; });
+      wake.wait_until(lock, tell_at, [&] { return underway.something_to_send() || closing || over || line != &open || redial; });
       // A server that is about to stop decides what it has been sent and no more: the rest goes when the session goes on.
       if (over || line != &open || redial) break;
       cut = underway.take_cut();
       state = cut ? std::nullopt : underway.take_state();
-      if (!cut && !state) break;
+      if (!cut && !state && closing) break;
     }
-    if (const std::shared_ptr<FastPath> path = fast_path(); path && (cut ? path->send(*cut) : path->send(*state))) continue;
+    const std::shared_ptr<FastPath> path = fast_path();
+    // Datagrams say themselves what has come.
+    if (const auto now = std::chrono::steady_clock::now(); now >= tell_at) {
+      tell_at = now + kTellHeard;
+      if (const std::uint64_t place = heard; place != told && !(path && path->health().alive)) {
+        request.mutable_heard()->set_room_seq(told = place);
+        if (written = open.stream->Write(request); !written) break;
+      }
+    }
+    if (!cut && !state) continue;
+    if (path && (cut ? path->send(*cut) : path->send(*state))) continue;
     if (cut)
       *request.mutable_cut() = wire::to_wire(*cut);
     else
@@ -274,15 +289,24 @@ void RoomSession::Impl::open_fast_path(std::uint64_t decided) {
                                                        : static_cast<std::uint32_t>(std::strtoul(at.c_str() + at.rfind(':') + 1, nullptr, 10));
   Result<std::unique_ptr<FastPath>> opened = FastPath::open(
       host, static_cast<std::uint16_t>(port), {offer->session(), *up, *down}, decided + 1,
-      [this](wire::IndexedRow row) {
-        const std::lock_guard lock(read_mutex);
-        (void)reader->take(std::move(row));
-      },
-      [this] {
-        const std::lock_guard lock(mutex);
-        underway.again();
-        wake.notify_all();
-      });
+      {.row =
+           [this](wire::IndexedRow row) {
+             const std::lock_guard lock(read_mutex);
+             (void)reader->take(std::move(row));
+             heard = reader->place().value;
+           },
+       .dead =
+           [this] {
+             const std::lock_guard lock(mutex);
+             underway.again();
+             wake.notify_all();
+           },
+       .partner =
+           [this](const CuttingState& partner) {
+             const std::lock_guard lock(read_mutex);
+             reader->take(partner);
+           },
+       .stop_flag = events.stop_flag});
   if (!opened) return;
   for (const auto& [number, tool] : numbered_tools) (*opened)->know_tool(number, tool);
   const std::lock_guard lock(fast_mutex);
@@ -326,7 +350,9 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
       // that are not all there.
       const std::lock_guard lock(read_mutex);
       follow(response);
-      return reader->take(std::move(response));
+      Result<void> taken = reader->take(std::move(response));
+      heard = reader->place().value;
+      return taken;
     }();
     if (!delivered) {
       broken = Error{delivered.error().code, "the server sent what no correct server sends: " + delivered.error().message};
@@ -424,7 +450,7 @@ RoomSession::~RoomSession() { close(); }
 
 Result<RoomSession> RoomSession::join(const RoomSessionOptions& options, const std::function<bool()>& stop) {
   Result<wire::JoinedRoom> room =
-      wire::join_room(options.address, wire::ClientKind::haptic, options.name, options.patience, stop, options.room);
+      wire::join_room(options.address, wire::ClientKind::haptic, options.name, options.patience, stop, options.room, options.door);
   if (!room) return tl::unexpected(room.error());
   Result<Case> bone = fetch_case(*room, options.cache, stop);
   if (!bone) return tl::unexpected(bone.error());

@@ -27,6 +27,7 @@ namespace osteon {
 struct RoomSessionOptions {
   std::string address;                  // HOST:PORT
   std::string room{};                   // which of the server's; empty: the only one that is open
+  wire::Door door{};
   std::string name = "haptic";          // shown to others
   std::chrono::milliseconds patience{5000};
   std::filesystem::path cache = default_case_cache();  // one folder per case, named by its hash

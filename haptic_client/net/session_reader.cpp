@@ -22,7 +22,11 @@ SessionReader::SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomE
                              std::function<void(std::uint64_t)> decided, std::function<void(std::uint64_t)> complete)
     : own_(own), tools_(std::move(tools)), events_(std::move(events)), decided_(std::move(decided)), complete_(std::move(complete)) {}
 
-void SessionReader::begin() { rows_ = ReceiveWindow<Row>(); }
+void SessionReader::begin() {
+  rows_ = ReceiveWindow<Row>();
+  supervised_ = false;
+  partners_.clear();
+}
 
 Result<void> SessionReader::take(v1::SessionResponse response) {
   // An answer outside the order: what it tells of is in the leaves, or came before.
@@ -53,12 +57,28 @@ bool SessionReader::cuts(const Cut& cut) const {
   return tool && tool->body.cuts();
 }
 
+void SessionReader::take(const CuttingState& partner) {
+  // Whichever way the newer one comes.
+  std::uint64_t& newest = partners_[partner.author];
+  if (partner.author == own_ || partner.state_seq <= newest) return;
+  newest = partner.state_seq;
+  if (events_.partner) events_.partner(partner);
+}
+
+void SessionReader::supervised(RoomSeq place, const Supervision& supervision, std::uint64_t lease_epoch) {
+  place_ = std::max(place_, place);
+  supervised_ = true;
+  if (events_.supervised) events_.supervised({place, supervision, lease_epoch});
+}
+
 void SessionReader::committed(RoomSeq place, const Cut& cut) {
+  place_ = std::max(place_, place);
   if (cut.author == own_) decided_(cut.author_seq);
   if (events_.committed) events_.committed(place, cut);
 }
 
 void SessionReader::rejected(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason) {
+  place_ = std::max(place_, place);
   decided_(author_seq);
   if (events_.rejected) events_.rejected(place, author_seq, lease_epoch, reason);
 }
@@ -66,6 +86,8 @@ void SessionReader::rejected(RoomSeq place, std::uint64_t author_seq, std::uint6
 Result<void> SessionReader::deliver(const wire::SessionRow& row) {
   if (row.kind == wire::SessionRowKind::committed)
     committed(row.room_seq, row.cut);
+  else if (row.kind == wire::SessionRowKind::supervised)
+    supervised(row.room_seq, row.supervision, row.lease_epoch);
   else
     rejected(row.room_seq, row.author_seq, row.lease_epoch, std::string(sentence(static_cast<Rejection>(row.reason))));
   return {};
@@ -84,12 +106,16 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       complete_(row.decided_author_seq());
       if (events_.complete)
         events_.complete({RoomSeq{row.room_seq()}, bodies_of(row.bodies()), row.lease_epoch(), row.decided_author_seq()});
+      place_ = std::max(place_, RoomSeq{row.room_seq()});
+      // Nothing was said of this hand: what held over an earlier stream is over.
+      if (!supervised_) supervised(RoomSeq{}, {}, row.lease_epoch());
       return {};
     }
     case v1::SessionResponse::kTool: {
       const Result<Tool> tool = wire::from_wire(response.tool().tool());
       if (!tool) return tl::unexpected(tool.error());
       tools_->add(*tool);
+      place_ = std::max(place_, RoomSeq{response.tool().room_seq()});
       if (events_.noted && response.tool().room_seq() != 0) events_.noted(RoomSeq{response.tool().room_seq()});
       return {};
     }
@@ -103,6 +129,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
           return failure(ErrorCode::invalid_input, "change.leaves has one of a body that is gone");
         part.leaves.push_back(std::move(*leaf));
       }
+      place_ = std::max(place_, part.place);
       if (events_.change) events_.change(std::move(part));
       return {};
     }
@@ -114,6 +141,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
         if (!tools_->find(item->tool)) return failure(ErrorCode::invalid_input, "scene.items names a tool that was not sent");
         items.push_back(*item);
       }
+      place_ = std::max(place_, RoomSeq{response.scene().room_seq()});
       if (events_.scene) events_.scene(RoomSeq{response.scene().room_seq()}, items);
       return {};
     }
@@ -136,8 +164,28 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       return {};
     }
     case v1::SessionResponse::kNoted:
+      place_ = std::max(place_, RoomSeq{response.noted().room_seq()});
       if (events_.noted) events_.noted(RoomSeq{response.noted().room_seq()});
       return {};
+    case v1::SessionResponse::kSupervised: {
+      const v1::Supervised& row = response.supervised();
+      const Result<Supervision> supervision = wire::from_wire(row.supervision());
+      if (!supervision) return tl::unexpected(supervision.error());
+      supervised(RoomSeq{row.room_seq()}, *supervision, row.lease_epoch());
+      return {};
+    }
+    case v1::SessionResponse::kSaid: {
+      const v1::Said& row = response.said();
+      place_ = std::max(place_, RoomSeq{row.room_seq()});
+      if (events_.said) events_.said({RoomSeq{row.room_seq()}, AuthorId{row.from()}, AuthorId{row.to()}, row.words()});
+      return {};
+    }
+    case v1::SessionResponse::kPartner: {
+      const Result<CuttingState> partner = wire::from_wire(response.partner());
+      if (!partner) return tl::unexpected(partner.error());
+      take(*partner);
+      return {};
+    }
     case v1::SessionResponse::kLink:
     case v1::SessionResponse::kRedial: return {};  // the session's own
     default: return failure(ErrorCode::unsupported, "SessionResponse.message is not known to this client");

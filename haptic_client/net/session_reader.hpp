@@ -1,6 +1,7 @@
 // Turns what comes from a room, over its stream and over the fast path, into one order of events.
 #pragma once
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <variant>
@@ -15,7 +16,7 @@
 
 namespace osteon {
 
-// Every row after the leaves comes over the stream; rejections and cuts of anyone may come sooner over the fast path. Whichever
+// Every row after the leaves comes over the stream; rejections, supervision and cuts of anyone may come sooner over the fast path. Whichever
 // is first counts. Not synchronised.
 class SessionReader {
  public:
@@ -32,6 +33,10 @@ class SessionReader {
   [[nodiscard]] Result<void> take(wire::IndexedRow row);
   // Every row up to this one was passed on.
   [[nodiscard]] std::uint64_t taken() const { return rows_.acknowledged(); }
+  // Another's tool, heard of over the fast path.
+  void take(const CuttingState& partner);
+  // The newest event that was passed on, or that the leaves contain.
+  [[nodiscard]] RoomSeq place() const { return place_; }
   // The newest that the room has said is kept.
   [[nodiscard]] const std::optional<wire::KeptEvents>& kept() const { return kept_; }
 
@@ -42,6 +47,7 @@ class SessionReader {
   [[nodiscard]] Result<void> deliver(const wire::SessionRow& row);
   [[nodiscard]] bool cuts(const Cut& cut) const;  // with a tool that was sent
   void committed(RoomSeq place, const Cut& cut);
+  void supervised(RoomSeq place, const Supervision& supervision, std::uint64_t lease_epoch);
   void rejected(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason);
 
   const AuthorId own_;
@@ -50,6 +56,9 @@ class SessionReader {
   const std::function<void(std::uint64_t)> decided_, complete_;
   ReceiveWindow<Row> rows_;
   std::optional<wire::KeptEvents> kept_;
+  RoomSeq place_;
+  bool supervised_ = false;  // of the present stream, before its leaves are complete
+  std::map<AuthorId, std::uint64_t> partners_;  // newest state_seq of each
 };
 
 }  // namespace osteon

@@ -98,7 +98,7 @@ class Line final : public SessionSink, private SessionLink::Sink, public std::en
   void begin(RoomSeq, MessageParts, Bytes) override {
     link_ = links_.add(author_, 1, *this);
     auto opened = FastPath::open(
-        "127.0.0.1", port_, link_->keys(), 1, [this](wire::IndexedRow row) { hear(std::move(row)); }, [] {});
+        "127.0.0.1", port_, link_->keys(), 1, {.row = [this](wire::IndexedRow row) { hear(std::move(row)); }, .dead = [] {}});
     OSTEON_CHECK(opened.has_value());
     path_ = std::move(*opened);
   }

@@ -56,7 +56,8 @@ TEST(CutsUnderway, AreBounded) {
 
 struct Heard {
   std::vector<std::string> events;
-  std::vector<std::uint64_t> decided;
+  std::vector<std::uint64_t> decided, partners;
+  int free = 0;  // times that a stream began with nothing decided about this hand
   SessionReader reader{AuthorId{7}, builtin_tool_box(),
                        {.complete = [this](const RoomAtJoin& room) { events.push_back("complete " + std::to_string(room.contained.value)); },
                         .committed = [this](RoomSeq place, const Cut& cut) {
@@ -66,7 +67,19 @@ struct Heard {
                           events.push_back(std::to_string(place.value) + " rejects " + std::to_string(seq) + " until " +
                                            std::to_string(lease) + ": " + why);
                         },
-                        .scene = [this](RoomSeq place, const std::vector<SceneItem>&) { events.push_back("scene " + std::to_string(place.value)); }},
+                        .scene = [this](RoomSeq place, const std::vector<SceneItem>&) { events.push_back("scene " + std::to_string(place.value)); },
+                        .supervised = [this](const HandSupervised& now) {
+                          if (now.place.value == 0 && now.supervision == Supervision{}) return ++free;
+                          events.push_back(std::to_string(now.place.value) + (now.supervision.stopped ? " stops" : " frees") + " until " +
+                                           std::to_string(now.lease_epoch) + now.supervision.words);
+                          return free;
+                        },
+                        .said = [this](const WordsSaid& said) {
+                          events.push_back(std::to_string(said.place.value) + ": " + std::to_string(said.from.value) + " says " + said.words);
+                        },
+                        .partner = [this](const CuttingState& state) {
+                          partners.push_back(100 * state.author.value + state.state_seq);
+                        }},
                        [this](std::uint64_t seq) { decided.push_back(seq); }, [this](std::uint64_t seq) { decided.push_back(seq); }};
 };
 
@@ -106,6 +119,79 @@ TEST(SessionReader, TakesWhicheverWayIsFirstAndKeepsTheOrder) {
                                                     "13 rejects 7 until 14: the path leaves the surroundings of the bone"}));
   EXPECT_EQ(heard.decided, (std::vector<std::uint64_t>{5, 6, 7}));
   EXPECT_EQ(heard.reader.taken(), 4u);
+}
+
+wire::IndexedRow word(std::uint64_t index, std::uint64_t place, bool stopped) {
+  wire::IndexedRow row{index, {.room_seq = RoomSeq{place}, .kind = wire::SessionRowKind::supervised, .lease_epoch = place + 1}};
+  row.row.supervision.stopped = stopped;
+  return row;
+}
+v1::SessionResponse streamed_word(const wire::IndexedRow& row) {
+  v1::SessionResponse response;
+  response.set_index(row.index);
+  response.mutable_supervised()->set_room_seq(row.row.room_seq.value);
+  response.mutable_supervised()->set_lease_epoch(row.row.lease_epoch);
+  *response.mutable_supervised()->mutable_supervision() = wire::to_wire(row.row.supervision);
+  return response;
+}
+
+// Each once and in the room's order, whichever way is first; what the stream alone brings keeps its place among them.
+TEST(SessionReader, AnInstructorsWordKeepsItsPlace) {
+  Heard heard;
+  heard.reader.begin();
+  ASSERT_TRUE(heard.reader.take(word(2, 11, true)));  // a cut before it has not come
+  EXPECT_TRUE(heard.events.empty());
+  ASSERT_TRUE(heard.reader.take(streamed_word(word(2, 11, true))));
+  ASSERT_TRUE(heard.reader.take(row(1, 10, 7, 1)));
+  ASSERT_TRUE(heard.reader.take(word(2, 11, true)));
+  ASSERT_TRUE(heard.reader.take(word(4, 13, false)));
+  v1::SessionResponse said;
+  said.set_index(3);
+  said.mutable_said()->set_room_seq(12);
+  said.mutable_said()->set_from(4);
+  said.mutable_said()->set_words("look here");
+  ASSERT_TRUE(heard.reader.take(said));
+  EXPECT_EQ(heard.events, (std::vector<std::string>{"10 of 7", "11 stops until 12", "12: 4 says look here", "13 frees until 14"}));
+  EXPECT_EQ(heard.reader.place(), RoomSeq{13});
+}
+
+// What held when the stream began is said before its leaves are complete; where nothing is said, nothing holds any more.
+TEST(SessionReader, EveryStreamSaysWhatHoldsForTheHand) {
+  Heard heard;
+  v1::SessionResponse complete;
+  complete.mutable_complete()->set_room_seq(3);
+  heard.reader.begin();
+  wire::IndexedRow before = word(0, 0, true);
+  before.row.lease_epoch = 5;
+  ASSERT_TRUE(heard.reader.take(streamed_word(before)));
+  ASSERT_TRUE(heard.reader.take(complete));
+  EXPECT_EQ(heard.events, (std::vector<std::string>{"0 stops until 5", "complete 3"}));
+  EXPECT_EQ(heard.free, 0);
+  heard.reader.begin();
+  ASSERT_TRUE(heard.reader.take(complete));
+  EXPECT_EQ(heard.free, 1);
+}
+
+TEST(SessionReader, TakesTheNewestOfAPartnersTool) {
+  Heard heard;
+  heard.reader.begin();
+  const auto state = [](std::uint64_t author, std::uint64_t seq) {
+    CuttingState of;
+    of.author = AuthorId{author};
+    of.state_seq = seq;
+    return of;
+  };
+  const auto streamed = [&](std::uint64_t author, std::uint64_t seq) {
+    v1::SessionResponse response;
+    *response.mutable_partner() = wire::to_wire(state(author, seq));
+    return response;
+  };
+  heard.reader.take(state(2, 8));
+  ASSERT_TRUE(heard.reader.take(streamed(2, 7)));
+  ASSERT_TRUE(heard.reader.take(streamed(2, 9)));
+  ASSERT_TRUE(heard.reader.take(streamed(3, 1)));
+  heard.reader.take(state(7, 50));  // its own
+  EXPECT_EQ(heard.partners, (std::vector<std::uint64_t>{208, 209, 301}));
 }
 
 TEST(SessionReader, BeginsAnewWithEachStream) {
