@@ -23,8 +23,9 @@ std::uint64_t place_of(const v1::SessionResponse& row) {
 
 Result<void> check_protocol_version(std::uint32_t clients) {
   if (clients >= kOldestProtocolVersion && clients <= kProtocolVersion) return {};
-  const std::string versions = "the client speaks protocol version " + std::to_string(clients) + " and the server protocol version " +
-                               std::to_string(kProtocolVersion) + ", or " + std::to_string(kOldestProtocolVersion);
+  const std::string versions = "the client speaks protocol version " + std::to_string(clients) +
+                               " and the server protocol version " + std::to_string(kProtocolVersion) + ", or " +
+                               std::to_string(kOldestProtocolVersion);
   return failure(ErrorCode::unsupported, versions + (clients < kOldestProtocolVersion
                                                          ? "; install a newer Osteon where the client runs"
                                                          : "; install a newer Osteon where the server runs, before the clients"));
