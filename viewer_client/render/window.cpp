@@ -5,6 +5,7 @@
 #include <vtkCallbackCommand.h>
 #include <vtkCamera.h>
 #include <vtkCellArray.h>
+#include <vtkCellPicker.h>
 #include <vtkCullerCollection.h>
 #include <vtkFloatArray.h>
 #include <vtkFrustumCoverageCuller.h>
@@ -32,6 +33,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
 #include <map>
 #include <memory>
 #include <numbers>
@@ -40,6 +42,8 @@
 
 #include "common/runtime/files.hpp"
 #include "common/tools/tool.hpp"
+#include "viewer_client/render/people_overlay.hpp"
+#include "viewer_client/scene/stroke.hpp"
 #include "viewer_client/scene/tool_mesh.hpp"
 
 namespace osteon {
@@ -155,12 +159,17 @@ void add_light(vtkRenderer* renderer, double x, double y, double z, double inten
   renderer->AddLight(light);
 }
 
-// The trackball, with our own keys in place of VTK's many.
+// The trackball, with our own keys in place of VTK's many; after P or L the left button draws once instead of turning.
 class BoneStyle : public vtkInteractorStyleTrackballCamera {
  public:
   static BoneStyle* New();
   vtkTypeMacro(BoneStyle, vtkInteractorStyleTrackballCamera);
+  enum class Pen { up, pointer, line };
   WindowEvents pending;
+  std::function<std::optional<Vec3>(int x, int y)> surface_at;  // of VTK's display: rows from the bottom
+
+  [[nodiscard]] Pen pen() const { return pen_; }
+  [[nodiscard]] std::vector<Vec3> stroke() const { return stroke_ ? stroke_->line(kMostAnnotationPoints) : std::vector<Vec3>{}; }
 
   void OnChar() override {
     switch (Interactor->GetKeyCode()) {
@@ -172,6 +181,21 @@ class BoneStyle : public vtkInteractorStyleTrackballCamera {
       case 'T':
         pending.wants_tool = true;
         break;
+      case 'p':
+      case 'P':
+        take(pen_ == Pen::pointer ? Pen::up : Pen::pointer);
+        break;
+      case 'l':
+      case 'L':
+        take(pen_ == Pen::line ? Pen::up : Pen::line);
+        break;
+      case 'x':
+      case 'X':
+        pending.wants_wipe = true;
+        break;
+      case kEscape:
+        take(Pen::up);
+        break;
       case 'q':
       case 'Q':
         pending.closed = true;
@@ -180,6 +204,44 @@ class BoneStyle : public vtkInteractorStyleTrackballCamera {
         break;
     }
   }
+
+  void OnLeftButtonDown() override {
+    if (pen_ == Pen::up) return vtkInteractorStyleTrackballCamera::OnLeftButtonDown();
+    const std::optional<Vec3> at = under_mouse();
+    if (!at) return;  // beside the bone: the pen stays down
+    if (pen_ == Pen::pointer) {
+      pending.pointed = at;
+      take(Pen::up);
+    } else {
+      stroke_.emplace().add(*at);
+    }
+  }
+  void OnMouseMove() override {
+    if (!stroke_) return vtkInteractorStyleTrackballCamera::OnMouseMove();
+    if (const std::optional<Vec3> at = under_mouse()) stroke_->add(*at);
+    pending.redraw = true;
+  }
+  void OnLeftButtonUp() override {
+    if (!stroke_) return vtkInteractorStyleTrackballCamera::OnLeftButtonUp();
+    pending.drawn = stroke();
+    take(Pen::up);
+  }
+
+ private:
+  static constexpr char kEscape = 27;
+
+  std::optional<Vec3> under_mouse() const {
+    const int* at = Interactor->GetEventPosition();
+    return surface_at ? surface_at(at[0], at[1]) : std::nullopt;
+  }
+  void take(Pen pen) {
+    pen_ = pen;
+    stroke_.reset();
+    pending.redraw = true;
+  }
+
+  Pen pen_ = Pen::up;
+  std::optional<Stroke> stroke_;  // between the button's going down and up
 };
 vtkStandardNewMacro(BoneStyle);
 
@@ -241,6 +303,13 @@ struct BoneWindow::Impl {
   std::map<Digest, std::string> tool_names;                       // of all tools that can be drawn
   std::map<std::uint32_t, vtkSmartPointer<vtkActor>> items;
 
+  std::unique_ptr<PeopleOverlay> people;
+  std::vector<std::string> said;
+  std::string holding;
+
+  // Rows from the bottom.
+  std::optional<Vec3> surface_at(int x, int y) const;
+  std::optional<Vec3> normal_at(const Vec3& point_mm) const;
   vtkPolyData* data_of(const std::string& name);
   static vtkSmartPointer<vtkPolyData> data_of(const Tool& tool);
   void add_in_order();
@@ -257,6 +326,36 @@ vtkPolyData* BoneWindow::Impl::data_of(const std::string& name) {
 vtkSmartPointer<vtkPolyData> BoneWindow::Impl::data_of(const Tool& tool) {
   const ToolMesh mesh = tool_mesh(tool);
   return poly_data(mesh.positions_mm, mesh.normals, mesh.cutting, mesh.triangles, kSteel, kCuttingSteel);
+}
+
+std::optional<Vec3> BoneWindow::Impl::surface_at(int x, int y) const {
+  // Only of the bone: neither tools nor what is drawn.
+  vtkNew<vtkCellPicker> picker;
+  picker->SetTolerance(0.0);
+  picker->PickFromListOn();
+  for (const auto& [key, actor] : regions) picker->AddPickList(actor);
+  if (regions.empty() || picker->Pick(x, y, 0.0, renderer) == 0) return std::nullopt;
+  return Vec3(picker->GetPickPosition());
+}
+
+// The mean normal of the vertices round a point.
+std::optional<Vec3> BoneWindow::Impl::normal_at(const Vec3& point_mm) const {
+  constexpr double kNear_mm = 2.5;
+  Vec3 sum = Vec3::Zero();
+  for (const auto& [key, actor] : regions) {
+    const double* box = actor->GetBounds();
+    bool near = true;
+    for (int axis = 0; axis < 3; ++axis)
+      near = near && point_mm[axis] > box[2 * axis] - kNear_mm && point_mm[axis] < box[2 * axis + 1] + kNear_mm;
+    if (!near) continue;
+    vtkPolyData* data = static_cast<vtkPolyDataMapper*>(actor->GetMapper())->GetInput();
+    for (vtkIdType i = 0; i < data->GetNumberOfPoints(); ++i) {
+      if ((Vec3(data->GetPoint(i)) - point_mm).norm() > kNear_mm) continue;
+      sum += Vec3(data->GetPointData()->GetNormals()->GetTuple(i));
+    }
+  }
+  if (sum.norm() < 1e-6) return std::nullopt;
+  return sum.normalized();
 }
 
 // Regions that are equally near are drawn in the order of their keys, however they came, so that one surface gives one
@@ -279,6 +378,7 @@ void BoneWindow::Impl::add_in_order() {
 BoneWindow::BoneWindow(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 BoneWindow::~BoneWindow() {
+  impl_->people.reset();
   // The window must go before the style and renderer that it still points to.
   impl_->interactor->SetInteractorStyle(nullptr);
   impl_->window->Finalize();
@@ -325,6 +425,10 @@ Result<std::unique_ptr<BoneWindow>> BoneWindow::open(const WindowOptions& option
   text(impl->notice, 15, 0.78, 0.82, 0.86);
   impl->notice->GetPositionCoordinate()->SetCoordinateSystemToNormalizedViewport();
   impl->notice->SetPosition(0.016, 0.024);
+
+  const auto normal_at = [at = impl.get()](const Vec3& point_mm) { return at->normal_at(point_mm); };
+  impl->people = std::make_unique<PeopleOverlay>(*renderer, *window, normal_at);
+  impl->style->surface_at = [at = impl.get()](int x, int y) { return at->surface_at(x, y); };
 
   for (const Tool& tool : builtin_tools()) impl->tool_names.emplace(tool.hash(), tool.name);
 
@@ -422,6 +526,7 @@ void BoneWindow::show_tools(std::span<const CuttingState> states) {
   }
   impl_->tools = std::move(shown);
   if (changed) impl_->add_in_order();
+  impl_->people->show_tools(states);
 }
 
 void BoneWindow::learn_tool(const Tool& tool) {
@@ -450,6 +555,19 @@ void BoneWindow::show_text(const std::string& gauges, const std::string& notice)
   impl_->notice->SetVisibility(notice.empty() ? 0 : 1);
 }
 
+void BoneWindow::show_annotations(std::span<const Annotation> drawn) { impl_->people->show_annotations(drawn); }
+
+void BoneWindow::show_names(std::map<AuthorId, std::string> names) { impl_->people->show_names(std::move(names)); }
+
+void BoneWindow::show_words(const std::vector<std::string>& said, const std::string& holding) {
+  impl_->said = said;
+  impl_->holding = holding;
+}
+
+std::optional<Vec3> BoneWindow::surface_at(int x_px, int y_px) const {
+  return impl_->surface_at(x_px, impl_->window->GetActualSize()[1] - 1 - y_px);
+}
+
 void BoneWindow::look(const CameraView& view) {
   vtkCamera* camera = impl_->renderer->GetActiveCamera();
   camera->SetPosition(view.eye_mm.x(), view.eye_mm.y(), view.eye_mm.z());
@@ -469,6 +587,14 @@ CameraView BoneWindow::camera() const {
 }
 
 void BoneWindow::draw() {
+  using Pen = BoneStyle::Pen;
+  const Pen pen = impl_->style->pen();
+  impl_->people->show_words(impl_->said, impl_->holding,
+                            pen == Pen::up        ? ""
+                            : pen == Pen::pointer ? "click on the bone to point there, Esc to leave it"
+                                                  : "draw on the bone with the left button, Esc to leave it");
+  impl_->people->show_stroke(impl_->style->stroke());
+  impl_->people->place();
   impl_->renderer->ResetCameraClippingRange();
   impl_->window->Render();
   impl_->window->WaitForCompletion();

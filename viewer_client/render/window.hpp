@@ -4,13 +4,16 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "common/core/result.hpp"
 #include "common/mechanics/cutting_state.hpp"
+#include "common/tools/annotation.hpp"
 #include "common/tools/scene_item.hpp"
 #include "viewer_client/scene/camera_view.hpp"
 #include "viewer_client/scene/surface_scene.hpp"
@@ -39,6 +42,9 @@ struct WindowEvents {
   bool redraw = false;          // the camera moved or the window was uncovered or resized
   bool wants_overview = false;  // key O
   bool wants_tool = false;      // key T
+  bool wants_wipe = false;      // key X
+  std::optional<Vec3> pointed;  // key P, then a click on the surface; bone frame, mm
+  std::vector<Vec3> drawn;      // key L, then a line drawn on the surface with the left button; empty: none
 };
 
 class BoneWindow {
@@ -56,6 +62,15 @@ class BoneWindow {
   // What stands on the bone; what is not in the list vanishes.
   void show_items(std::span<const SceneItem> items);
   void show_text(const std::string& gauges, const std::string& notice);
+  // What people have drawn; what is not in the list vanishes.
+  void show_annotations(std::span<const Annotation> drawn);
+  // Each tool is named by its person.
+  void show_names(std::map<AuthorId, std::string> names);
+  // Who said what, one after the other; and what holds for one's own hand, in lines.
+  void show_words(const std::vector<std::string>& said, const std::string& holding);
+
+  // What of the bone is seen at a pixel, columns from the left and rows from the top; bone frame.
+  [[nodiscard]] std::optional<Vec3> surface_at(int x_px, int y_px) const;
 
   void look(const CameraView& view);
   [[nodiscard]] CameraView camera() const;

@@ -9,73 +9,25 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "picture.hpp"
 #include "synthetic.hpp"
 #include "tests/support/temp_dir.hpp"
-#include "tests/support/xvfb.hpp"
 #include "viewer_client/app/viewer.hpp"
 #include "viewer_client/render/window.hpp"
 
 namespace osteon {
 namespace {
 
+using test::differing_pixels;
+using test::focal_px;
+using test::from_front;
+using test::kHeight;
+using test::kWidth;
 using test::sphere_mesh;
 
-constexpr int kWidth = 320, kHeight = 240;
 constexpr RegionKey kHere{BodyId{0}, 0, {0, 0, 0}}, kThere{BodyId{0}, 0, {1, 0, 0}};
 
-// From the front at this distance, z upwards.
-CameraView from_front(double distance_mm) {
-  CameraView view;
-  view.target_mm = Vec3::Zero();
-  view.eye_mm = Vec3(0, -distance_mm, 0);
-  view.up = Vec3::UnitZ();
-  return view;
-}
-
-// Pixels for one radian at the picture's centre.
-double focal_px(const CameraView& view) { return 0.5 * kHeight / std::tan(0.5 * view.view_angle_rad); }
-
-int differing_pixels(const Image& a, const Image& b) {
-  int count = 0;
-  for (std::size_t i = 0; i < a.rgb.size(); ++i) count += a.rgb[i] != b.rgb[i] ? 1 : 0;
-  return count;
-}
-
-class Picture : public testing::Test {
- protected:
-  void SetUp() override {
-    screen_ = test::Xvfb::start();
-    ASSERT_TRUE(screen_) << "Xvfb, of Debian's package xvfb, did not start";
-    ::setenv("DISPLAY", screen_->display().c_str(), 1);
-    auto window = BoneWindow::open({kWidth, kHeight, "picture test"});
-    ASSERT_TRUE(window) << window.error().message;
-    window_ = std::move(*window);
-    window_->look(from_front(100.0));
-  }
-  void TearDown() override {
-    window_.reset();
-    screen_.reset();
-  }
-
-  Image drawn() {
-    window_->draw();
-    return window_->image();
-  }
-  // Mean colour of a square of 9 pixels round a place.
-  static Vec3 colour(const Image& image, int x, int y) {
-    Vec3 sum = Vec3::Zero();
-    for (int dy = -1; dy <= 1; ++dy) {
-      for (int dx = -1; dx <= 1; ++dx) {
-        const auto& [r, g, b] = image.at(x + dx, y + dy);
-        sum += Vec3(r, g, b);
-      }
-    }
-    return sum / 9.0;
-  }
-
-  std::optional<test::Xvfb> screen_;
-  std::unique_ptr<BoneWindow> window_;
-};
+class Picture : public test::Picture {};
 
 TEST_F(Picture, ASphereCoversItsOutline) {
   const Image empty = drawn();

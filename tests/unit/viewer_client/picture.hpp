@@ -1,0 +1,71 @@
+// A window on a screen of its own, for tests that ask pixels.
+#pragma once
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <memory>
+#include <optional>
+
+#include "tests/support/xvfb.hpp"
+#include "viewer_client/render/window.hpp"
+
+namespace osteon::test {
+
+inline constexpr int kWidth = 320, kHeight = 240;
+
+// From the front at this distance, z upwards.
+inline CameraView from_front(double distance_mm) {
+  CameraView view;
+  view.target_mm = Vec3::Zero();
+  view.eye_mm = Vec3(0, -distance_mm, 0);
+  view.up = Vec3::UnitZ();
+  return view;
+}
+
+// Pixels for one radian at the picture's centre.
+inline double focal_px(const CameraView& view) { return 0.5 * kHeight / std::tan(0.5 * view.view_angle_rad); }
+
+inline int differing_pixels(const Image& a, const Image& b) {
+  int count = 0;
+  for (std::size_t i = 0; i < a.rgb.size(); ++i) count += a.rgb[i] != b.rgb[i] ? 1 : 0;
+  return count;
+}
+
+class Picture : public testing::Test {
+ protected:
+  void SetUp() override {
+    screen_ = Xvfb::start();
+    ASSERT_TRUE(screen_) << "Xvfb, of Debian's package xvfb, did not start";
+    ::setenv("DISPLAY", screen_->display().c_str(), 1);
+    auto window = BoneWindow::open({kWidth, kHeight, "picture test"});
+    ASSERT_TRUE(window) << window.error().message;
+    window_ = std::move(*window);
+    window_->look(from_front(100.0));
+  }
+  void TearDown() override {
+    window_.reset();
+    screen_.reset();
+  }
+
+  Image drawn() {
+    window_->draw();
+    return window_->image();
+  }
+  // Mean colour of a square of 9 pixels round a place.
+  static Vec3 colour(const Image& image, int x, int y) {
+    Vec3 sum = Vec3::Zero();
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const auto& [r, g, b] = image.at(x + dx, y + dy);
+        sum += Vec3(r, g, b);
+      }
+    }
+    return sum / 9.0;
+  }
+
+  std::optional<Xvfb> screen_;
+  std::unique_ptr<BoneWindow> window_;
+};
+
+}  // namespace osteon::test

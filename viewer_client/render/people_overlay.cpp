@@ -1,0 +1,372 @@
+#include "viewer_client/render/people_overlay.hpp"
+
+#include <vtkActor.h>
+#include <vtkArrowSource.h>
+#include <vtkCamera.h>
+#include <vtkCellArray.h>
+#include <vtkMatrix4x4.h>
+#include <vtkNew.h>
+#include <vtkPoints.h>
+#include <vtkPolyData.h>
+#include <vtkPolyDataMapper.h>
+#include <vtkProperty.h>
+#include <vtkRenderWindow.h>
+#include <vtkRenderer.h>
+#include <vtkSmartPointer.h>
+#include <vtkSphereSource.h>
+#include <vtkTextActor.h>
+#include <vtkTextProperty.h>
+#include <vtkTubeFilter.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "viewer_client/scene/people_view.hpp"
+#include "viewer_client/scene/stroke.hpp"
+
+namespace osteon {
+
+namespace {
+
+// Of the screen, in pixels.
+constexpr double kArrow = 74.0, kTube = 2.4, kDot = 5.0, kBeside = 14.0, kAlongTool = 80.0;
+constexpr int kLabelText = 16, kNameText = 15, kSaidText = 19, kHoldingText = 22, kHintText = 16;
+// Characters of the font are about half as wide as high.
+constexpr double kCharacter = 0.52;
+// What lies behind the bone shows through it this much.
+constexpr double kThrough = 0.22;
+constexpr std::uint32_t kStroke = 0xffd040;
+
+using Rgb = std::array<double, 3>;
+constexpr Rgb kLight{0.96, 0.96, 0.97}, kDark{0.06, 0.08, 0.10}, kWarning{1.0, 0.72, 0.25}, kName{0.60, 0.80, 0.95};
+
+Rgb rgb(std::uint32_t colour) { return {(colour >> 16 & 255) / 255.0, (colour >> 8 & 255) / 255.0, (colour & 255) / 255.0}; }
+
+vtkSmartPointer<vtkTextActor> text_actor(int size, const Rgb& colour) {
+  auto actor = vtkSmartPointer<vtkTextActor>::New();
+  vtkTextProperty* text = actor->GetTextProperty();
+  text->SetFontFamilyToArial();
+  text->SetFontSize(size);
+  text->SetColor(colour[0], colour[1], colour[2]);
+  text->SetBackgroundColor(kDark[0], kDark[1], kDark[2]);
+  text->SetBackgroundOpacity(0.74);
+  text->SetLineSpacing(1.2);
+  return actor;
+}
+
+vtkSmartPointer<vtkActor> actor_of(vtkAlgorithmOutput* shape, std::uint32_t colour, double opacity) {
+  vtkNew<vtkPolyDataMapper> mapper;
+  mapper->SetInputConnection(shape);
+  mapper->ScalarVisibilityOff();
+  auto actor = vtkSmartPointer<vtkActor>::New();
+  actor->SetMapper(mapper);
+  const Rgb c = rgb(colour);
+  vtkProperty* paint = actor->GetProperty();
+  paint->SetColor(c[0], c[1], c[2]);
+  // Much of it its own light: the colour says who drew it.
+  paint->SetAmbient(0.55);
+  paint->SetDiffuse(0.5);
+  paint->SetOpacity(opacity);
+  paint->SetBackfaceCulling(1);
+  return actor;
+}
+
+}  // namespace
+
+struct PeopleOverlay::Impl {
+  vtkRenderer& bone;
+  vtkRenderWindow& window;
+  NormalAt normal_at;
+  vtkNew<vtkRenderer> above;  // drawn over the bone, with the same camera
+  vtkNew<vtkArrowSource> arrow;
+  vtkNew<vtkSphereSource> ball;
+
+  struct Drawn {
+    Annotation annotation;
+    std::vector<Vec3> points_mm;
+    vtkSmartPointer<vtkTubeFilter> tube;        // of a line
+    vtkSmartPointer<vtkActor> solid, through;   // the same shape, among the bone and over it
+    vtkSmartPointer<vtkTextActor> words;
+    std::optional<Vec3> normal;                 // of a pointer's point
+  };
+  std::map<std::uint32_t, Drawn> drawn;
+  std::optional<Drawn> stroke;
+  std::map<AuthorId, std::string> names;
+  struct Tool {
+    Pose pose;
+    vtkSmartPointer<vtkTextActor> name;
+  };
+  std::map<AuthorId, Tool> tools;
+  vtkSmartPointer<vtkTextActor> said = text_actor(kSaidText, kLight), holding = text_actor(kHoldingText, kWarning),
+                                hint = text_actor(kHintText, kLight);
+  std::vector<std::array<int, 4>> taken;  // by texts of this picture: left, right, bottom, top
+
+  Impl(vtkRenderer& b, vtkRenderWindow& w, NormalAt n) : bone(b), window(w), normal_at(std::move(n)) {}
+
+  Drawn make(const Annotation& annotation);
+  void add(const Drawn& one);
+  void remove(const Drawn& one);
+  void place(Drawn& one);
+  [[nodiscard]] std::string words_of(const Annotation& annotation) const;
+
+  // At a point's distance from the eye; not positive: behind it.
+  [[nodiscard]] double mm_per_px(const Vec3& point_mm) const;
+  [[nodiscard]] std::array<double, 2> on_screen(const Vec3& point_mm);  // from the lower left
+  void put_beside(vtkTextActor* text, const Vec3& point_mm);
+};
+
+PeopleOverlay::PeopleOverlay(vtkRenderer& bone, vtkRenderWindow& window, NormalAt normal_at)
+    : impl_(std::make_unique<Impl>(bone, window, std::move(normal_at))) {
+  vtkRenderer* above = impl_->above;
+  window.SetNumberOfLayers(2);
+  above->SetLayer(1);
+  above->InteractiveOff();
+  above->SetActiveCamera(bone.GetActiveCamera());
+  window.AddRenderer(above);
+
+  impl_->arrow->InvertOn();  // its tip at the origin
+  impl_->arrow->SetTipLength(0.32);
+  impl_->arrow->SetTipRadius(0.105);
+  impl_->arrow->SetShaftRadius(0.038);
+  impl_->arrow->SetTipResolution(24);
+  impl_->arrow->SetShaftResolution(24);
+  impl_->ball->SetRadius(1.0);
+  impl_->ball->SetThetaResolution(20);
+  impl_->ball->SetPhiResolution(20);
+
+  const auto fix = [&](vtkTextActor* text, double x, double y) {
+    text->GetPositionCoordinate()->SetCoordinateSystemToNormalizedViewport();
+    text->SetPosition(x, y);
+    text->SetVisibility(0);
+    above->AddActor2D(text);
+  };
+  fix(impl_->said, 0.5, 0.075);
+  impl_->said->GetTextProperty()->SetJustificationToCentered();
+  fix(impl_->holding, 0.5, 0.965);
+  impl_->holding->GetTextProperty()->SetJustificationToCentered();
+  impl_->holding->GetTextProperty()->SetVerticalJustificationToTop();
+  fix(impl_->hint, 0.984, 0.024);
+  impl_->hint->GetTextProperty()->SetJustificationToRight();
+}
+
+PeopleOverlay::~PeopleOverlay() { impl_->window.RemoveRenderer(impl_->above); }
+
+std::string PeopleOverlay::Impl::words_of(const Annotation& annotation) const {
+  // An author has one arrow: it says whose it is.
+  const auto name = names.find(annotation.author);
+  if (annotation.kind != AnnotationKind::pointer || name == names.end()) return annotation.words;
+  return annotation.words.empty() ? name->second : name->second + ": " + annotation.words;
+}
+
+PeopleOverlay::Impl::Drawn PeopleOverlay::Impl::make(const Annotation& annotation) {
+  Drawn one;
+  one.annotation = annotation;
+  for (const auto& point : annotation.points) one.points_mm.push_back(from_steps(point));
+  vtkAlgorithmOutput* shape = annotation.kind == AnnotationKind::pointer ? arrow->GetOutputPort() : ball->GetOutputPort();
+  if (annotation.kind == AnnotationKind::line) {
+    vtkNew<vtkPoints> points;
+    vtkNew<vtkCellArray> cells;
+    cells->InsertNextCell(static_cast<int>(one.points_mm.size()));
+    for (const Vec3& point : one.points_mm) cells->InsertCellPoint(points->InsertNextPoint(point.data()));
+    vtkNew<vtkPolyData> line;
+    line->SetPoints(points);
+    line->SetLines(cells);
+    one.tube = vtkSmartPointer<vtkTubeFilter>::New();
+    one.tube->SetInputData(line);
+    one.tube->SetNumberOfSides(10);
+    one.tube->CappingOn();
+    shape = one.tube->GetOutputPort();
+  }
+  one.solid = actor_of(shape, annotation.colour, 1.0);
+  one.through = actor_of(shape, annotation.colour, kThrough);
+  one.words = text_actor(kLabelText, kLight);
+  const Rgb c = rgb(annotation.colour);
+  one.words->GetTextProperty()->SetFrame(1);
+  one.words->GetTextProperty()->SetFrameWidth(2);
+  one.words->GetTextProperty()->SetFrameColor(c[0], c[1], c[2]);
+  return one;
+}
+
+void PeopleOverlay::Impl::add(const Drawn& one) {
+  bone.AddActor(one.solid);
+  above->AddActor(one.through);
+  above->AddActor2D(one.words);
+}
+
+void PeopleOverlay::Impl::remove(const Drawn& one) {
+  bone.RemoveActor(one.solid);
+  above->RemoveActor(one.through);
+  above->RemoveActor2D(one.words);
+}
+
+void PeopleOverlay::show_annotations(std::span<const Annotation> drawn) {
+  std::map<std::uint32_t, Impl::Drawn> shown;
+  for (const Annotation& annotation : drawn) {
+    if (!check(annotation)) continue;
+    auto held = impl_->drawn.extract(annotation.id);
+    if (!held.empty() && held.mapped().annotation == annotation) {
+      shown.insert(std::move(held));
+      continue;
+    }
+    if (!held.empty()) impl_->remove(held.mapped());
+    const auto place = shown.insert_or_assign(annotation.id, impl_->make(annotation)).first;
+    impl_->add(place->second);
+  }
+  for (const auto& [id, gone] : impl_->drawn) impl_->remove(gone);
+  impl_->drawn = std::move(shown);
+}
+
+void PeopleOverlay::show_stroke(const std::vector<Vec3>& points_mm) {
+  if (impl_->stroke) impl_->remove(*impl_->stroke);
+  impl_->stroke.reset();
+  if (points_mm.size() < 2) return;
+  Annotation line;
+  line.kind = AnnotationKind::line;
+  line.colour = kStroke;
+  for (const Vec3& point : points_mm) line.points.push_back(in_steps(point));
+  impl_->stroke = impl_->make(line);
+  impl_->add(*impl_->stroke);
+}
+
+void PeopleOverlay::show_names(std::map<AuthorId, std::string> names) { impl_->names = std::move(names); }
+
+void PeopleOverlay::show_tools(std::span<const CuttingState> states) {
+  std::map<AuthorId, Impl::Tool> shown;
+  for (const CuttingState& state : states) {
+    auto held = impl_->tools.extract(state.author);
+    Impl::Tool tool = held.empty() ? Impl::Tool{{}, text_actor(kNameText, kName)} : held.mapped();
+    if (held.empty()) impl_->above->AddActor2D(tool.name);
+    tool.pose = state.pose_bone_tool;
+    shown.emplace(state.author, std::move(tool));
+  }
+  for (const auto& [author, gone] : impl_->tools) impl_->above->RemoveActor2D(gone.name);
+  impl_->tools = std::move(shown);
+}
+
+void PeopleOverlay::show_words(const std::vector<std::string>& said, const std::string& holding, const std::string& hint) {
+  const auto show = [&](vtkTextActor* actor, const std::string& text) {
+    actor->SetInput(text.c_str());
+    actor->SetVisibility(text.empty() ? 0 : 1);
+  };
+  const auto columns = [&](int size) {
+    return static_cast<std::size_t>(std::max(20.0, 0.62 * impl_->window.GetSize()[0] / (kCharacter * size)));
+  };
+  std::string lines;
+  for (const std::string& one : said) lines += (lines.empty() ? "" : "\n") + wrapped(one, columns(kSaidText), 3);
+  show(impl_->said, lines);
+  // Its own line breaks stay.
+  lines.clear();
+  for (std::size_t at = 0; at < holding.size();) {
+    const std::size_t end = std::min(holding.find('\n', at), holding.size());
+    lines += (lines.empty() ? "" : "\n") + wrapped(std::string_view(holding).substr(at, end - at), columns(kHoldingText), 3);
+    at = end + 1;
+  }
+  show(impl_->holding, lines);
+  show(impl_->hint, hint);
+}
+
+double PeopleOverlay::Impl::mm_per_px(const Vec3& point_mm) const {
+  vtkCamera* camera = bone.GetActiveCamera();
+  const Vec3 eye(camera->GetPosition()), sight(camera->GetDirectionOfProjection());
+  const double half = std::tan(0.5 * camera->GetViewAngle() * std::numbers::pi / 180.0);
+  return 2.0 * half * (point_mm - eye).dot(sight) / std::max(1, window.GetSize()[1]);
+}
+
+std::array<double, 2> PeopleOverlay::Impl::on_screen(const Vec3& point_mm) {
+  bone.SetWorldPoint(point_mm.x(), point_mm.y(), point_mm.z(), 1.0);
+  bone.WorldToDisplay();
+  return {bone.GetDisplayPoint()[0], bone.GetDisplayPoint()[1]};
+}
+
+// To the right of the point, lower where another text is there already.
+void PeopleOverlay::Impl::put_beside(vtkTextActor* text, const Vec3& point_mm) {
+  const auto [x, y] = on_screen(point_mm);
+  const int* size = window.GetSize();
+  const bool seen = mm_per_px(point_mm) > 0.0 && x >= 0 && y >= 0 && x < size[0] && y < size[1];
+  text->SetVisibility(seen ? 1 : 0);
+  if (!seen) return;
+  double box[4];
+  text->SetPosition(0, 0);
+  text->GetBoundingBox(above, box);
+  const int width = static_cast<int>(box[1] - box[0]) + 1, height = static_cast<int>(box[3] - box[2]) + 1;
+  // To the left where the window ends on the right.
+  int left = static_cast<int>(std::lround(x + kBeside)), bottom = static_cast<int>(std::lround(y)) - height / 2;
+  if (left + width > size[0]) left = static_cast<int>(std::lround(x - kBeside)) - width;
+  for (bool free = false; !free;) {
+    free = true;
+    for (const auto& [l, r, b, t] : taken) {
+      if (left > r || left + width < l || bottom > t || bottom + height < b) continue;
+      bottom = b - height - 4;
+      free = false;
+      break;
+    }
+  }
+  taken.push_back({left, left + width, bottom, bottom + height});
+  text->SetPosition(left - box[0], bottom - box[2]);
+}
+
+void PeopleOverlay::Impl::place(Drawn& one) {
+  const Vec3& at = one.points_mm.front();
+  const double px_mm = std::max(1e-6, mm_per_px(at));
+  Vec3 beside = at;
+  vtkNew<vtkMatrix4x4> matrix;
+  if (one.annotation.kind == AnnotationKind::line) {
+    beside = one.points_mm.back();
+    const Vec3& middle = one.points_mm[one.points_mm.size() / 2];
+    const double radius_mm = kTube * std::max(1e-6, mm_per_px(middle));
+    // Made anew only where one sees the difference.
+    if (std::abs(one.tube->GetRadius() / radius_mm - 1.0) > 0.1) one.tube->SetRadius(radius_mm);
+  } else if (one.annotation.kind == AnnotationKind::label) {
+    for (int i = 0; i < 3; ++i) {
+      matrix->SetElement(i, i, kDot * px_mm);
+      matrix->SetElement(i, 3, at[i]);
+    }
+  } else {
+    // From outside and from above, so that it is long on the screen even where one looks along the normal.
+    if (!one.normal) one.normal = normal_at(at);
+    const Vec3 sight(bone.GetActiveCamera()->GetDirectionOfProjection());
+    const Vec3 normal = one.normal.value_or(-sight);
+    const Vec3 upwards = Vec3::UnitZ() - normal.z() * normal;
+    const Vec3 aside = upwards.norm() > 0.1 ? upwards.normalized() : normal.unitOrthogonal();
+    const Vec3 outwards = (normal + 0.8 * aside).normalized();
+    // VTK's inverted arrow runs from its tip at the origin along +x.
+    const Eigen::Matrix3d turn = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitX(), outwards).toRotationMatrix();
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) matrix->SetElement(row, column, kArrow * px_mm * turn(row, column));
+      matrix->SetElement(row, 3, at[row]);
+    }
+    beside = at + kArrow * px_mm * outwards;
+  }
+  one.solid->SetUserMatrix(matrix);
+  one.through->SetUserMatrix(matrix);
+
+  const std::string words = wrapped(words_of(one.annotation), 40, 4);
+  one.words->SetVisibility(0);
+  if (words.empty()) return;
+  one.words->SetInput(words.c_str());
+  put_beside(one.words, beside);
+}
+
+void PeopleOverlay::place() {
+  impl_->taken.clear();
+  for (auto& [id, one] : impl_->drawn) impl_->place(one);
+  if (impl_->stroke) impl_->place(*impl_->stroke);
+  bool named = false;
+  for (auto& [author, tool] : impl_->tools) {
+    const auto name = impl_->names.find(author);
+    tool.name->SetVisibility(0);
+    if (name == impl_->names.end() || name->second.empty()) continue;
+    named = true;
+    tool.name->SetInput(name->second.c_str());
+    const Vec3& tip = tool.pose.position_mm;
+    impl_->put_beside(tool.name, tip - kAlongTool * impl_->mm_per_px(tip) * tool.pose.direction(Vec3::UnitZ()));
+  }
+  bool words = false;
+  for (vtkTextActor* text : {impl_->said.Get(), impl_->holding.Get(), impl_->hint.Get()}) words = words || text->GetVisibility() != 0;
+  impl_->above->SetDraw(words || named || impl_->stroke || !impl_->drawn.empty());
+}
+
+}  // namespace osteon
