@@ -37,6 +37,7 @@ constexpr auto kRunDown = 2s;
 
 struct Options {
   std::string server, room;
+  wire::DoorArguments door;
   std::string output = "pulse";
   std::filesystem::path wav_file, state_log_file, summary_file;
   double patience_s = 5;
@@ -116,6 +117,8 @@ nlohmann::json summary_of(const Options& options, const audio::SoundEngine& engi
 }
 
 Result<void> run(const Options& options, const StopSignal& stop) {
+  const Result<wire::Door> door = wire::door_of(options.door);
+  if (!door) return tl::unexpected(door.error());
   const Result<audio::OutputKind> kind = audio::output_kind(options.output);
   if (!kind) return tl::unexpected(kind.error());
   audio::OutputParams output_params;
@@ -134,7 +137,7 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   Result<wire::JoinedRoom> room =
       wire::join_room(options.server, wire::ClientKind::audio, "audio",
                       std::chrono::milliseconds(static_cast<std::int64_t>(1000 * options.patience_s)),
-                      [&] { return stop.requested(); }, options.room);
+                      [&] { return stop.requested(); }, options.room, *door);
   // A stop is what was asked for, also before the server answered.
   if (!room && room.error().code == ErrorCode::cancelled) return {};
   if (!room) return tl::unexpected(room.error());
@@ -207,6 +210,7 @@ int main(int argc, char** argv) {
   CLI::App app("Makes the tools of a room heard: the drill's sound follows speed, load and bone density.", kProgram);
   app.add_option("--server", options.server, "HOST:PORT of osteon-server")->required();
   app.add_option("--room", options.room, "Name of the room; not needed where the server has one");
+  wire::add_door_options(app, options.door);
   app.add_option("--output", options.output, "pulse: PulseAudio's default sink; none: at the same pace to nowhere")
       ->capture_default_str();
   app.add_option("--wav", options.wav_file, "Record what is heard: 48 kHz, 16 bit, mono");

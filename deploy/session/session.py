@@ -86,7 +86,7 @@ class Session:
         address_file.parent.mkdir(exist_ok=True)
         address_file.unlink(missing_ok=True)
         self.household.start("osteon-server", [
-            self.programs / "osteon-server", "--case", self.case, "--listen", "127.0.0.1:0",
+            self.programs / "osteon-server", "--case", self.case, "--listen", "127.0.0.1:0", "--plain",
             "--address-file", address_file, "--summary", self.out / "server.json", "--journal", self._new_journal()])
         address = self.household.wait_for_file(address_file, "osteon-server", patience_s=60.0)
         self.say(f"Server: {self.case.name} at {address}.")
@@ -99,7 +99,7 @@ class Session:
         return self.out / "session.journal"
 
     def _start_viewer(self, address, name, *options):
-        child = self.household.start(name, [self.programs / "osteon-viewer", "--server", address, "--size", self.size,
+        child = self.household.start(name, [self.programs / "osteon-viewer", "--server", address, "--plain", "--size", self.size,
                                             "--script", "-", *options], self.screen, takes_input=True)
         return Viewer(self.household, child)
 
@@ -117,7 +117,7 @@ class Session:
         return look(centre, centre + 1.42 * float(np.linalg.norm(high - low)) * eye_side, up)
 
     def _start_audio(self, address):
-        command = [self.programs / "osteon-audio", "--server", address, "--wav", self.out / "sound.wav",
+        command = [self.programs / "osteon-audio", "--server", address, "--plain", "--wav", self.out / "sound.wav",
                    "--state-log", self.out / "states.csv", "--summary", self.out / "audio.json", "--output", "pulse"]
         if has_sound_server():
             self.say("Sound: your sound server.")
@@ -134,7 +134,7 @@ class Session:
         if str(self.out / "session.h5") not in self.device:
             (self.out / "session.h5").unlink(missing_ok=True)
         haptic = self.household.start("osteon-haptic", [
-            self.programs / "osteon-haptic", "--server", address, "--plan", plan_file, "--device", self.device,
+            self.programs / "osteon-haptic", "--server", address, "--plain", "--plan", plan_file, "--device", self.device,
             "--session-log", self.out / "session.csv", "--record", self.out / "session.h5", "--cut-log", self.out / "cuts.csv",
             "--summary", self.out / "haptic.json", "--cache", cache, "--status"])
         haptic.may_end = True

@@ -22,6 +22,7 @@
 #include "server/app/journal_commands.hpp"
 #include "server/app/room_commands.hpp"
 #include "server/app/server_config.hpp"
+#include "server/app/ticket_command.hpp"
 #include "server/net/metrics.hpp"
 #include "server/net/room_server.hpp"
 
@@ -213,12 +214,13 @@ Result<void> run(const ServerConfig& options, const StopSignal& stop) {
     std::error_code ignored;
     std::filesystem::remove(options.address_file, ignored);
   }
-  if (Result<void> usable = RoomServer::check_listen(options.listen); !usable) return usable;
+  const DoorOptions doors{.certificates = options.certificates, .most_connections = static_cast<std::size_t>(options.most_connections)};
+  if (Result<void> usable = RoomServer::check_listen(options.listen, doors); !usable) return usable;
   if (Result<void> usable = check_writable(options.save_file, "the fields", "--save"); !usable) return usable;
   if (Result<void> usable = check_rooms_folder(options.rooms_folder); !usable) return usable;
   Result<std::unique_ptr<Rooms>> rooms = open_rooms(options);
   if (!rooms) return tl::unexpected(rooms.error());
-  Result<std::unique_ptr<RoomServer>> server = RoomServer::start(std::move(*rooms), options.listen);
+  Result<std::unique_ptr<RoomServer>> server = RoomServer::start(std::move(*rooms), options.listen, doors);
   if (!server) return tl::unexpected(server.error());
   const HostHealth first = (*server)->health();
   log::info("listening", {{"address", (*server)->address()},
@@ -227,7 +229,8 @@ Result<void> run(const ServerConfig& options, const StopSignal& stop) {
                           {"surface_bytes", first.surface_bytes}});
   Result<std::unique_ptr<Metrics>> metrics;
   if (!options.metrics.empty()) {
-    metrics = Metrics::start(options.metrics, **server, {});
+    metrics = Metrics::start(options.metrics, **server,
+                             options.certificates.empty() ? std::filesystem::path() : options.certificates / "server.pem");
     if (!metrics) return tl::unexpected(metrics.error());
     log::info("metrics", {{"address", (*metrics)->address()}});
   }
@@ -270,8 +273,15 @@ int main(int argc, char** argv) {
   std::function<Result<void>()> command;
   add_journal_commands(app, command);
   add_room_commands(app, command);
+  add_ticket_command(app, command);
   app.require_subcommand(0, 1);
   app.add_option("--listen", options.listen, "HOST:PORT on this machine; port 0 lets the system choose")->capture_default_str();
+  app.add_option("--certificates", options.certificates,
+                 "Folder with ca.pem, server.pem, server.key and tickets.pub, as deploy/certs makes it: clients come with a certificate and a ticket");
+  app.add_flag("--plain", options.plain, "Plain text, without certificates and tickets, for clients on this machine alone");
+  app.add_option("--most-connections", options.most_connections, "Of everybody together; further ones are closed at once")
+      ->check(CLI::Range(1, 65535))
+      ->capture_default_str();
   app.add_option("--address-file", options.address_file, "Written with HOST:PORT when clients may come");
   app.add_option("--tools", options.tools_folder,
                  "Folder of tool files (*.yaml, with the STL files they name) that the room knows beside the built-in tools");

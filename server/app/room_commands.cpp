@@ -18,6 +18,7 @@ struct Arguments {
   std::uint64_t from = 0, to = 0;
   double speed = 1.0;
   bool with_branches = false;
+  wire::DoorArguments door;
 };
 
 void print(const RoomLine& room) {
@@ -83,10 +84,13 @@ void add_room_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
   const auto command = [&](const char* name, const char* what, Run run) {
     CLI::App* sub = rooms->add_subcommand(name, what);
     sub->add_option("--server", given->server, "HOST:PORT of osteon-server")->required();
+    wire::add_door_options(*sub, given->door);
     sub->callback([&chosen, given, run] {
       chosen = [given, run]() -> Result<void> {
         // What the server is asked may take long: Ctrl-C ends this program, and the server goes on.
-        Result<RoomsClient> client = RoomsClient::reach(given->server, std::chrono::seconds(5), {});
+        const Result<wire::Door> door = wire::door_of(given->door);
+        if (!door) return tl::unexpected(door.error());
+        Result<RoomsClient> client = RoomsClient::reach(given->server, std::chrono::seconds(5), {}, *door);
         if (!client) return tl::unexpected(client.error());
         return run(*client, *given);
       };

@@ -85,6 +85,13 @@ std::string metrics_place(const Value& value) {
   return text;
 }
 
+bool yes_or_no(const Value& value) {
+  const std::string text = scalar(value, "write true or false");
+  if (text == "true") return true;
+  if (text == "false") return false;
+  throw Wrong{"is " + text + "; write true or false"};
+}
+
 Detail detail(const Value& value) {
   constexpr const char* kRemedy = "write auto, full or near";
   const std::string text = scalar(value, kRemedy);
@@ -104,11 +111,14 @@ const std::vector<Field>& fields() {
   static const std::vector<Field> all{
       {"address_file", [](const Value& v, Config& c) { c.address_file = path(v); }},
       {"cases", [](const Value& v, Config& c) { c.case_folders = paths(v); }},
+      {"certificates", [](const Value& v, Config& c) { c.certificates = path(v); }},
       {"detail", [](const Value& v, Config& c) { c.detail = detail(v); }},
       {"drain_seconds", [](const Value& v, Config& c) { c.drain_seconds = whole(v, 0, 600); }},
       {"journal", [](const Value& v, Config& c) { c.journal_file = path(v); }},
       {"listen", [](const Value& v, Config& c) { c.listen = host_port(v, "write HOST:PORT, such as 127.0.0.1:50000"); }},
       {"metrics", [](const Value& v, Config& c) { c.metrics = metrics_place(v); }},
+      {"most_connections", [](const Value& v, Config& c) { c.most_connections = whole(v, 1, 65535); }},
+      {"plain", [](const Value& v, Config& c) { c.plain = yes_or_no(v); }},
       {"resume", [](const Value& v, Config& c) { c.resume_file = path(v); }},
       {"retention_days", [](const Value& v, Config& c) { c.retention_days = whole(v, 1, 36500); }},
       {"rooms", [](const Value& v, Config& c) { c.rooms_folder = path(v); }},
@@ -238,6 +248,9 @@ Result<void> check_server_config(const ServerConfig& config) {
                      ", on the command line as in a --config file; leave one");
   if (ways[0].second && !config.save_file.empty())
     return wrong("--rooms excludes --save, on the command line as in a --config file; leave one");
+  if (config.plain == !config.certificates.empty())
+    return wrong(config.plain ? "--plain excludes --certificates, on the command line as in a --config file; leave one"
+                              : "say how clients come in: --certificates DIR, which deploy/certs makes, or --plain for plain text on this machine alone");
   return {};
 }
 
@@ -252,6 +265,8 @@ Result<void> check_server_places(const ServerConfig& config) {
     return missing("tools (--tools)", config.tools_folder, "is not a folder; give one with tool files");
   if (!config.resume_file.empty() && !is_there(config.resume_file, false))
     return missing("resume (--resume)", config.resume_file, "is not there; give a file that --save wrote");
+  if (!config.certificates.empty() && !is_there(config.certificates / "server.pem", false))
+    return missing("certificates (--certificates)", config.certificates, "has no server.pem; give a folder that deploy/certs server made");
   const std::tuple<const char*, const fs::path&> written[]{{"address_file (--address-file)", config.address_file},
                                                            {"journal (--journal)", config.journal_file},
                                                            {"save (--save)", config.save_file},

@@ -18,6 +18,9 @@ inline constexpr CutLimits kServedLimits{
 struct ServerConfig {
   std::vector<std::filesystem::path> case_folders;
   std::string listen = "127.0.0.1:0";   // HOST:PORT
+  std::filesystem::path certificates;   // folder, as Gate::open has it
+  bool plain = false;                   // without: plain text, on this machine alone
+  int most_connections = 512;           // of everybody together
   std::filesystem::path address_file, summary_file, tools_folder;
   std::filesystem::path save_file, resume_file, journal_file, rooms_folder;
   int retention_days = 0;               // 0: nobody is forgotten

@@ -9,10 +9,40 @@
 
 namespace osteon {
 
-// By the call's metadata "osteon-room-bin"; without it, the only one that is open.
+inline std::string metadata_of(const grpc::CallbackServerContext& context, const char* key) {
+  const auto named = context.client_metadata().find(key);
+  return named == context.client_metadata().end() ? std::string() : std::string(named->second.data(), named->second.size());
+}
+
+// Who calls. Over plain text nobody says so: `user` is empty then, and the caller may do anything. Error denied: the caller's
+// right has ended since the call was let in.
+inline Result<Caller> caller_of(const Rooms& rooms, const grpc::CallbackServerContext& context) {
+  if (!rooms.gate) return Caller{};
+  const auto pem = context.auth_context()->FindPropertyValues(GRPC_X509_PEM_CERT_PROPERTY_NAME);
+  const std::string ticket = metadata_of(context, "osteon-ticket"), room = metadata_of(context, "osteon-room-bin");
+  const std::string_view certificate = pem.empty() ? std::string_view() : std::string_view(pem[0].data(), pem[0].size());
+  auto caller = rooms.gate->judge({.certificate_pem = certificate, .ticket = ticket, .room = room, .method = {}});
+  if (!caller) return failure(ErrorCode::denied, caller.error().sentence);
+  return std::move(*caller);
+}
+
+// By the call's metadata "osteon-room-bin"; without it, the one that the ticket is for, or the only one that is open.
 inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const grpc::CallbackServerContext& context) {
-  const auto named = context.client_metadata().find("osteon-room-bin");
-  return rooms.find(named == context.client_metadata().end() ? std::string() : std::string(named->second.data(), named->second.size()));
+  const Result<Caller> caller = caller_of(rooms, context);
+  if (!caller) return tl::unexpected(caller.error());
+  std::string named = metadata_of(context, "osteon-room-bin");
+  if (named.empty() && caller->ticket_room != kAnyRoom) named = caller->ticket_room;
+  return rooms.find(named);
+}
+
+// The same, of a call that is made as `author`. Error denied: that is not who calls.
+inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const grpc::CallbackServerContext& context, AuthorId author) {
+  Result<std::shared_ptr<OpenRoom>> room = called_room(rooms, context);
+  if (!room || !rooms.gate) return room;
+  const Result<Caller> caller = caller_of(rooms, context);
+  if (!caller) return tl::unexpected(caller.error());
+  if (const Result<void> own = rooms.gate->check_author(*caller, (*room)->name, author); !own) return tl::unexpected(own.error());
+  return room;
 }
 
 inline Status status_of(const Error& error) {

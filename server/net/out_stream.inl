@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/net/gate.hpp"
 #include "server/net/outbox.hpp"
 
 namespace osteon {
@@ -39,6 +40,10 @@ std::optional<Message> parse(const ByteBuffer& bytes) {
 
 inline Status invalid(std::string why) { return {StatusCode::INVALID_ARGUMENT, std::move(why)}; }
 
+inline Status status_of(const Refusal& why) {
+  return {why.is_known ? StatusCode::PERMISSION_DENIED : StatusCode::UNAUTHENTICATED, why.sentence};
+}
+
 inline Status not_joined(const char* message, std::uint64_t author) {
   return invalid(std::string(message) + ".author " + std::to_string(author) + " has not joined this room; call Join first");
 }
@@ -54,6 +59,15 @@ class OutStream : public Reactor {
     Stream* raw = stream.get();
     raw->self_ = std::move(stream);
     return raw;
+  }
+
+  // From now on `gate` ends it when its caller may have it no more, or has come anew; null, over plain text: nothing does.
+  // Before the stream is given to gRPC, or in its reactions to reads.
+  void stand_under(Gate* gate, const Caller& caller, const std::string& room, AuthorId author, std::string_view method) {
+    if (gate == nullptr) return;
+    watched_ = gate->enter(caller, room, author, method, [this, weak = std::weak_ptr<void>(self_)](const Refusal& why) {
+      if (const std::shared_ptr<void> keep = weak.lock()) close(status_of(why));
+    });
   }
 
   void close(Status status) {
@@ -74,6 +88,7 @@ class OutStream : public Reactor {
       const std::lock_guard lock(mutex_);
       done_ = true;
     }
+    watched_.reset();
     leave();
     const std::shared_ptr<void> last = std::move(self_);
   }
@@ -99,6 +114,10 @@ class OutStream : public Reactor {
       this->Finish(*closing_);
     }
   }
+  // Whether its caller may send that now.
+  [[nodiscard]] bool may_carry(DatagramContent kind) const { return !watched_ || osteon::may_carry(watched_->role(), kind); }
+  // Whether its caller may be told that now.
+  [[nodiscard]] bool may_receive(StreamContent content) const { return !watched_ || osteon::may_receive(watched_->role(), content); }
   [[nodiscard]] bool closing() const { return closing_.has_value(); }
   [[nodiscard]] bool done() const { return done_; }  // gRPC has let go of the stream
   [[nodiscard]] std::shared_ptr<void> self() const { return self_; }
@@ -107,6 +126,7 @@ class OutStream : public Reactor {
 
  private:
   std::shared_ptr<void> self_;
+  std::shared_ptr<OpenStream> watched_;  // shared with the gate while it ends the stream
   std::optional<Status> closing_;
   bool writing_ = false, finished_ = false, done_ = false;
   ByteBuffer message_;

@@ -27,6 +27,8 @@
 
 namespace osteon {
 
+class Gate;
+
 struct RoomSummary {
   Digest case_hash;
   BoneStatus bone;
@@ -146,6 +148,7 @@ class Rooms {
   JobThread jobs;   // whatever changes the rooms
   JobThread files;  // what only reads a case's files
   RefusalCounts refusals;  // of all doors
+  Gate* gate = nullptr;    // before every call; null: plain text, and everybody may do anything. It outlives the rooms' calls
 
  private:
   [[nodiscard]] std::filesystem::path journal_of(const std::string& name) const;

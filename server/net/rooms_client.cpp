@@ -17,6 +17,8 @@ Error error_of(const grpc::Status& status) {
     case grpc::StatusCode::NOT_FOUND: return {ErrorCode::not_found, status.error_message()};
     case grpc::StatusCode::ALREADY_EXISTS: return {ErrorCode::exists, status.error_message()};
     case grpc::StatusCode::FAILED_PRECONDITION: return {ErrorCode::unavailable, status.error_message()};
+    case grpc::StatusCode::UNAUTHENTICATED:
+    case grpc::StatusCode::PERMISSION_DENIED: return {ErrorCode::denied, "the server does not do that for you: " + status.error_message()};
     case grpc::StatusCode::INTERNAL: return {ErrorCode::internal, status.error_message()};
     default: return {ErrorCode::unavailable, "the server does not answer: " + status.error_message()};
   }
@@ -56,9 +58,9 @@ Result<RoomLine> line_of(const Result<Response>& response) {
 }  // namespace
 
 Result<RoomsClient> RoomsClient::reach(const std::string& address, std::chrono::milliseconds patience,
-                                       const std::function<bool()>& stop) {
+                                       const std::function<bool()>& stop, const wire::Door& door) {
   // A long answer is waited for as long as by a hand.
-  Result<std::shared_ptr<grpc::Channel>> channel = wire::reach_server(address, wire::ClientKind::haptic, patience, stop);
+  Result<std::shared_ptr<grpc::Channel>> channel = wire::reach_server(address, wire::ClientKind::haptic, patience, stop, door);
   if (!channel) return tl::unexpected(channel.error());
   return RoomsClient(std::move(*channel));
 }

@@ -9,6 +9,7 @@
 #include "common/core/digest.hpp"
 #include "common/core/id.hpp"
 #include "common/core/result.hpp"
+#include "common/wire/door.hpp"
 
 namespace grpc {
 class Channel;
@@ -32,7 +33,7 @@ struct RoomLine {
 class RoomsClient {
  public:
   [[nodiscard]] static Result<RoomsClient> reach(const std::string& address, std::chrono::milliseconds patience,
-                                                 const std::function<bool()>& stop);
+                                                 const std::function<bool()>& stop, const wire::Door& door = {});
 
   [[nodiscard]] Result<std::vector<RoomLine>> list();
   [[nodiscard]] Result<RoomLine> create(const std::string& name, const std::string& case_hash_hex);

@@ -8,6 +8,7 @@
 #include "common/wire/convert.hpp"
 #include "osteon/v1/rooms.grpc.pb.h"
 #include "server/net/called_room.inl"
+#include "server/net/gate.hpp"
 #include "server/net/services.hpp"
 
 namespace osteon {
@@ -37,14 +38,20 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
 
   Reactor* ListRooms(Context* context, const v1::ListRoomsRequest*, v1::ListRoomsResponse* response) override {
     Reactor* reactor = context->DefaultReactor();
-    rooms_.files.run([this, reactor, response] {
-      for (const RoomListing& listing : rooms_.list()) *response->add_rooms() = to_wire(listing);
+    const Result<Caller> caller = caller_of(rooms_, *context);
+    if (!caller) {
+      reactor->Finish(status_of(caller.error()));
+      return reactor;
+    }
+    rooms_.files.run([this, reactor, response, caller = *caller] {
+      for (const RoomListing& listing : rooms_.list())
+        if (is_for(caller, listing.name)) *response->add_rooms() = to_wire(listing);
       reactor->Finish(Status::OK);
     });
     return reactor;
   }
   Reactor* CreateRoom(Context* context, const v1::CreateRoomRequest* request, v1::CreateRoomResponse* response) override {
-    return slowly(context, [this, request, response] {
+    return slowly(context, request->name(), [this, request, response] {
       std::optional<Digest> hash;
       if (!request->case_hash().empty()) {
         const Result<Digest> named = wire::digest_from_wire(request->case_hash());
@@ -55,7 +62,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     });
   }
   Reactor* CloseRoom(Context* context, const v1::CloseRoomRequest* request, v1::CloseRoomResponse* response) override {
-    return slowly(context, [this, request, response] {
+    return slowly(context, request->name(), [this, request, response] {
       const Result<RoomSummary> closed = rooms_.close(request->name());
       if (!closed) return status_of(closed.error());
       response->mutable_room()->set_name(request->name());
@@ -66,15 +73,15 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     });
   }
   Reactor* ResumeRoom(Context* context, const v1::ResumeRoomRequest* request, v1::ResumeRoomResponse* response) override {
-    return slowly(context, [this, request, response] { return told(rooms_.resume(request->name()), response->mutable_room()); });
+    return slowly(context, request->name(), [this, request, response] { return told(rooms_.resume(request->name()), response->mutable_room()); });
   }
   Reactor* BranchRoom(Context* context, const v1::BranchRoomRequest* request, v1::BranchRoomResponse* response) override {
-    return slowly(context, [this, request, response] {
+    return slowly(context, request->name(), [this, request, response] {
       return told(rooms_.branch(request->name(), request->new_name(), RoomSeq{request->room_seq()}), response->mutable_room());
     });
   }
   Reactor* DeleteRoom(Context* context, const v1::DeleteRoomRequest* request, v1::DeleteRoomResponse* response) override {
-    return slowly(context, [this, request, response] {
+    return slowly(context, request->name(), [this, request, response] {
       const Result<std::vector<std::string>> gone = rooms_.remove(request->name(), request->with_branches());
       if (!gone) return status_of(gone.error());
       for (const std::string& name : *gone) response->add_deleted(name);
@@ -82,7 +89,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     });
   }
   Reactor* VerifyRoom(Context* context, const v1::VerifyRoomRequest* request, v1::VerifyRoomResponse* response) override {
-    return slowly(context, [this, request, response] {
+    return slowly(context, request->name(), [this, request, response] {
       const auto report = rooms_.verify(request->name());
       if (!report) return status_of(report.error());
       response->set_room_seq(report->head.place.value);
@@ -94,7 +101,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     });
   }
   Reactor* BackUpRoom(Context* context, const v1::BackUpRoomRequest* request, v1::BackUpRoomResponse* response) override {
-    return slowly(context, [this, request, response] {
+    return slowly(context, request->name(), [this, request, response] {
       std::filesystem::path file;
       const Result<JournalHead> copied = rooms_.back_up(request->name(), request->file_name(), file);
       if (!copied) return status_of(copied.error());
@@ -105,7 +112,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     });
   }
   Reactor* ReplayRoom(Context* context, const v1::ReplayRoomRequest* request, v1::ReplayRoomResponse* response) override {
-    return slowly(context, [this, request, response] {
+    return slowly(context, request->name(), [this, request, response] {
       return told(rooms_.replay(request->name(), request->new_name(), RoomSeq{request->from_room_seq()},
                                 RoomSeq{request->to_room_seq()}, request->speed()),
                   response->mutable_room());
@@ -113,8 +120,19 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
   }
 
  private:
-  Reactor* slowly(Context* context, std::function<Status()> work) {
+  // Over plain text everybody's ticket is for every room.
+  [[nodiscard]] bool is_for(const Caller& caller, const std::string& room) const {
+    return !rooms_.gate || caller.ticket_room == kAnyRoom || caller.ticket_room == room;
+  }
+  Reactor* slowly(Context* context, const std::string& room, std::function<Status()> work) {
     Reactor* reactor = context->DefaultReactor();
+    const Result<Caller> caller = caller_of(rooms_, *context);
+    if (!caller || !is_for(*caller, room)) {
+      reactor->Finish(caller ? Status(StatusCode::PERMISSION_DENIED, "the ticket is for room " + caller->ticket_room + " and not for " + room +
+                                                                         "; ask for one for that room")
+                             : status_of(caller.error()));
+      return reactor;
+    }
     rooms_.jobs.run([reactor, work = std::move(work)] { reactor->Finish(work()); });
     return reactor;
   }

@@ -120,20 +120,26 @@ class RoomServiceImpl final : public RoomBase {
       return refuse(reactor, {StatusCode::UNAVAILABLE, *why});
     }
     const std::shared_ptr<OpenRoom> room = called(*context, reactor);
-    if (!room) {
+    const Result<Caller> caller = caller_of(rooms_, *context);
+    if (!room || !caller) {
       rooms_.refusals.count("room");
-      return reactor;
+      return room ? refuse(reactor, status_of(caller.error())) : reactor;
     }
-    room->host().run_slowly([this, room, reactor, request, response] {
+    if (Result<void> may = may_join(*caller, *room, *request); !may) {
+      rooms_.refusals.count("role");
+      return refuse(reactor, status_of(may.error()));
+    }
+    room->host().run_slowly([this, room, reactor, request, response, caller = *caller] {
       RoomHost& host = room->host();
       const Case& bone = host.bone();
       const Result<AuthorId> author =
-          request->resume_author() != 0 ? come_back(host, *request) : come(host, *request, *response);
+          request->resume_author() != 0 ? come_back(host, *request) : come(host, *request, *response, caller);
       if (!author) {
         rooms_.refusals.count("room");
         log::warn("join refused", {{"room", room->name}, {"reason", author.error().message}});
         return reactor->Finish(status_of(author.error()));
       }
+      if (rooms_.gate) rooms_.gate->joined(caller, room->name, request->kind(), *author);
       room->note_version(*author, request->protocol_version());
       log::info("joined", {{"room", room->name},
                            {"author", author->value},
@@ -151,6 +157,7 @@ class RoomServiceImpl final : public RoomBase {
       *response->mutable_bounds_min_mm() = wire::to_wire(bounds.min_mm);
       *response->mutable_bounds_max_mm() = wire::to_wire(bounds.max_mm);
       response->set_room_seq(host.room_seq().value);
+      response->set_role(static_cast<v1::Role>(caller.role));
       reactor->Finish(Status::OK);
     });
     return reactor;
@@ -189,14 +196,24 @@ class RoomServiceImpl final : public RoomBase {
     return reactor;
   }
 
-  WriteReactor* GetCase(grpc::CallbackServerContext*, const ByteBuffer* bytes) override {
+  WriteReactor* GetCase(grpc::CallbackServerContext* context, const ByteBuffer* bytes) override {
     const auto request = parse<v1::GetCaseRequest>(*bytes);
     if (!request) return refused(invalid("the GetCaseRequest could not be parsed"));
     const Result<Digest> hash = wire::digest_from_wire(request->case_hash());
     if (!hash) return refused(invalid("case_hash is not a digest of 32 bytes"));
     const ServedCase* served = rooms_.find_case(*hash);
     if (!served) return refused({StatusCode::NOT_FOUND, "this server has no case " + to_hex(*hash)});
+    const Result<Caller> caller = caller_of(rooms_, *context);
+    if (!caller) return refused(status_of(caller.error()));
+    if (rooms_.gate) {
+      // A ticket for a room opens no other room's case.
+      const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context);
+      if (!room) return refused(status_of(room.error()));
+      if ((*room)->host().bone().hash() != *hash)
+        return refused({StatusCode::PERMISSION_DENIED, "case " + to_hex(*hash) + " is not that of room " + (*room)->name});
+    }
     CaseStream* stream = CaseStream::launch(std::make_shared<CaseStream>(rooms_.files, served->folder));
+    stream->stand_under(rooms_.gate, *caller, caller->ticket_room, {}, "/osteon.v1.RoomService/GetCase");
     stream->start();
     return stream;
   }
@@ -237,7 +254,7 @@ class RoomServiceImpl final : public RoomBase {
     Result<Tool> tool = wire::from_wire(request->tool());
     if (!tool) return refuse(reactor, invalid(tool.error().message));
     return change(
-        *context, reactor, [by = AuthorId{request->author()}, tool = *tool](Room& room) { return room.add_tool(by, tool); },
+        *context, reactor, request->author(), [by = AuthorId{request->author()}, tool = *tool](Room& room) { return room.add_tool(by, tool); },
         [response](const RoomEvent& event) {
           response->set_room_seq(event.room_seq.value);
           response->set_tool_hash(wire::to_wire(event.tool->hash));
@@ -253,7 +270,7 @@ class RoomServiceImpl final : public RoomBase {
     if (int{by_count} + int{!places.empty()} + int{request->to_mark() != 0} > 1)
       return refuse(reactor, invalid("an UndoRequest has one of count, room_seqs and to_mark"));
     return change(
-        *context, reactor,
+        *context, reactor, request->author(),
         [by = AuthorId{request->author()}, of = AuthorId{request->of_author()}, count = request->count(), places,
          mark = RoomSeq{request->to_mark()}](Room& room) {
           if (mark) return room.undo_to(by, mark);
@@ -268,7 +285,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* Redo(grpc::CallbackServerContext* context, const v1::RedoRequest* request,
                                  v1::RedoResponse* response) override {
     return change(
-        *context, context->DefaultReactor(),
+        *context, context->DefaultReactor(), request->author(),
         [by = AuthorId{request->author()}, count = request->count()](Room& room) { return room.redo_last(by, count); },
         [response](const RoomEvent& event) {
           response->set_room_seq(event.room_seq.value);
@@ -279,7 +296,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* Mark(grpc::CallbackServerContext* context, const v1::MarkRequest* request,
                                  v1::MarkResponse* response) override {
     return change(
-        *context, context->DefaultReactor(),
+        *context, context->DefaultReactor(), request->author(),
         [by = AuthorId{request->author()}, label = request->label()](Room& room) { return room.mark(by, label); },
         [response](const RoomEvent& event) { response->set_room_seq(event.room_seq.value); });
   }
@@ -287,7 +304,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* RemoveBody(grpc::CallbackServerContext* context, const v1::RemoveBodyRequest* request,
                                        v1::RemoveBodyResponse* response) override {
     return change(
-        *context, context->DefaultReactor(),
+        *context, context->DefaultReactor(), request->author(),
         [by = AuthorId{request->author()}, body = BodyId{request->body()}](Room& room) { return room.remove_body(by, body); },
         [response](const RoomEvent& event) { response->set_room_seq(event.room_seq.value); });
   }
@@ -300,7 +317,7 @@ class RoomServiceImpl final : public RoomBase {
     const Result<Placing> placing = wire::placing_from_wire(*request);
     if (!placing) return refuse(reactor, invalid(placing.error().message));
     return change(
-        *context, reactor,
+        *context, reactor, request->author(),
         [by = AuthorId{request->author()}, item = *item, placing = *placing](Room& room) { return room.set_item(by, item, placing); },
         [response](const RoomEvent& event) {
           response->set_room_seq(event.room_seq.value);
@@ -313,7 +330,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* RemoveSceneItem(grpc::CallbackServerContext* context, const v1::RemoveSceneItemRequest* request,
                                             v1::RemoveSceneItemResponse* response) override {
     return change(
-        *context, context->DefaultReactor(),
+        *context, context->DefaultReactor(), request->author(),
         [by = AuthorId{request->author()}, item = request->item()](Room& room) { return room.remove_item(by, item); },
         [response](const RoomEvent& event) { response->set_room_seq(event.room_seq.value); });
   }
@@ -345,12 +362,13 @@ class RoomServiceImpl final : public RoomBase {
 
  private:
   // A new identity, and the secret that proves it.
-  static Result<AuthorId> come(RoomHost& host, const v1::JoinRequest& request, v1::JoinResponse& response) {
+  static Result<AuthorId> come(RoomHost& host, const v1::JoinRequest& request, v1::JoinResponse& response, const Caller& caller) {
     const MemberKind kind = request.kind() == v1::CLIENT_KIND_HAPTIC ? MemberKind::surgeon : MemberKind::watcher;
     std::array<std::uint8_t, 32> secret{};
     system_random()(secret);
     response.set_secret(secret.data(), secret.size());
-    return host.join(kind, request.name(), digest_of_secret(response.secret()));
+    // Others see who it is by the certificate, where there is one.
+    return host.join(kind, caller.user.empty() ? request.name() : caller.user, digest_of_secret(response.secret()), caller.role);
   }
   static Result<AuthorId> come_back(RoomHost& host, const v1::JoinRequest& request) {
     std::optional<JournalHead> kept;
@@ -363,13 +381,22 @@ class RoomServiceImpl final : public RoomBase {
     if (Result<void> may = host.resume(author, digest_of_secret(request.secret()), kept); !may) return tl::unexpected(may.error());
     return author;
   }
+  // What the name of the call does not say.
+  [[nodiscard]] Result<void> may_join(const Caller& caller, const OpenRoom& room, const v1::JoinRequest& request) const {
+    if (!rooms_.gate) return {};
+    if (request.kind() == v1::CLIENT_KIND_HAPTIC && !has_right(caller.role, Right::hold_a_tool))
+      return failure(ErrorCode::denied, "your role here, " + std::string(to_string(caller.role)) + ", holds no tool; come as a viewer, or ask for a ticket of another role");
+    if (request.resume_author() == 0) return {};
+    return rooms_.gate->check_resume(caller, room.name, request.kind(), AuthorId{request.resume_author()});
+  }
   static grpc::ServerUnaryReactor* refuse(grpc::ServerUnaryReactor* reactor, Status status) {
     reactor->Finish(std::move(status));
     return reactor;
   }
   // The room that is called; null once `reactor` was told that there is none.
-  std::shared_ptr<OpenRoom> called(const grpc::CallbackServerContext& context, grpc::ServerUnaryReactor* reactor) {
-    Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, context);
+  std::shared_ptr<OpenRoom> called(const grpc::CallbackServerContext& context, grpc::ServerUnaryReactor* reactor,
+                                   std::optional<AuthorId> author = {}) {
+    Result<std::shared_ptr<OpenRoom>> room = author ? called_room(rooms_, context, *author) : called_room(rooms_, context);
     if (room) return std::move(*room);
     reactor->Finish(status_of(room.error()));
     return nullptr;
@@ -377,16 +404,16 @@ class RoomServiceImpl final : public RoomBase {
   // The same, of a caller who has joined it.
   std::shared_ptr<OpenRoom> known(const char* message, std::uint64_t author, const grpc::CallbackServerContext& context,
                                   grpc::ServerUnaryReactor* reactor) {
-    std::shared_ptr<OpenRoom> room = called(context, reactor);
+    std::shared_ptr<OpenRoom> room = called(context, reactor, AuthorId{author});
     if (!room || room->host().knows(AuthorId{author})) return room;
     reactor->Finish(not_joined(message, author));
     return nullptr;
   }
   // An event of the room; answered when every session has been told.
   template <class Fill>
-  grpc::ServerUnaryReactor* change(const grpc::CallbackServerContext& context, grpc::ServerUnaryReactor* reactor,
+  grpc::ServerUnaryReactor* change(const grpc::CallbackServerContext& context, grpc::ServerUnaryReactor* reactor, std::uint64_t author,
                                    std::function<Result<RoomEvent>(Room&)> event, Fill fill) {
-    const std::shared_ptr<OpenRoom> room = called(context, reactor);
+    const std::shared_ptr<OpenRoom> room = called(context, reactor, AuthorId{author});
     if (!room) return reactor;
     room->host().queue_event(std::move(event), [reactor, fill](const Result<RoomEvent>& decided) {
       if (decided) fill(*decided);

@@ -23,10 +23,14 @@ namespace {
 class SessionStream final : public OutStream<BidiReactor>, public SessionSink, private SessionLink::Sink {
  public:
   static constexpr int kMaxQueuedCuts = 256;
+  static constexpr std::string_view kMethod = "/osteon.v1.CuttingService/Session";
 
-  SessionStream(std::shared_ptr<OpenRoom> room, LinkServer* links)
-      : room_(std::move(room)), host_(room_->host()), links_(links) {}
-  void start() { StartRead(&request_); }
+  SessionStream(std::shared_ptr<OpenRoom> room, LinkServer* links, Gate* gate, Caller caller)
+      : room_(std::move(room)), host_(room_->host()), links_(links), gate_(gate), caller_(std::move(caller)) {}
+  void start() {
+    stand_under(gate_, caller_, room_->name, {}, kMethod);
+    StartRead(&request_);
+  }
 
   AuthorId author() const override { return author_; }
   void begin(RoomSeq contained, MessageParts before, Bytes complete) override {
@@ -119,6 +123,9 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
  private:
   void open(const v1::SessionOpen& request) {
     if (opened_) return close(invalid("open was sent before"));
+    if (gate_ != nullptr)
+      if (const Result<void> own = gate_->check_author(caller_, room_->name, AuthorId{request.author()}); !own)
+        return close(status_of(own.error()));
     if (request.server_epoch() != room_->server_epoch)
       // It joined a server that was killed meanwhile: this one knows it, if it joins again.
       return close({StatusCode::UNAVAILABLE, "open.server_epoch is " + std::to_string(request.server_epoch()) + " and the server's " +
@@ -126,6 +133,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     opened_ = true;
     author_ = AuthorId{request.author()};
     version_ = room_->version_of(author_);
+    stand_under(gate_, caller_, room_->name, author_, kMethod);
     const Digest secret = digest_of_secret(request.secret());
     // Reading goes on after the leaves were taken, so that no cut of this author is among them.
     host_.run_slowly([this, keep = self(), secret] {
@@ -158,12 +166,15 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     {
       const std::lock_guard lock(mutex_);
       if (closing()) return;
+      if (!may_carry(DatagramContent::cuts)) return close_locked(not_allowed());
       ++queued_;
       taken_ = std::max(taken_, cut.author_seq);
     }
     host_.queue_cut(std::shared_ptr<SessionSink>(self(), this), std::move(cut), RoomHost::Clock::now());
   }
-  void take(CuttingState state) override { host_.offer_state(std::move(state)); }
+  void take(CuttingState state) override {
+    if (may_carry(DatagramContent::tool_state)) host_.offer_state(std::move(state));
+  }
   void arrived(std::uint64_t index) override {
     const std::lock_guard lock(mutex_);
     outbox_.arrived(index);
@@ -173,6 +184,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     Result<CuttingState> state = wire::from_wire(message);
     if (!state) return close(invalid(state.error().message));
     if (state->author != author_) return close(invalid("state.author is not the author who opened the session"));
+    if (!may_carry(DatagramContent::tool_state)) return close(not_allowed());
     host_.offer_state(std::move(*state));
     read_on();
   }
@@ -186,6 +198,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     if (!older) return nullptr;
     return older->message_case() == said.message_case() ? row : serialised(*older);
   }
+
+  [[nodiscard]] static Status not_allowed() { return {StatusCode::PERMISSION_DENIED, "your role does not hold a tool any more"}; }
 
   // Reads the next request, or waits for decided() to do so. False when gRPC has let go of the stream.
   bool read_on() {
@@ -217,6 +231,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
   RoomHost& host_;                        // of room_
   LinkServer* const links_;
+  Gate* const gate_;  // null: plain text
+  const Caller caller_;
   std::shared_ptr<SessionLink> link_;  // with the link server; set before the host tells of rows
   ByteBuffer request_;
   AuthorId author_;           // set before the host knows the stream, as the next
@@ -235,7 +251,10 @@ class CuttingServiceImpl final : public v1::CuttingService::WithRawCallbackMetho
   BidiReactor* Session(grpc::CallbackServerContext* context) override {
     Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context);
     if (!room) return refused<BidiReactor>(status_of(room.error()));
-    SessionStream* stream = SessionStream::launch(std::make_shared<SessionStream>(std::move(*room), links_));
+    Result<Caller> caller = caller_of(rooms_, *context);
+    if (!caller) return refused<BidiReactor>(status_of(caller.error()));
+    SessionStream* stream =
+        SessionStream::launch(std::make_shared<SessionStream>(std::move(*room), links_, rooms_.gate, std::move(*caller)));
     stream->start();
     return stream;
   }

@@ -94,7 +94,7 @@ class WatchServiceImpl final : public WatchBase {
   WriteReactor* WatchMesh(grpc::CallbackServerContext* context, const ByteBuffer* bytes) override {
     const auto request = parse<v1::WatchMeshRequest>(*bytes);
     if (!request) return refused(invalid("the WatchMeshRequest could not be parsed"));
-    const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context);
+    const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context, AuthorId{request->author()});
     if (!room) return refused(status_of(room.error()));
     if (!(*room)->host().knows(AuthorId{request->author()})) return refused(not_joined("WatchMeshRequest", request->author()));
     std::optional<Look> look;
@@ -103,7 +103,10 @@ class WatchServiceImpl final : public WatchBase {
       if (!stated) return refused(invalid(stated.error().message));
       look = *stated;
     }
+    const Result<Caller> caller = caller_of(rooms_, *context);
+    if (!caller) return refused(status_of(caller.error()));
     MeshStream* stream = MeshStream::launch(std::make_shared<MeshStream>(*room, AuthorId{request->author()}));
+    stream->stand_under(rooms_.gate, *caller, (*room)->name, AuthorId{request->author()}, "/osteon.v1.WatchService/WatchMesh");
     (*room)->host().watch_mesh(*stream, look);
     return stream;
   }
@@ -112,7 +115,7 @@ class WatchServiceImpl final : public WatchBase {
                                      v1::LookFromResponse*) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     const Result<Look> look = wire::from_wire(request->look());
-    const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context);
+    const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context, AuthorId{request->author()});
     if (!room) {
       reactor->Finish(status_of(room.error()));
     } else if (!(*room)->host().knows(AuthorId{request->author()})) {
@@ -129,11 +132,14 @@ class WatchServiceImpl final : public WatchBase {
   WriteReactor* WatchCutting(grpc::CallbackServerContext* context, const ByteBuffer* bytes) override {
     const auto request = parse<v1::WatchCuttingRequest>(*bytes);
     if (!request) return refused(invalid("the WatchCuttingRequest could not be parsed"));
-    const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context);
+    const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context, AuthorId{request->author()});
     if (!room) return refused(status_of(room.error()));
     if (!(*room)->host().knows(AuthorId{request->author()})) return refused(not_joined("WatchCuttingRequest", request->author()));
     const std::chrono::nanoseconds apart{request->most_hz() == 0 ? 0 : 1'000'000'000 / request->most_hz()};
+    const Result<Caller> caller = caller_of(rooms_, *context);
+    if (!caller) return refused(status_of(caller.error()));
     CuttingStream* stream = CuttingStream::launch(std::make_shared<CuttingStream>(*room, apart));
+    stream->stand_under(rooms_.gate, *caller, (*room)->name, AuthorId{request->author()}, "/osteon.v1.WatchService/WatchCutting");
     (*room)->host().watch_cutting(*stream);
     return stream;
   }

@@ -15,6 +15,7 @@
 #include "common/wire/server_link.hpp"
 #include "tests/fuzz/datagram_target.hpp"
 #include "tests/fuzz/journal_target.hpp"
+#include "tests/fuzz/ticket_target.hpp"
 
 namespace osteon::fuzz {
 namespace {
@@ -195,6 +196,9 @@ std::vector<Target> targets() {
           named("up_packet", datagram_target(as_up_packet, {an_up_packet()})),
           named("down_packet", datagram_target(as_down_packet, {a_down_packet()})),
           {"mesh_block", decode_any_block, {a_block().bytes, a_seamed_block().bytes}},
+          ticket_target(),
+          ticket_contents_target(),
+          access_list_target(),
           rows_target(),
           evaluated_rows_target(),
           genesis_target(),

@@ -251,7 +251,7 @@ TEST(Trouble, AHandWithoutRealTimePriorityIsToldSo) {
   std::vector<std::string> line{"--rtprio=0"};
   if (::geteuid() == 0) line.insert(line.end(), {"setpriv", "--bounding-set", "-sys_nice"});
   line.insert(line.end(), {program("osteon-haptic"), "--server", stage.address(), "--plan", stage / "plan.json", "--cache",
-                           stage / "cache", "--summary", stage / "summary.json"});
+                           stage / "cache", "--summary", stage / "summary.json", "--plain"});
   Process haptic("/usr/bin/prlimit", line);
   ASSERT_EQ(haptic.wait(60s), 0) << haptic.err();
   EXPECT_EQ(read_json(stage / "summary.json")["loop"]["realtime"], false);

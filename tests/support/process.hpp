@@ -16,7 +16,12 @@ struct ProcessOptions {
   std::vector<std::pair<std::string, std::string>> environment;  // set on top of the test's own
   std::vector<std::string> without;                              // variables that the child must not see
   std::filesystem::path folder;                                  // working folder; empty: the test's own
+  bool as_given = false;                                         // without the --plain of with_plain()
 };
+
+// The arguments with --plain behind them, where a program of Osteon serves rooms or goes to a server and is not told by which
+// way.
+[[nodiscard]] std::vector<std::string> with_plain(const std::filesystem::path& program, std::vector<std::string> arguments);
 
 class Process {
  public:

@@ -51,6 +51,7 @@ constexpr const char* kScriptHelp =
     "SpaceMouse (--spacemouse): the bone follows the cap; first button overview, second tool.";
 
 struct Arguments {
+  wire::DoorArguments door;
   std::string server, room, size = "1280x720", script, screenshot, frame_log, summary;
   double patience_s = 5.0;
   bool space_mouse = false;
@@ -75,6 +76,8 @@ Result<void> run(const Arguments& arguments) {
   StopSignal stop;
 
   // What can be wrong with the arguments is told before anything is started.
+  const Result<wire::Door> door = wire::door_of(arguments.door);
+  if (!door) return tl::unexpected(door.error());
   auto window_size = window_options(arguments.size);
   if (!window_size) return tl::unexpected(window_size.error());
   std::optional<ScriptReader> script;
@@ -94,6 +97,7 @@ Result<void> run(const Arguments& arguments) {
   RoomWatchOptions watch_options;
   watch_options.address = arguments.server;
   watch_options.room = arguments.room;
+  watch_options.door = *door;
   watch_options.patience = std::chrono::milliseconds(static_cast<long>(1000.0 * arguments.patience_s));
   watch_options.keep_trying = !scripted;
   const auto seen_from = [size = *window_size](const CameraView& view) { return look_of(view, size.width_px, size.height_px); };
@@ -169,6 +173,7 @@ int main(int argc, char** argv) {
   app.footer(kScriptHelp);
   app.add_option("--server", arguments.server, "Address of the server, HOST:PORT")->required();
   app.add_option("--room", arguments.room, "Name of the room; not needed where the server has one");
+  wire::add_door_options(app, arguments.door);
   app.add_option("--size", arguments.size, "Size of the window in pixels")->capture_default_str();
   app.add_option("--script", arguments.script, "File of commands, - for standard input; its end closes the viewer");
   app.add_option("--screenshot", arguments.screenshot,

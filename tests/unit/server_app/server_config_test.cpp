@@ -45,6 +45,9 @@ journal: room.journal
 rooms: rooms
 retention_days: 365
 detail: near
+certificates: certs
+plain: true
+most_connections: 40
 metrics: 9464
 drain_seconds: 7
 limits:
@@ -70,6 +73,9 @@ limits:
   EXPECT_EQ(c.rooms_folder, dir_ / "rooms");
   EXPECT_EQ(c.retention_days, 365);
   EXPECT_EQ(c.detail, Detail::near);
+  EXPECT_EQ(c.certificates, dir_ / "certs");
+  EXPECT_TRUE(c.plain);
+  EXPECT_EQ(c.most_connections, 40);
   EXPECT_EQ(c.metrics, "9464");
   EXPECT_EQ(c.drain_seconds, 7);
   EXPECT_EQ(c.limits.path_knots, 32);
@@ -87,6 +93,7 @@ const std::multimap<std::string, std::pair<std::string, std::string>> kWrong{
     {"address_file", {"[a, b]", "write a path"}},
     {"cases", {"{}", "list of paths"}},
     {"cases", {"[]", "list of paths"}},
+    {"certificates", {"[x]", "write a path"}},
     {"detail", {"fine", "auto, full or near"}},
     {"drain_seconds", {"-1", "from 0 to 600"}},
     {"drain_seconds", {"1.5", "whole number"}},
@@ -104,6 +111,8 @@ const std::multimap<std::string, std::pair<std::string, std::string>> kWrong{
     {"listen", {"127.0.0.1:70000", "HOST:PORT"}},
     {"metrics", {"0.0.0.0:9464", "this machine alone"}},
     {"metrics", {"port", "write a port"}},
+    {"most_connections", {"0", "from 1 to 65535"}},
+    {"plain", {"yes please", "true or false"}},
     {"resume", {"''", "write a path"}},
     {"retention_days", {"0", "from 1 to 36500"}},
     {"rooms", {"[x]", "write a path"}},
@@ -165,6 +174,12 @@ TEST_F(ServerConfigTest, WhatDoesNotFitTogetherIsSaid) {
   ServerConfig config;
   EXPECT_NE(check_server_config(config).error().message.find("--case"), std::string::npos);
   config.case_folders = {"a"};
+  EXPECT_NE(check_server_config(config).error().message.find("--certificates"), std::string::npos) << "nobody says how clients come in";
+  config.certificates = "c";
+  EXPECT_TRUE(check_server_config(config).has_value());
+  config.plain = true;
+  EXPECT_NE(check_server_config(config).error().message.find("--plain excludes"), std::string::npos);
+  config.certificates.clear();
   EXPECT_TRUE(check_server_config(config).has_value());
   ServerConfig two = config;
   two.case_folders = {"a", "b"};
@@ -201,6 +216,7 @@ TEST_F(ServerConfigTest, WhatIsNotThereIsSaid) {
       {"--save", [&](ServerConfig& c) { c.save_file = dir_ / "nowhere" / "s"; }},
       {"--summary", [&](ServerConfig& c) { c.summary_file = dir_ / "nowhere" / "s"; }},
       {"--address-file", [&](ServerConfig& c) { c.address_file = dir_ / "nowhere" / "a"; }},
+      {"--certificates", [&](ServerConfig& c) { c.certificates = dir_ / "nowhere"; }},
       {"--rooms", [&](ServerConfig& c) { c.rooms_folder = dir_ / "nowhere" / "r"; }}};
   for (const auto& [option, change] : missing) {
     ServerConfig config = sound;

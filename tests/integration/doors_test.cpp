@@ -1,0 +1,125 @@
+// A server with certificates and tickets, a surgeon at work in it, and all who may not come in, or not any more. What they try
+// must not be felt by the surgeon.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "tests/integration/stage.hpp"
+#include "tests/support/doors/people.hpp"
+#include "tests/support/wait.hpp"
+
+namespace osteon::test {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+std::vector<std::string> plus(std::vector<std::string> arguments, const std::vector<std::string>& more) {
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+class DoorsOfPrograms : public ::testing::Test {
+ protected:
+  // A ticket as whoever runs the server makes it.
+  std::filesystem::path ticket(const std::string& user, const std::string& role, const std::string& room = "room") {
+    const RunResult made = run(program("osteon-server"), {"ticket", "--key", people_.ticket_key(), "--room", room, "--user", user, "--role", role, "--hours", "1"});
+    EXPECT_EQ(made.exit_code, 0) << made.err;
+    EXPECT_THAT(made.err, HasSubstr("ticket ")) << "its id, by which it is revoked";
+    return people_.ticket_file(made.out.substr(0, made.out.find('\n')));
+  }
+  std::vector<std::string> door(const std::string& user, const std::filesystem::path& with) {
+    return {"--certificates", people_.person(user), "--ticket", with};
+  }
+  // An audio client that is turned away: one sentence that says why, and an exit code.
+  std::string turned_away(const std::vector<std::string>& by, ProcessOptions options = {}) {
+    const RunResult result = run(program("osteon-audio"), plus({"--server", stage_.address(), "--output", "none", "--patience", "1"}, by), 30s, std::move(options));
+    EXPECT_NE(result.exit_code, 0) << result.out << result.err;
+    EXPECT_FALSE(result.timed_out);
+    const std::size_t last = result.err.rfind("osteon-audio: ");
+    return last == std::string::npos ? result.err : result.err.substr(last);
+  }
+  Process haptic(const std::string& name, const std::string& user, const std::string& role, const nlohmann::json& plan) {
+    const auto file = stage_ / (name + "-plan.json");
+    std::ofstream(file) << plan.dump();
+    return stage_.start("osteon-haptic", plus({"--server", stage_.address(), "--plan", file, "--summary", stage_ / (name + ".json"), "--cache", stage_ / "cache"},
+                                              door(user, ticket(user, role))));
+  }
+  // Connects and says what is neither TLS nor HTTP.
+  void say_nonsense() {
+    const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    sockaddr_in at{};
+    at.sin_family = AF_INET;
+    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    at.sin_port = htons(static_cast<std::uint16_t>(std::stoi(stage_.address().substr(stage_.address().rfind(':') + 1))));
+    ASSERT_EQ(::connect(socket, reinterpret_cast<const sockaddr*>(&at), sizeof at), 0);
+    std::string noise(64 * 1024, '\0');
+    unsigned state = 1;
+    for (char& byte : noise) byte = static_cast<char>((state = state * 1664525u + 1013904223u) >> 24);
+    (void)::send(socket, noise.data(), noise.size(), MSG_NOSIGNAL);
+    ::close(socket);
+  }
+
+  People people_;
+  Stage stage_{30.0, {"--certificates", people_.server()}};
+};
+
+TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
+  Process sue = haptic("sue", "sue", "trainee", {{"steps", {drill_at(0, 0, "rig")}}});
+  Process dora = haptic("dora", "dora", "collaborator", {{"steps", {drill_at(9, 9, "rig")}}});
+  Process ben = stage_.start("osteon-audio", plus({"--server", stage_.address(), "--output", "none"}, door("ben", ticket("ben", "observer"))));
+
+  // With nothing, with plain text, with what another authority has made.
+  EXPECT_THAT(turned_away({}, {.environment = {}, .without = {}, .folder = {}, .as_given = true}), HasSubstr("--certificates DIR with --ticket FILE"));
+  EXPECT_THAT(turned_away({"--plain"}), HasSubstr("no Osteon server answers"));
+  People strangers;
+  EXPECT_THAT(turned_away({"--certificates", strangers.person("sue"), "--ticket", ticket("sue", "trainee")}), HasSubstr("no Osteon server answers"));
+  say_nonsense();
+
+  // With a certificate, and a ticket that does not fit.
+  EXPECT_THAT(turned_away(door("eve", people_.ticket("eve", "room", Role::observer, -5s))), HasSubstr("the ticket expired"));
+  EXPECT_THAT(turned_away(door("eve", ticket("sue", "trainee"))), HasSubstr("the ticket is for sue and the certificate for eve"));
+  EXPECT_THAT(turned_away(plus(door("eve", ticket("eve", "observer", "theatre")), {"--room", "room"})), HasSubstr("the ticket is for room theatre"));
+  EXPECT_THAT(turned_away(door("eve", people_.ticket_file("osteon1.AAAA.AAAA"))), HasSubstr("malformed"));
+  EXPECT_THAT(turned_away(door("eve", strangers.ticket("eve", "room", Role::instructor))), HasSubstr("signature"));
+  const RunResult closing = run(program("osteon-server"), plus({"rooms", "close", "room", "--server", stage_.address()}, door("eve", ticket("eve", "instructor"))));
+  EXPECT_NE(closing.exit_code, 0);
+  EXPECT_THAT(closing.err, HasSubstr("an instructor may not call RoomsService/CloseRoom"));
+
+  // In the middle of it: one is revoked, another's role is taken away.
+  EXPECT_TRUE(ben.running()) << ben.err();
+  EXPECT_TRUE(dora.running()) << dora.err();
+  people_.certs({"revoke", "ben"});
+  const auto ben_ended = ben.wait(20s);
+  ASSERT_TRUE(ben_ended.has_value());
+  EXPECT_NE(*ben_ended, 0);
+  EXPECT_THAT(ben.err(), HasSubstr("was revoked"));
+  people_.append_access("role dora observer");
+  const auto dora_ended = dora.wait(20s);
+  ASSERT_TRUE(dora_ended.has_value());
+  EXPECT_NE(*dora_ended, 0);
+  EXPECT_THAT(dora.err(), HasSubstr("an observer may not call CuttingService/Session"));
+
+  // She has noticed nothing.
+  ASSERT_EQ(sue.wait(120s), 0) << sue.err();
+  const nlohmann::json summary = read_json(stage_ / "sue.json");
+  EXPECT_EQ(summary["steps"][0]["completed"], true);
+  EXPECT_EQ(summary["interruptions"], 0);
+  EXPECT_EQ(summary["rejected"], 0);
+  EXPECT_EQ(summary["lost"], nullptr);
+  EXPECT_EQ(summary["fast_path"]["alive"], true);
+  ASSERT_EQ(stage_.server().terminate(30s), 0) << stage_.server().err();
+  // Each of those who were refused is in the server's log, once.
+  const std::string log = stage_.server().err();
+  EXPECT_THAT(log, HasSubstr("who=eve reason=person"));
+  EXPECT_THAT(log, HasSubstr("who=ben reason=revoked"));
+}
+
+}  // namespace
+}  // namespace osteon::test

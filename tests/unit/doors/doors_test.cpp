@@ -1,0 +1,413 @@
+// The doors of a server in this process, on TLS and the loopback device: every call by every role, and those who come with the
+// wrong thing in their hands.
+#include <gmock/gmock.h>
+#include <google/protobuf/dynamic_message.h>
+#include <grpcpp/generic/generic_stub.h>
+#include <grpcpp/grpcpp.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <functional>
+#include <future>
+#include <iterator>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+
+#include "common/wire/room_client.hpp"
+#include "osteon/v1/rooms.grpc.pb.h"
+#include "server/net/room_server.hpp"
+#include "server/net/rooms_client.hpp"
+#include "tests/architecture/proto_rules.hpp"
+#include "tests/support/doors/people.hpp"
+#include "tests/support/wait.hpp"
+#include "tests/unit/room/cuts.hpp"
+#include "tests/unit/room/members.hpp"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+using grpc::ByteBuffer;
+using grpc::StatusCode;
+using testing::HasSubstr;
+
+std::string content(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+class Doors : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const Case bone = test::test_block();
+    ASSERT_TRUE(bone.save(dir_ / "case"));
+    auto rooms = std::make_unique<Rooms>(RoomsOptions{.cases = {{bone, dir_ / "case"}}, .folder = dir_ / "rooms"});
+    std::filesystem::create_directories(dir_ / "rooms");
+    for (const char* name : {"ward", "theatre"}) ASSERT_TRUE(rooms->create(name, nullptr));
+    auto started = RoomServer::start(std::move(rooms), "127.0.0.1:0", {.certificates = people_.server(), .most_connections = kMostConnections});
+    ASSERT_TRUE(started.has_value()) << started.error().message;
+    server_ = std::move(*started);
+  }
+  static constexpr std::size_t kMostConnections = 24;
+  const std::string& address() { return server_->address(); }
+  Result<wire::JoinedRoom> join(const wire::Door& door, wire::ClientKind kind = wire::ClientKind::viewer, const std::string& room = "ward") {
+    return wire::join_room(address(), kind, "whatever", 5s, {}, room, door);
+  }
+  std::string refusal(const wire::Door& door, const std::string& room = "ward") {
+    const auto joined = wire::join_room(address(), wire::ClientKind::viewer, "whatever", 500ms, {}, room, door);
+    return joined ? std::string() : joined.error().message;
+  }
+  // A channel with this door, as no client of ours would use it.
+  std::shared_ptr<grpc::Channel> channel(const wire::Door& door) {
+    return grpc::CreateChannel(address(), wire::credentials_of(door, address()).value());
+  }
+
+  test::TempDir dir_;
+  test::People people_;
+  std::unique_ptr<RoomServer> server_;
+};
+
+// Somebody who connects and says nothing.
+class RawConnection {
+ public:
+  explicit RawConnection(const std::string& address) : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_in at{};
+    at.sin_family = AF_INET;
+    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    at.sin_port = htons(static_cast<std::uint16_t>(std::stoi(address.substr(address.rfind(':') + 1))));
+    (void)::connect(socket_, reinterpret_cast<const sockaddr*>(&at), sizeof at);
+  }
+  ~RawConnection() { ::close(socket_); }
+  RawConnection(const RawConnection&) = delete;
+  RawConnection& operator=(const RawConnection&) = delete;
+
+ private:
+  const int socket_;
+};
+
+struct Called {
+  grpc::Status status;
+  bool answered = false;  // a message came
+};
+
+// Any call: one request, then what comes first, a message or the end.
+Called call(const std::shared_ptr<grpc::Channel>& channel, const std::string& method, const ByteBuffer& request,
+            const std::map<std::string, std::string>& metadata) {
+  grpc::GenericStub stub(channel);
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + 20s);
+  for (const auto& [key, value] : metadata) context.AddMetadata(key, value);
+  grpc::CompletionQueue queue;
+  const auto stream = stub.PrepareCall(&context, method, &queue);
+  const auto done = [&] {
+    void* tag = nullptr;
+    bool ok = false;
+    return queue.Next(&tag, &ok) && ok;
+  };
+  Called called;
+  stream->StartCall(nullptr);
+  bool ok = done();
+  if (ok) stream->Write(request, nullptr), ok = done();
+  if (ok) stream->WritesDone(nullptr), ok = done();
+  ByteBuffer response;
+  stream->Read(&response, nullptr);
+  called.answered = done();
+  if (called.answered) context.TryCancel();
+  stream->Finish(&called.status, nullptr);
+  (void)done();
+  return called;
+}
+
+struct Method {
+  std::string name;
+  const google::protobuf::Descriptor* request;
+};
+
+const test::Protocol& protocol() {
+  static const test::Protocol all = test::load_protocol(content(OSTEON_DESCRIPTOR));
+  return all;
+}
+
+std::vector<Method> methods() {
+  std::vector<Method> all;
+  for (const auto* file : protocol().files)
+    for (int s = 0; s < file->service_count(); ++s)
+      for (int m = 0; m < file->service(s)->method_count(); ++m)
+        all.push_back({"/" + file->service(s)->full_name() + "/" + file->service(s)->method(m)->name(), file->service(s)->method(m)->input_type()});
+  return all;
+}
+
+// A request of that kind, with nothing in it but its author.
+ByteBuffer request_of(const Method& method, std::uint64_t author) {
+  google::protobuf::DynamicMessageFactory factory;
+  const std::unique_ptr<google::protobuf::Message> message(factory.GetPrototype(method.request)->New());
+  if (const auto* field = method.request->FindFieldByName("author")) message->GetReflection()->SetUInt64(message.get(), field, author);
+  const std::string bytes = message->SerializeAsString();
+  const grpc::Slice slice(bytes);
+  return {&slice, 1};
+}
+
+bool has_author(const Method& method) { return method.request->FindFieldByName("author") != nullptr; }
+
+TEST_F(Doors, LetEveryRoleMakeTheCallsThatAreForIt) {
+  // By the rules as people are told them: what a role may do beyond looking.
+  const std::set<std::string> hands{"Session", "AddTool", "Undo", "Redo", "Mark", "SetSceneItem", "RemoveSceneItem", "Say"},
+      instructors{"RemoveBody", "SaveFields", "Supervise", "Annotate", "Demonstrate", "EndDemonstration"},
+      both{"ListRooms", "VerifyRoom", "BranchRoom", "ReplayRoom", "ListCases"},
+      operators{"CreateRoom", "CloseRoom", "ResumeRoom", "DeleteRoom", "BackUpRoom", "UploadCase"};
+  const auto may = [&](Role role, const std::string& name) {
+    if (operators.contains(name)) return role == Role::operator_;
+    if (both.contains(name)) return role == Role::operator_ || role == Role::instructor;
+    if (role == Role::operator_) return false;
+    if (instructors.contains(name)) return role == Role::instructor;
+    return !hands.contains(name) || role != Role::observer;
+  };
+  int calls = 0;
+  for (const Role role : {Role::observer, Role::trainee, Role::collaborator, Role::instructor, Role::operator_}) {
+    const std::string user = "user-" + std::string(to_string(role));
+    const wire::Door door = people_.door(user, role, "ward");
+    const auto line = channel(door);
+    const std::map<std::string, std::string> metadata{{"osteon-room-bin", "ward"}, {"osteon-ticket", wire::ticket_text(door)}};
+    for (const Method& method : methods()) {
+      const std::string name = method.name.substr(method.name.rfind('/') + 1);
+      const Called called = call(line, method.name, request_of(method, 0), metadata);
+      ++calls;
+      const bool refused_by_role = called.status.error_code() == StatusCode::PERMISSION_DENIED &&
+                                   called.status.error_message().find("may not call " + method.name.substr(method.name.rfind('.') + 1)) != std::string::npos;
+      EXPECT_EQ(!refused_by_role, may(role, name)) << to_string(role) << " " << method.name << ": " << called.status.error_code() << " "
+                                                   << called.status.error_message();
+      EXPECT_NE(called.status.error_code(), StatusCode::UNAUTHENTICATED) << method.name;
+      EXPECT_NE(called.status.error_code(), StatusCode::UNAVAILABLE) << method.name << called.status.error_message();
+    }
+  }
+  EXPECT_EQ(calls, 5 * static_cast<int>(methods().size()));
+  EXPECT_GT(methods().size(), 30u);
+}
+
+TEST_F(Doors, LetNobodyCallAsSomebodyElse) {
+  const auto ben = join(people_.door("ben", Role::instructor, "ward"));
+  ASSERT_TRUE(ben.has_value()) << ben.error().message;
+  const wire::Door door = people_.door("anna", Role::instructor, "ward");
+  const std::map<std::string, std::string> metadata{{"osteon-room-bin", "ward"}, {"osteon-ticket", wire::ticket_text(door)}};
+  const auto line = channel(door);
+  int tried = 0;
+  for (const Method& method : methods()) {
+    if (!has_author(method)) continue;
+    ++tried;
+    const Called called = call(line, method.name, request_of(method, ben->author.value), metadata);
+    EXPECT_FALSE(called.answered) << method.name;
+    // What is wrong with an empty request may be said first.
+    EXPECT_THAT(called.status.error_code(), testing::AnyOf(StatusCode::PERMISSION_DENIED, StatusCode::INVALID_ARGUMENT))
+        << method.name << " " << called.status.error_message();
+    if (called.status.error_code() == StatusCode::PERMISSION_DENIED) {
+      EXPECT_THAT(called.status.error_message(), HasSubstr("not yours")) << method.name;
+    }
+  }
+  EXPECT_GT(tried, 15);
+}
+
+TEST_F(Doors, NeedACertificateOfTheirOwnAuthority) {
+  const wire::Door anna = people_.door("anna", Role::trainee, "ward");
+  EXPECT_EQ(refusal(anna), "");
+  EXPECT_THAT(refusal({}), HasSubstr("no Osteon server answers")) << "plain text";
+  test::People strangers;
+  EXPECT_NE(refusal({.certificates = strangers.person("anna"), .ticket = anna.ticket}), "") << "of another authority";
+  // The server's authority, and a certificate that another has signed.
+  std::filesystem::copy_file(people_.person("anna") / "ca.pem", strangers.person("anna") / "ca.pem", std::filesystem::copy_options::overwrite_existing);
+  EXPECT_NE(refusal({.certificates = strangers.person("anna"), .ticket = anna.ticket}), "") << "signed by another authority";
+  // None at all.
+  const auto bare = grpc::CreateChannel(address(), grpc::SslCredentials({.pem_root_certs = content(people_.server() / "ca.pem"), .pem_private_key = "", .pem_cert_chain = ""}));
+  EXPECT_EQ(call(bare, "/osteon.v1.RoomsService/ListRooms", {}, {}).status.error_code(), StatusCode::UNAVAILABLE);
+  // Nor does a client take another authority's server for the right one.
+  std::filesystem::copy_file(strangers.server() / "ca.pem", people_.person("ben") / "ca.pem", std::filesystem::copy_options::overwrite_existing);
+  EXPECT_NE(refusal({.certificates = people_.person("ben"), .ticket = people_.ticket("ben", "ward", Role::trainee)}), "");
+  EXPECT_EQ(refusal(anna), "");
+}
+
+TEST_F(Doors, SayInOneSentenceWhatIsWrongWithATicket) {
+  const std::filesystem::path anna = people_.person("anna");
+  const auto with = [&](const std::filesystem::path& ticket) { return refusal({.certificates = anna, .ticket = ticket}); };
+  EXPECT_THAT(with(people_.ticket("anna", "ward", Role::trainee, -5s)), HasSubstr("the ticket expired"));
+  EXPECT_THAT(with(people_.ticket("ben", "ward", Role::trainee)), HasSubstr("the ticket is for ben and the certificate for anna"));
+  EXPECT_THAT(with(people_.ticket("anna", "theatre", Role::trainee)), HasSubstr("the ticket is for room theatre"));
+  EXPECT_THAT(with(people_.ticket_file("osteon1.aaaa.bbbb")), HasSubstr("malformed"));
+  EXPECT_THAT(with(people_.ticket_file(sign_ticket(
+                  make_ticket("ward", "anna", Role::trainee, std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now()) + 1h).value(), new_ticket_key()))),
+              HasSubstr("signature"));
+  EXPECT_THAT(with(people_.folder() / "none"), HasSubstr("no ticket came"));
+  // An observer comes to look, not to cut.
+  const auto hand = join(people_.door("eve", Role::observer, "ward"), wire::ClientKind::haptic);
+  ASSERT_FALSE(hand);
+  EXPECT_EQ(hand.error().code, ErrorCode::denied);
+  EXPECT_THAT(hand.error().message, HasSubstr("holds no tool"));
+  EXPECT_TRUE(join(people_.door("eve", Role::observer, "ward")));
+}
+
+TEST_F(Doors, TakeATicketOnceOnly) {
+  // Twice with one call: two readers might take different ones.
+  const wire::Door anna = people_.door("anna", Role::trainee, "ward");
+  grpc::ClientContext context;
+  context.AddMetadata("osteon-ticket", wire::ticket_text(anna));
+  context.AddMetadata("osteon-room-bin", "ward");
+  context.AddMetadata("osteon-room-bin", "theatre");
+  v1::GetStatusResponse response;
+  const grpc::Status status = v1::RoomService::NewStub(channel(anna))->GetStatus(&context, {}, &response);
+  EXPECT_EQ(status.error_code(), StatusCode::INVALID_ARGUMENT) << status.error_message();
+}
+
+TEST_F(Doors, KeepRoomsApart) {
+  // Without a room's name a call is to the ticket's.
+  const auto in_theatre = join(people_.door("anna", Role::trainee, "theatre"), wire::ClientKind::viewer, "");
+  ASSERT_TRUE(in_theatre.has_value()) << in_theatre.error().message;
+  EXPECT_EQ(in_theatre->name, "theatre");
+  // An instructor of one room sees, checks and branches that one.
+  auto rooms = RoomsClient::reach(address(), 5s, {}, people_.door("ina", Role::instructor, "ward"));
+  ASSERT_TRUE(rooms.has_value());
+  const auto list = rooms->list();
+  ASSERT_TRUE(list.has_value()) << list.error().message;
+  ASSERT_EQ(list->size(), 1u);
+  EXPECT_EQ(list->front().name, "ward");
+  EXPECT_TRUE(rooms->verify("ward"));
+  const auto other = rooms->verify("theatre");
+  ASSERT_FALSE(other);
+  EXPECT_EQ(other.error().code, ErrorCode::denied) << other.error().message;
+  EXPECT_FALSE(rooms->branch("theatre", "copy", RoomSeq{0}));
+  EXPECT_FALSE(rooms->create("third", ""));
+  auto all = RoomsClient::reach(address(), 5s, {}, people_.door("otto", Role::operator_, "*"));
+  EXPECT_EQ(all->list()->size(), 2u);
+  EXPECT_TRUE(all->create("third", ""));
+  EXPECT_TRUE(all->remove("third", false));
+}
+
+// A surgeon of the ward at work, and somebody beside who is in trouble.
+class DoorsAtWork : public Doors {
+ protected:
+  void SetUp() override {
+    Doors::SetUp();
+    surgeon_ = std::make_unique<test::Surgeon>(address(), dir_ / "cache", "", "ward", people_.door("sue", Role::trainee, "ward"));
+    ASSERT_TRUE(test::wait_until([&] { return surgeon_->complete(); }, test::kPatience));
+  }
+  // Cuts on, and expects it to arrive; her session is the one that she began with.
+  void expect_undisturbed() {
+    const std::uint64_t before = surgeon_->own();
+    Cut cut = test::strokes(surgeon_->author(), static_cast<int>(before) + 1, 7).back();
+    cut.lease_epoch = surgeon_->lease();
+    ASSERT_TRUE(surgeon_->session().send(cut));
+    EXPECT_TRUE(test::wait_until([&] { return surgeon_->own() == before + 1; }, test::kPatience));
+    EXPECT_EQ(surgeon_->interruptions(), 0);
+    EXPECT_EQ(surgeon_->lost(), "");
+  }
+  // Watches the ward's surface until the stream ends.
+  struct Watcher {
+    explicit Watcher(wire::JoinedRoom joined) : room(std::move(joined)) {
+      v1::WatchMeshRequest request;
+      request.set_author(room.author.value);
+      stream = v1::WatchService::NewStub(room.channel)->WatchMesh(&context, request);
+      EXPECT_TRUE(stream->Read(&message));
+      end = std::async(std::launch::async, [this] {
+        while (stream->Read(&message)) {}
+        return stream->Finish();
+      });
+    }
+    ~Watcher() { context.TryCancel(); }
+    bool over(std::chrono::milliseconds patience) { return end.wait_for(patience) == std::future_status::ready; }
+    wire::JoinedRoom room;
+    grpc::ClientContext context;
+    std::unique_ptr<grpc::ClientReader<v1::WatchMeshResponse>> stream;
+    v1::WatchMeshResponse message;
+    std::future<grpc::Status> end;
+  };
+
+  std::unique_ptr<test::Surgeon> surgeon_;
+};
+
+TEST_F(DoorsAtWork, EndTheStreamsOfSomebodyWhoIsRevoked) {
+  auto ben = join(people_.door("ben", Role::observer, "ward"));
+  ASSERT_TRUE(ben.has_value()) << ben.error().message;
+  Watcher watcher(*ben);
+  EXPECT_FALSE(watcher.over(600ms));
+  people_.certs({"revoke", "ben"});
+  ASSERT_TRUE(watcher.over(10s));
+  const grpc::Status end = watcher.end.get();
+  EXPECT_EQ(end.error_code(), StatusCode::UNAUTHENTICATED);
+  EXPECT_THAT(end.error_message(), HasSubstr("revoked"));
+  EXPECT_THAT(refusal(people_.door("ben", Role::observer, "ward")), HasSubstr("revoked"));
+  expect_undisturbed();
+}
+
+TEST_F(DoorsAtWork, EndTheSessionOfSomebodyWhoseRoleIsTakenAway) {
+  test::Surgeon ben(address(), dir_ / "cache", "", "ward", people_.door("ben", Role::collaborator, "ward"));
+  ASSERT_TRUE(test::wait_until([&] { return ben.complete(); }, test::kPatience));
+  people_.append_access("role ben observer ward");
+  ASSERT_TRUE(test::wait_until([&] { return !ben.lost().empty(); }, 10s));
+  EXPECT_THAT(ben.lost(), HasSubstr("an observer may not call CuttingService/Session"));
+  EXPECT_EQ(ben.interruptions(), 0) << "it does not come again by itself";
+  EXPECT_TRUE(join(people_.door("ben", Role::collaborator, "ward"))) << "but may watch";
+  expect_undisturbed();
+}
+
+TEST_F(DoorsAtWork, EndTheStreamsOfATicketThatExpires) {
+  auto ben = join({.certificates = people_.person("ben"), .ticket = people_.ticket("ben", "ward", Role::observer, 3s)});
+  ASSERT_TRUE(ben.has_value()) << ben.error().message;
+  Watcher watcher(*ben);
+  ASSERT_TRUE(watcher.over(15s));
+  EXPECT_THAT(watcher.end.get().error_message(), HasSubstr("expired"));
+  expect_undisturbed();
+}
+
+TEST_F(DoorsAtWork, GiveTheNewerSessionOfAPersonThePlace) {
+  const wire::Door door = people_.door("ben", Role::observer, "ward");
+  const auto first = join(door);
+  Watcher older(*first);
+  const auto second = join(door);
+  ASSERT_TRUE(second.has_value());
+  Watcher newer(*second);
+  ASSERT_TRUE(older.over(10s));
+  EXPECT_THAT(older.end.get().error_message(), HasSubstr("newer session of ben"));
+  EXPECT_FALSE(newer.over(600ms));
+  EXPECT_EQ(wire::join_again(*first, wire::ClientKind::viewer, {}).error().code, ErrorCode::denied);
+  EXPECT_TRUE(wire::join_again(*second, wire::ClientKind::viewer, {}));
+  expect_undisturbed();
+}
+
+TEST_F(DoorsAtWork, StandWhatIsTooLargeOrNoMessage) {
+  const wire::Door door = people_.door("ben", Role::trainee, "ward");
+  const auto line = channel(door);
+  const std::map<std::string, std::string> metadata{{"osteon-room-bin", "ward"}, {"osteon-ticket", wire::ticket_text(door)}};
+  const std::string large(5 * 1024 * 1024, 'x'), nonsense = "\xff\xff\xff\xff\xff\x01\x02";
+  for (const char* method : {"/osteon.v1.RoomService/Join", "/osteon.v1.RoomService/AddTool", "/osteon.v1.WatchService/WatchMesh", "/osteon.v1.CuttingService/Session"}) {
+    const grpc::Slice too_large(large), no_message(nonsense);
+    EXPECT_EQ(call(line, method, ByteBuffer(&too_large, 1), metadata).status.error_code(), StatusCode::RESOURCE_EXHAUSTED) << method;
+    const Called malformed = call(line, method, ByteBuffer(&no_message, 1), metadata);
+    EXPECT_FALSE(malformed.answered) << method;
+    // gRPC itself says of a single request that it cannot read that there was none.
+    EXPECT_THAT(malformed.status.error_code(), testing::AnyOf(StatusCode::INVALID_ARGUMENT, StatusCode::UNIMPLEMENTED))
+        << method << malformed.status.error_message();
+  }
+  // More metadata than any call needs.
+  auto more = metadata;
+  more["osteon-ticket"] = std::string(100'000, 'a');
+  EXPECT_FALSE(call(line, "/osteon.v1.RoomService/GetStatus", {}, more).status.ok());
+  expect_undisturbed();
+}
+
+TEST_F(DoorsAtWork, RefuseFurtherConnectionsAndLetThemInAgain) {
+  const ListenerCounts before = server_->door_health().connections;
+  std::vector<std::unique_ptr<RawConnection>> strangers;
+  for (std::size_t i = 0; i < 2 * kMostConnections; ++i) strangers.push_back(std::make_unique<RawConnection>(address()));
+  ASSERT_TRUE(test::wait_until([&] { return server_->door_health().connections.refused > before.refused; }, 10s));
+  EXPECT_LE(server_->door_health().connections.open, kMostConnections);
+  expect_undisturbed();
+  strangers.clear();
+  EXPECT_TRUE(test::wait_until([&] { return refusal(people_.door("ben", Role::observer, "ward")).empty(); }, test::kPatience));
+}
+
+}  // namespace
+}  // namespace osteon

@@ -1,0 +1,236 @@
+#include "server/net/gate.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <string>
+
+#include "server/net/person_certificate.hpp"
+#include "tests/support/doors/people.hpp"
+#include "tests/support/wait.hpp"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+constexpr const char* kUndo = "/osteon.v1.RoomService/Undo";
+constexpr const char* kWatch = "/osteon.v1.WatchService/WatchMesh";
+
+std::string content(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+class GateTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() { people_ = new test::People; }
+  static void TearDownTestSuite() { delete people_; }
+  void SetUp() override {
+    std::ofstream(people_->server() / "access.txt") << "";
+    Result<std::unique_ptr<Gate>> gate = Gate::open(people_->server(), refusals_, [this] { return UnixTime{std::chrono::seconds(now_)}; });
+    ASSERT_TRUE(gate.has_value()) << gate.error().message;
+    gate_ = std::move(*gate);
+  }
+  std::string certificate(const std::string& user) { return content(people_->person(user) / "person.pem"); }
+  std::string ticket(const std::string& user, const std::string& room, Role role, std::chrono::seconds good_for = 1h) {
+    return sign_ticket(make_ticket(room, user, role, UnixTime{std::chrono::seconds(now_)} + good_for).value(), people_->key());
+  }
+  // The refusal's sentence, with the word it is counted under; empty: let in.
+  std::string refused(const std::string& user, const std::string& with, const std::string& room, const std::string& method, bool is_known) {
+    const auto caller = gate_->admit({certificate(user), with, room, method});
+    if (caller) return {};
+    EXPECT_EQ(caller.error().is_known, is_known) << caller.error().sentence;
+    return std::string(caller.error().reason) + ": " + caller.error().sentence;
+  }
+  Caller let_in(const std::string& user, Role role, const std::string& room = "ward") {
+    const auto caller = gate_->admit({certificate(user), ticket(user, room, role), room, "/osteon.v1.RoomService/GetStatus"});
+    EXPECT_TRUE(caller.has_value()) << caller.error().sentence;
+    return caller.value_or(Caller{});
+  }
+
+  static test::People* people_;
+  RefusalCounts refusals_;
+  std::atomic<std::int64_t> now_ = std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+  std::unique_ptr<Gate> gate_;
+};
+test::People* GateTest::people_ = nullptr;
+
+TEST_F(GateTest, ReadsWhoACertificateIsOf) {
+  const Result<PersonCertificate> anna = read_person_certificate(certificate("anna"));
+  ASSERT_TRUE(anna.has_value()) << anna.error().message;
+  EXPECT_EQ(anna->user, "anna");
+  EXPECT_EQ(anna->serial.size() % 2, 0u);
+  const std::int64_t days = (anna->ends.time_since_epoch().count() - now_) / 86400;
+  EXPECT_GE(days, 363);
+  EXPECT_LE(days, 366);
+  // The server's own names nobody.
+  EXPECT_THAT(read_person_certificate(content(people_->server() / "server.pem")).error().message, HasSubstr("osteon://person/"));
+  for (const std::string& text : {std::string(), std::string("nonsense"), certificate("anna").substr(0, 300)})
+    EXPECT_FALSE(read_person_certificate(text));
+}
+
+TEST_F(GateTest, LetsInWhoHasBoth) {
+  EXPECT_EQ(refused("anna", ticket("anna", "ward", Role::trainee), "ward", kUndo, true), "");
+  EXPECT_EQ(refused("anna", ticket("anna", "*", Role::collaborator), "other", kUndo, true), "");
+  EXPECT_EQ(refused("anna", ticket("anna", "ward", Role::trainee), "", kUndo, true), "");
+  EXPECT_EQ(gate_->counts().admitted, 3u);
+}
+
+TEST_F(GateTest, SaysWhyNot) {
+  EXPECT_THAT(refused("anna", "", "ward", kUndo, false), HasSubstr("ticket: no ticket"));
+  EXPECT_THAT(refused("anna", "osteon1.x.y", "ward", kUndo, false), HasSubstr("malformed"));
+  EXPECT_THAT(refused("anna", sign_ticket(make_ticket("ward", "anna", Role::trainee, UnixTime{2h + std::chrono::seconds(now_)}).value(), new_ticket_key()), "ward", kUndo, false),
+              HasSubstr("signature"));
+  EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::trainee, -1s), "ward", kUndo, false), HasSubstr("expired"));
+  EXPECT_THAT(refused("anna", ticket("ben", "ward", Role::trainee), "ward", kUndo, true), HasSubstr("person: the ticket is for ben"));
+  EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::trainee), "other", kUndo, true), HasSubstr("room: "));
+  EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::observer), "ward", kUndo, true), HasSubstr("role: an observer may not call RoomService/Undo"));
+  EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::instructor), "ward", "/osteon.v1.RoomService/Nothing", true), HasSubstr("call: "));
+  EXPECT_FALSE(gate_->admit({content(people_->server() / "server.pem"), ticket("anna", "ward", Role::trainee), "ward", kUndo}));
+  EXPECT_FALSE(gate_->admit({"", ticket("anna", "ward", Role::trainee), "ward", kUndo}));
+  const auto counts = refusals_.counts();
+  EXPECT_EQ(counts.at("ticket"), 4u);
+  EXPECT_EQ(counts.at("certificate"), 2u);
+  EXPECT_EQ(counts.at("role"), 1u);
+  EXPECT_EQ(gate_->counts().refused, 10u);
+}
+
+TEST_F(GateTest, GoesByTheClock) {
+  const std::string good = ticket("anna", "ward", Role::trainee, 10s);
+  EXPECT_EQ(refused("anna", good, "ward", kUndo, true), "");
+  now_ += 10;
+  EXPECT_THAT(refused("anna", good, "ward", kUndo, false), HasSubstr("expired"));
+  now_ += 400 * 86400;
+  EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::trainee), "ward", kUndo, false), HasSubstr("certificate: the certificate has expired"));
+}
+
+TEST_F(GateTest, ReadsTheListWhileItRuns) {
+  const std::string good = ticket("anna", "ward", Role::trainee), instead = ticket("ben", "ward", Role::trainee);
+  people_->append_access("role anna observer ward");
+  gate_->look();
+  EXPECT_THAT(refused("anna", good, "ward", kUndo, true), HasSubstr("an observer may not"));
+  EXPECT_EQ(refused("anna", good, "ward", kWatch, true), "");
+  people_->append_access("revoke user anna");
+  gate_->look();
+  EXPECT_THAT(refused("anna", good, "ward", kWatch, false), HasSubstr("revoked"));
+  EXPECT_EQ(refused("ben", instead, "ward", kUndo, true), "");
+}
+
+TEST_F(GateTest, DoesNotOpenWithAWrongList) {
+  people_->append_access("nonsense");
+  EXPECT_THAT(Gate::open(people_->server(), refusals_).error().message, HasSubstr("access.txt:1"));
+}
+
+TEST_F(GateTest, NamesTheFileThatIsWrong) {
+  const test::TempDir dir;
+  for (const char* lacking : {"ca.pem", "server.pem", "server.key", "tickets.pub"}) {
+    std::filesystem::remove_all(dir / "d");
+    std::filesystem::copy(people_->server(), dir / "d");
+    std::filesystem::remove(dir / "d" / lacking);
+    EXPECT_THAT(Gate::open(dir / "d", refusals_).error().message, HasSubstr(lacking));
+  }
+  std::filesystem::remove_all(dir / "d");
+  std::filesystem::copy(people_->server(), dir / "d");
+  std::filesystem::copy(people_->person("anna") / "person.key", dir / "d" / "server.key", std::filesystem::copy_options::overwrite_existing);
+  EXPECT_THAT(Gate::open(dir / "d", refusals_).error().message, HasSubstr("not that of the certificate"));
+}
+
+TEST_F(GateTest, KeepsAuthorsToTheirPeople) {
+  const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
+  gate_->joined(anna, "ward", 1, AuthorId{1});
+  gate_->joined(anna, "ward", 2, AuthorId{2});
+  gate_->joined(ben, "ward", 1, AuthorId{3});
+  EXPECT_TRUE(gate_->check_author(anna, "ward", AuthorId{1}));
+  EXPECT_TRUE(gate_->check_author(anna, "ward", AuthorId{2}));
+  EXPECT_TRUE(gate_->check_author(ben, "ward", AuthorId{3}));
+  for (const auto author : {AuthorId{0}, AuthorId{3}, AuthorId{4}}) {
+    ASSERT_FALSE(gate_->check_author(anna, "ward", author)) << author.value;
+    EXPECT_EQ(gate_->check_author(anna, "ward", author).error().code, ErrorCode::denied);
+  }
+  EXPECT_FALSE(gate_->check_author(anna, "other", AuthorId{1}));
+  EXPECT_TRUE(gate_->check_resume(anna, "ward", 1, AuthorId{1}));
+  EXPECT_FALSE(gate_->check_resume(anna, "ward", 2, AuthorId{1}));
+  EXPECT_FALSE(gate_->check_resume(ben, "ward", 1, AuthorId{1}));
+  // A room that is opened again counts its authors anew, or goes on from its journal.
+  gate_->forget_room("ward");
+  EXPECT_FALSE(gate_->check_author(anna, "ward", AuthorId{1}));
+  EXPECT_TRUE(gate_->check_resume(anna, "ward", 1, AuthorId{1}));
+}
+
+TEST_F(GateTest, ANewerSessionTakesThePlaceOfAnOlderOne) {
+  const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
+  gate_->joined(anna, "ward", 1, AuthorId{1});
+  gate_->joined(ben, "ward", 1, AuthorId{2});
+  std::string ended, bystander;
+  const auto older = gate_->enter(anna, "ward", AuthorId{1}, kWatch, [&](const Refusal& why) { ended += why.sentence; });
+  const auto others = gate_->enter(ben, "ward", AuthorId{2}, kWatch, [&](const Refusal& why) { bystander += why.sentence; });
+  gate_->joined(anna, "ward", 2, AuthorId{3});
+  gate_->joined(anna, "other", 1, AuthorId{1});
+  EXPECT_EQ(ended, "") << "another kind of program, another room";
+  gate_->joined(anna, "ward", 1, AuthorId{4});
+  EXPECT_THAT(ended, HasSubstr("newer session of anna"));
+  EXPECT_EQ(bystander, "");
+  EXPECT_FALSE(gate_->check_author(anna, "ward", AuthorId{1}));
+  EXPECT_TRUE(gate_->check_author(anna, "ward", AuthorId{4}));
+  EXPECT_FALSE(gate_->check_resume(anna, "ward", 1, AuthorId{1})) << "or they would push out each other for ever";
+  EXPECT_EQ(gate_->counts().displaced, 1u);
+  gate_->joined(anna, "ward", 1, AuthorId{4});
+  EXPECT_EQ(gate_->counts().displaced, 1u);
+}
+
+TEST_F(GateTest, EndsStreamsOfWhoMayHaveThemNoMore) {
+  const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
+  std::optional<Refusal> ended[3];
+  std::atomic<int> calls = 0;
+  const auto into = [&](int i) { return [&, i](const Refusal& why) { ended[i] = why, ++calls; }; };
+  const auto first = gate_->enter(anna, "ward", AuthorId{1}, kWatch, into(0));
+  const auto second = gate_->enter(ben, "ward", AuthorId{2}, kWatch, into(1));
+  auto gone = gate_->enter(anna, "ward", AuthorId{1}, kWatch, into(2));
+  EXPECT_EQ(gate_->counts().streams, 3u);
+  gone.reset();
+  EXPECT_EQ(gate_->counts().streams, 2u);
+  EXPECT_EQ(first->role(), Role::trainee);
+  // Nobody asks: the gate looks by itself.
+  people_->append_access("role anna observer");
+  ASSERT_TRUE(test::wait_until([&] { return calls == 1; }, 5s));
+  EXPECT_THAT(ended[0]->sentence, HasSubstr("your role has changed to observer"));
+  EXPECT_EQ(first->role(), Role::none);
+  EXPECT_FALSE(ended[1]);
+  now_ += 3600;
+  ASSERT_TRUE(test::wait_until([&] { return calls == 2; }, 5s));
+  EXPECT_THAT(ended[1]->sentence, HasSubstr("expired"));
+  gate_->look();
+  EXPECT_EQ(calls, 2) << "a stream ends once";
+}
+
+TEST_F(GateTest, KnowsAPersonWhoseRoleHasChangedOnlyAfterAnotherJoin) {
+  const Caller before = let_in("anna", Role::collaborator);
+  gate_->joined(before, "ward", 1, AuthorId{1});
+  people_->append_access("role anna trainee");
+  gate_->look();
+  const Caller after = let_in("anna", Role::collaborator);
+  EXPECT_EQ(after.role, Role::trainee);
+  EXPECT_THAT(gate_->check_author(after, "ward", AuthorId{1}).error().message, HasSubstr("role has changed"));
+  EXPECT_THAT(gate_->check_resume(after, "ward", 1, AuthorId{1}).error().message, HasSubstr("role has changed"));
+}
+
+TEST(RefusalLog, SaysEachOnceAndRemembersNoMoreThanItsLimit) {
+  RefusalLog log;
+  EXPECT_TRUE(log.is_new("anna", "a"));
+  EXPECT_FALSE(log.is_new("anna", "a"));
+  EXPECT_TRUE(log.is_new("anna", "b"));
+  EXPECT_TRUE(log.is_new("ben", "a"));
+  for (std::size_t i = 0; i < 3 * RefusalLog::kMost; ++i) EXPECT_TRUE(log.is_new("eve", std::to_string(i)));
+  EXPECT_EQ(log.size(), RefusalLog::kMost);
+  EXPECT_FALSE(log.is_new("eve", std::to_string(3 * RefusalLog::kMost - 1)));
+  EXPECT_TRUE(log.is_new("anna", "a"));
+}
+
+}  // namespace
+}  // namespace osteon
