@@ -131,6 +131,7 @@ void OpenRoom::send_away(const std::string& why) {
 }
 
 RoomSummary OpenRoom::close() {
+  demonstrations_.end_all();
   host_->stop();
   if (keeper_) {
     // Nothing is lost where this fails: the next opening takes longer.
@@ -460,6 +461,34 @@ Result<std::shared_ptr<OpenRoom>> Rooms::replay(const std::string& name, const s
                                           std::move(playback));
   shown->shows = {name, last};
   return take_in(std::move(shown));
+}
+
+Result<RoomGenesis> Rooms::read(const std::string& name, RoomSeq to, const std::function<bool(const RoomRow&)>& take) {
+  if (const Result<std::shared_ptr<OpenRoom>> room = find(name)) {
+    RoomKeeper* keeper = (*room)->keeper();
+    if (!keeper) return tl::unexpected(not_kept(name));
+    const RoomSeq head = keeper->head().place;
+    if (const Result<void> read = keeper->read(RoomSeq{1}, to ? std::min(to, head) : head, take); !read) return tl::unexpected(read.error());
+    return keeper->genesis();
+  }
+  // Nobody opens it meanwhile.
+  const std::lock_guard changing(changing_);
+  const Result<fs::path> file = kept_file(name);
+  if (!file) return tl::unexpected(file.error());
+  Result<Journal> journal = Journal::open(*file);
+  if (!journal) return tl::unexpected(journal.error());
+  Result<RoomGenesis> genesis = genesis_from_bytes(journal->genesis());
+  Result<void> sound;
+  const Result<void> read = journal->read(RoomSeq{1}, [&](const JournalRow& row) {
+    if (to && row.place > to) return false;
+    const Result<RoomRow> one = row_from_bytes(row.place, std::chrono::nanoseconds(row.at_ns), row.bytes);
+    if (!one) sound = tl::unexpected(one.error());
+    return one && take(*one);
+  });
+  (void)journal->close();
+  if (!sound) return tl::unexpected(sound.error());
+  if (!read) return tl::unexpected(read.error());
+  return genesis;
 }
 
 Result<std::vector<std::string>> Rooms::remove(const std::string& name, bool with_branches) {

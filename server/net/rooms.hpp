@@ -19,6 +19,7 @@
 #include "common/core/result.hpp"
 #include "common/tools/tool_box.hpp"
 #include "common/volume/case.hpp"
+#include "server/net/demonstration.hpp"
 #include "server/net/job_thread.hpp"
 #include "server/net/refusals.hpp"
 #include "server/net/room_files.hpp"
@@ -71,6 +72,7 @@ class OpenRoom {
   // The version of the protocol that an author's newest join was made in; of one who never joined, this server's own.
   void note_version(AuthorId author, std::uint32_t version);
   [[nodiscard]] std::uint32_t version_of(AuthorId author) const;
+  [[nodiscard]] Demonstrations& demonstrations() { return demonstrations_; }
   // Tells every stream why it ends.
   void end_streams(const std::string& why);
   // The same; sessions come again by themselves.
@@ -87,6 +89,7 @@ class OpenRoom {
   std::map<AuthorId, std::uint32_t> older_versions_;      // of those that are not this server's own
   std::unique_ptr<RoomKeeper> keeper_;  // outlives the host, which writes to it
   std::unique_ptr<RoomHost> host_;
+  Demonstrations demonstrations_;       // in the host
   Clock::time_point newest_checkpoint_ = Clock::now(), forgotten_ = Clock::now();  // of upkeep
 };
 
@@ -132,6 +135,9 @@ class Rooms {
   // that room is closed meanwhile.
   Result<std::shared_ptr<OpenRoom>> replay(const std::string& name, const std::string& new_name, RoomSeq from, RoomSeq to,
                                            double speed);
+  // The rows of a kept room, open or closed, from its first to `to`, null for all, until `take` returns false; and what it
+  // began as.
+  Result<RoomGenesis> read(const std::string& name, RoomSeq to, const std::function<bool(const RoomRow&)>& take);
   // The names of those that are gone. Error unavailable: it has branches, and they are not to go too; it is kept elsewhere.
   Result<std::vector<std::string>> remove(const std::string& name, bool with_branches);
   // Of an open room, while it is cut.

@@ -2,7 +2,9 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <algorithm>
 #include <array>
+#include <chrono>
 #include <fstream>
 #include <mutex>
 #include <optional>
@@ -77,6 +79,8 @@ class CaseStream final : public OutStream<WriteReactor> {
   std::ifstream file_;
   std::uintmax_t file_size_ = 0, sent_ = 0;
 };
+
+constexpr std::uint64_t kLongestUndoMs = 1'000'000'000'000;  // longer than any room
 
 // Why a program of these versions cannot join; OK when it can.
 Status judge(const v1::JoinRequest& request) {
@@ -267,12 +271,17 @@ class RoomServiceImpl final : public RoomBase {
     std::vector<RoomSeq> places;
     for (const std::uint64_t place : request->room_seqs()) places.push_back(RoomSeq{place});
     const bool by_count = request->count() != 0 || request->of_author() != 0;
-    if (int{by_count} + int{!places.empty()} + int{request->to_mark() != 0} > 1)
-      return refuse(reactor, invalid("an UndoRequest has one of count, room_seqs and to_mark"));
+    const std::chrono::milliseconds newest(std::min<std::uint64_t>(request->newest_ms(), kLongestUndoMs));
+    if (int{by_count} + int{!places.empty()} + int{request->to_mark() != 0} + int{newest.count() > 0} + int{request->all()} > 1)
+      return refuse(reactor, invalid("an UndoRequest has one of count, room_seqs, to_mark, newest_ms and all"));
     return change(
         *context, reactor, request->author(),
         [by = AuthorId{request->author()}, of = AuthorId{request->of_author()}, count = request->count(), places,
-         mark = RoomSeq{request->to_mark()}](Room& room) {
+         mark = RoomSeq{request->to_mark()}, newest, all = request->all()](Room& room) -> Result<RoomEvent> {
+          if (all && !room.people().oversees(by))
+            return failure(ErrorCode::denied, "only an instructor takes everything back, to the imported bone");
+          if (all) return room.undo_to(by, RoomSeq{});
+          if (newest.count() > 0) return room.undo_since(by, room.time() - newest);
           if (mark) return room.undo_to(by, mark);
           return places.empty() ? room.undo_last(by, count, of) : room.undo(by, places);
         },

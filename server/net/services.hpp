@@ -22,6 +22,7 @@ class LinkServer;
 // `links`: the fast path; null: there is none, and all goes over the streams.
 [[nodiscard]] std::unique_ptr<grpc::Service> make_cutting_service(Rooms& rooms, LinkServer* links);
 [[nodiscard]] std::unique_ptr<grpc::Service> make_watch_service(Rooms& rooms);
+[[nodiscard]] std::unique_ptr<grpc::Service> make_people_service(Rooms& rooms);
 [[nodiscard]] std::unique_ptr<grpc::Service> make_rooms_service(Rooms& rooms);
 
 }  // namespace osteon

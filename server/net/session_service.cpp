@@ -1,6 +1,8 @@
 // The streams of haptic clients, and the fast path beside each.
 #include <grpcpp/grpcpp.h>
 
+#include <algorithm>
+#include <iterator>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -73,6 +75,19 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     // Beside the stream, which carries all.
     if (link_) link_->tell(index, row == any ? fast : wire::SessionRow{.room_seq = place, .kind = wire::SessionRowKind::streamed});
   }
+  void hold(const wire::SessionRow& supervised) override {
+    if (link_) link_->tell(0, supervised);
+  }
+  bool show_partners(const std::vector<CuttingState>& states) override {
+    std::vector<CuttingState> others;
+    std::ranges::copy_if(states, std::back_inserter(others), [&](const CuttingState& state) { return state.author != author_; });
+    const bool by_link = link_ && link_->set_partners(others);
+    const std::lock_guard lock(mutex_);
+    if (closing()) return false;
+    partners_.offer(others, !by_link);
+    pump();
+    return partners_.waits();
+  }
   void know_tool(std::uint32_t number, const Digest& tool) override {
     if (link_) link_->know_tool(number, tool);
   }
@@ -114,6 +129,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     if (request->message_case() == v1::SessionRequest::kOpen) return open(request->open());
     if (!opened_) return close(invalid("the first SessionRequest must be open"));
     switch (request->message_case()) {
+      case v1::SessionRequest::kHeard: return hear(RoomSeq{request->heard().room_seq()});
       case v1::SessionRequest::kCut: return queue(request->cut());
       case v1::SessionRequest::kState: return show(request->state());
       default: return close(invalid("SessionRequest.message is not set"));
@@ -176,8 +192,16 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     if (may_carry(DatagramContent::tool_state)) host_.offer_state(std::move(state));
   }
   void arrived(std::uint64_t index) override {
-    const std::lock_guard lock(mutex_);
-    outbox_.arrived(index);
+    const RoomSeq newest = [&] {
+      const std::lock_guard lock(mutex_);
+      return outbox_.arrived(index);
+    }();
+    if (newest) host_.people().heard(author_, newest);
+  }
+  void hear(RoomSeq newest) {
+    if (newest > host_.room_seq()) return close(invalid("heard.room_seq is beyond the newest event"));
+    host_.people().heard(author_, newest);
+    read_on();
   }
 
   void show(const v1::CuttingState& message) {
@@ -218,7 +242,13 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
                                                         " events behind the room; join again"});
   }
   bool take(ByteBuffer& message) override {
-    const MessageParts parts = outbox_.take();
+    MessageParts parts = outbox_.take();
+    // Where others' tools are only after all rows: no row is held up.
+    while (parts.empty() && outbox_.begun()) {
+      const std::optional<CuttingState> partner = partners_.take(PartnerOutbox::Clock::now());
+      if (!partner) break;
+      if (const Bytes row = in_its_version(partner_row(*partner))) parts = {row};
+    }
     if (!parts.empty()) message = buffer_of(parts);
     return !parts.empty();
   }
@@ -239,6 +269,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   std::uint32_t version_ = wire::kProtocolVersion;
   bool opened_ = false;       // only reactions to reads use it, and these come one by one
   SessionOutbox outbox_;
+  PartnerOutbox partners_;
   int queued_ = 0;            // cuts between reading and deciding
   std::uint64_t taken_ = 0;   // newest author_seq that was queued, here or in an earlier session
   bool paused_ = false, reading_ended_ = false;

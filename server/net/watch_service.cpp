@@ -56,7 +56,9 @@ class MeshStream final : public OutStream<WriteReactor>, public MeshSink {
 
 class CuttingStream final : public OutStream<WriteReactor>, public CuttingSink {
  public:
-  CuttingStream(std::shared_ptr<OpenRoom> room, std::chrono::nanoseconds apart) : room_(std::move(room)), apart_(apart) {}
+  CuttingStream(std::shared_ptr<OpenRoom> room, AuthorId author, std::chrono::nanoseconds apart)
+      : room_(std::move(room)), author_(author), apart_(apart) {}
+  AuthorId author() const override { return author_; }
 
   std::chrono::nanoseconds apart() const override { return apart_; }
   void offer(const Bytes& message) override {
@@ -80,6 +82,7 @@ class CuttingStream final : public OutStream<WriteReactor>, public CuttingSink {
   void leave() override { room_->host().leave(*this); }
 
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
+  const AuthorId author_;
   const std::chrono::nanoseconds apart_;
   Bytes waiting_;
 };
@@ -138,7 +141,7 @@ class WatchServiceImpl final : public WatchBase {
     const std::chrono::nanoseconds apart{request->most_hz() == 0 ? 0 : 1'000'000'000 / request->most_hz()};
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused(status_of(caller.error()));
-    CuttingStream* stream = CuttingStream::launch(std::make_shared<CuttingStream>(*room, apart));
+    CuttingStream* stream = CuttingStream::launch(std::make_shared<CuttingStream>(*room, AuthorId{request->author()}, apart));
     stream->stand_under(rooms_.gate, *caller, (*room)->name, AuthorId{request->author()}, "/osteon.v1.WatchService/WatchCutting");
     (*room)->host().watch_cutting(*stream);
     return stream;

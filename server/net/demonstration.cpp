@@ -1,0 +1,282 @@
+#include "server/net/demonstration.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <deque>
+#include <future>
+#include <map>
+#include <optional>
+#include <set>
+#include <thread>
+#include <utility>
+
+#include "common/runtime/log.hpp"
+#include "osteon/v1/cutting.pb.h"
+#include "server/net/playback.hpp"
+#include "server/net/rooms.hpp"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t kMostUndecided = 64;
+constexpr Clock::duration kLongestPause = 3s;  // somebody thought, or the room was closed
+
+struct Recorded {
+  Cut cut;
+  std::chrono::nanoseconds at{};
+};
+
+}  // namespace
+
+// One thread of its own makes the cuts; the room's threads say what became of them.
+class Demonstration final : public SessionSink, public std::enable_shared_from_this<Demonstration> {
+ public:
+  Demonstration(RoomHost& host, AuthorId author, std::vector<Recorded> cuts, double speed)
+      : host_(host), author_(author), cuts_(std::move(cuts)), speed_(speed) {}
+
+  [[nodiscard]] Result<void> start() {
+    if (Result<void> opened = host_.open_session(shared_from_this()); !opened) return opened;
+    thread_ = std::thread([this] { run(); });
+    return {};
+  }
+  // Once, and not on its own thread.
+  void stop() {
+    finish();
+    if (thread_.joinable()) thread_.join();
+  }
+  [[nodiscard]] bool over() const {
+    const std::lock_guard lock(mutex_);
+    return over_;
+  }
+
+  AuthorId author() const override { return author_; }
+  void begin(RoomSeq, MessageParts, Bytes complete) override {
+    v1::SessionResponse said;
+    (void)said.ParseFromString(*complete);
+    const std::lock_guard lock(mutex_);
+    lease_ = said.complete().lease_epoch();
+    body_ = BodyId{said.complete().bodies(0)};
+  }
+  void set_leaves(std::vector<FieldLeaf>) override {}
+  void offer(RoomSeq, const Bytes&) override {}
+  void offer(RoomSeq, const Bytes&, const wire::SessionRow& row) override {
+    const std::lock_guard lock(mutex_);
+    if (row.kind == wire::SessionRowKind::supervised) {
+      lease_ = row.lease_epoch;
+      stopped_ = !row.supervision.may_cut();
+    } else if (row.kind == wire::SessionRowKind::committed && row.cut.author == author_) {
+      undecided_.pop_front();
+    } else if (row.kind == wire::SessionRowKind::rejected) {
+      lease_ = row.lease_epoch;
+      // What fell with the lease is made again under the new one; what is wrong in itself is left out.
+      const auto reason = static_cast<Rejection>(row.reason);
+      if (reason == Rejection::lease || reason == Rejection::frozen || reason == Rejection::taken) again_.push_back(undecided_.front());
+      undecided_.pop_front();
+    }
+    wake_.notify_one();
+  }
+  void answer(const Bytes&) override {}
+  void refuse(const Error& why) override {
+    log::error("demonstration ended", {{"author", author_.value}, {"reason", why.message}});
+    finish();
+  }
+  void decided() override {}
+  void end(const std::string&) override { finish(); }
+  std::size_t waiting() const override { return 0; }
+
+ private:
+  void finish() {
+    const std::lock_guard lock(mutex_);
+    over_ = true;
+    wake_.notify_one();
+  }
+
+  // The next cut once it is due; nothing at the end.
+  std::optional<Recorded> next() {
+    std::unique_lock lock(mutex_);
+    while (!over_) {
+      const bool may_go_on = !stopped_ && undecided_.size() < kMostUndecided;
+      const bool all_made = again_.empty() && made_ == cuts_.size();
+      if (all_made && undecided_.empty()) return std::nullopt;
+      if (!may_go_on || all_made) {
+        wake_.wait(lock);
+        continue;
+      }
+      if (Clock::now() < due_) {
+        wake_.wait_until(lock, due_);
+        continue;
+      }
+      if (!again_.empty()) {
+        const std::size_t which = again_.front();
+        again_.pop_front();
+        undecided_.push_back(which);
+        // Not faster than a tool goes: a lease allows only so much.
+        due_ = Clock::now() + at_speed(std::chrono::microseconds(cuts_[which].cut.path_us));
+        return stamped(which);
+      }
+      const std::size_t which = made_++;
+      undecided_.push_back(which);
+      if (made_ < cuts_.size()) {
+        const Clock::duration apart = std::min<Clock::duration>(cuts_[made_].at - cuts_[which].at, kLongestPause);
+        due_ = std::max(due_, Clock::now()) +
+               at_speed(std::max<Clock::duration>(apart, std::chrono::microseconds(cuts_[made_].cut.path_us)));
+      }
+      return stamped(which);
+    }
+    return std::nullopt;
+  }
+  [[nodiscard]] Clock::duration at_speed(Clock::duration time) const {
+    return std::chrono::duration_cast<Clock::duration>(time / speed_);
+  }
+  // Under mutex_.
+  Recorded stamped(std::size_t which) {
+    Recorded out = cuts_[which];
+    out.cut.author = author_;
+    out.cut.author_seq = ++author_seq_;
+    out.cut.lease_epoch = lease_;
+    out.cut.body = body_;
+    out.cut.path_us = static_cast<std::uint32_t>(std::min(std::llround(out.cut.path_us / speed_), 4'000'000'000ll));
+    return out;
+  }
+
+  void run() {
+    Player tool(Playback{}, {});
+    const Clock::time_point began = Clock::now();
+    while (const std::optional<Recorded> cut = next()) {
+      host_.queue_cut(shared_from_this(), cut->cut, Clock::now());
+      if (std::optional<CuttingState> state = tool.see(cut->cut, host_.tools(), Clock::now() - began))
+        host_.offer_state(std::move(*state));
+    }
+    host_.leave(*this);
+    const std::lock_guard lock(mutex_);
+    over_ = true;
+  }
+
+  RoomHost& host_;
+  const AuthorId author_;
+  const std::vector<Recorded> cuts_;
+  const double speed_;
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  std::uint64_t lease_ = 0, author_seq_ = 0;
+  BodyId body_;
+  std::size_t made_ = 0;                       // of cuts_
+  std::deque<std::size_t> undecided_, again_;  // which of them
+  Clock::time_point due_{};
+  bool stopped_ = false, over_ = false;
+  std::thread thread_;
+};
+
+namespace {
+
+// What a journal has to show.
+struct Recording {
+  std::vector<Recorded> cuts;
+  std::vector<Tool> tools;  // that they are made with
+};
+
+Result<Recording> read_recording(Rooms& rooms, OpenRoom& in, const WhatToShow& what) {
+  std::map<RoomSeq, Recorded> cuts;
+  std::set<RoomSeq> undone;
+  std::map<Digest, Tool> tools;
+  bool too_many = false;
+  const auto take = [&](const RoomRow& row) {
+    if (const auto* cut = std::get_if<CutRow>(&row.what)) {
+      if (row.place >= what.from && (!what.of || cut->cut.author == what.of)) cuts[row.place] = {cut->cut, row.at};
+    } else if (const auto* undo = std::get_if<UndoRow>(&row.what)) {
+      undone.insert(undo->places.begin(), undo->places.end());
+    } else if (const auto* redo = std::get_if<RedoRow>(&row.what)) {
+      for (const RoomSeq place : redo->places) undone.erase(place);
+    } else if (const auto* added = std::get_if<ToolRow>(&row.what)) {
+      tools.emplace(added->tool.hash(), added->tool);
+    }
+    too_many = cuts.size() > Demonstrations::kMostCuts;
+    return !too_many;
+  };
+  const Result<RoomGenesis> genesis = rooms.read(what.room.empty() ? in.name : what.room, what.to, take);
+  if (!genesis) return tl::unexpected(genesis.error());
+  if (genesis->case_hash != in.host().bone().hash())
+    return failure(ErrorCode::invalid_input, "room " + genesis->room + " is of another case; show one of the same bone");
+  if (too_many)
+    return failure(ErrorCode::invalid_input, "there are more than " + std::to_string(Demonstrations::kMostCuts) + " cuts; say from where to where");
+  for (const Tool& tool : genesis->tools) tools.emplace(tool.hash(), tool);
+
+  Recording out;
+  std::set<Digest> used;
+  for (auto& [place, recorded] : cuts) {
+    if (undone.contains(place)) continue;
+    used.insert(recorded.cut.tool);
+    out.cuts.push_back(std::move(recorded));
+  }
+  for (const Digest& hash : used)
+    if (const auto tool = tools.find(hash); tool != tools.end()) out.tools.push_back(tool->second);
+  return out;
+}
+
+// Waits until the room knows it.
+Result<void> add_tool(RoomHost& host, AuthorId by, const Tool& tool) {
+  std::promise<Result<RoomEvent>> answer;
+  host.queue_event([by, tool](Room& room) { return room.add_tool(by, tool); },
+                   [&](const Result<RoomEvent>& added) { answer.set_value(added); });
+  const Result<RoomEvent> added = answer.get_future().get();
+  if (!added) return tl::unexpected(added.error());
+  return {};
+}
+
+}  // namespace
+
+Demonstrations::Demonstrations() = default;
+Demonstrations::~Demonstrations() { end_all(); }
+
+Result<Shown> Demonstrations::begin(Rooms& rooms, OpenRoom& in, AuthorId by, const WhatToShow& what) {
+  if (!(what.speed > 0 && what.speed <= kMostSpeed))
+    return failure(ErrorCode::invalid_input, "the speed is not more than 0 and at most " + std::to_string(static_cast<int>(kMostSpeed)));
+  Result<Recording> recording = read_recording(rooms, in, what);
+  if (!recording) return tl::unexpected(recording.error());
+  if (recording->cuts.empty()) return failure(ErrorCode::not_found, "there is no cut to show");
+  RoomHost& host = in.host();
+  for (const Tool& tool : recording->tools)
+    if (!host.tools().find(tool.hash()))
+      if (const Result<void> known = add_tool(host, by, tool); !known) return tl::unexpected(known.error());
+
+  const std::lock_guard lock(mutex_);
+  std::erase_if(going_on_, [](const auto& one) {
+    if (!one->over()) return false;
+    one->stop();
+    return true;
+  });
+  if (over_) return failure(ErrorCode::unavailable, "the room is closed");
+  if (going_on_.size() >= kMost)
+    return failure(ErrorCode::unavailable, "the room shows " + std::to_string(kMost) + " demonstrations already; end one first");
+  const Result<AuthorId> author = host.join(MemberKind::surgeon, "demonstrator", {}, Role::collaborator);
+  if (!author) return tl::unexpected(author.error());
+  const Shown shown{*author, recording->cuts.size()};
+  const auto one = std::make_shared<Demonstration>(host, *author, std::move(recording->cuts), what.speed);
+  if (const Result<void> started = one->start(); !started) return tl::unexpected(started.error());
+  going_on_.push_back(one);
+  return shown;
+}
+
+Result<void> Demonstrations::end(AuthorId demonstrator) {
+  const std::lock_guard lock(mutex_);
+  const auto one = std::ranges::find(going_on_, demonstrator, [](const auto& d) { return d->author(); });
+  if (one == going_on_.end() || (*one)->over())
+    return failure(ErrorCode::not_found, "author " + std::to_string(demonstrator.value) + " demonstrates nothing");
+  (*one)->stop();
+  going_on_.erase(one);
+  return {};
+}
+
+void Demonstrations::end_all() {
+  const std::lock_guard lock(mutex_);
+  over_ = true;
+  for (const auto& one : going_on_) one->stop();
+  going_on_.clear();
+}
+
+}  // namespace osteon

@@ -1,0 +1,57 @@
+// Cuts of a journal that happen again in a live room: made by a tool of its own, judged like anybody's, seen and heard, so that
+// hands can be guided along it.
+#pragma once
+#include <cstddef>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "common/core/id.hpp"
+#include "common/core/result.hpp"
+
+namespace osteon {
+
+class Demonstration;
+class OpenRoom;
+class Rooms;
+
+struct WhatToShow {
+  std::string room;     // whose journal; empty: the room's own
+  AuthorId of;          // whose cuts; null: everyone's
+  RoomSeq from, to;     // both included; null: from its beginning, to its end
+  double speed = 1.0;   // times as fast as it happened
+};
+
+struct Shown {
+  AuthorId demonstrator;
+  std::size_t cuts = 0;
+};
+
+// Those of one room. Any thread but the room's own. Each has a thread.
+class Demonstrations {
+ public:
+  static constexpr std::size_t kMost = 4, kMostCuts = 100'000;
+  static constexpr double kMostSpeed = 100.0;
+
+  Demonstrations();
+  ~Demonstrations();
+  Demonstrations(const Demonstrations&) = delete;
+  Demonstrations& operator=(const Demonstrations&) = delete;
+
+  // Reads the journal first, which takes a while. Cuts that were taken back by `to` are not shown. Errors: invalid_input (the
+  // speed; another case; more than kMostCuts), not_found (no such room, no cut there), unavailable (that room is not kept,
+  // kMost go on), and those of reading.
+  [[nodiscard]] Result<Shown> begin(Rooms& rooms, OpenRoom& in, AuthorId by, const WhatToShow& what);
+  // Error not_found: no demonstration of that author goes on.
+  [[nodiscard]] Result<void> end(AuthorId demonstrator);
+  // For good.
+  void end_all();
+
+ private:
+  std::mutex mutex_;  // never held with another that is taken within, but that of a demonstration
+  std::vector<std::shared_ptr<Demonstration>> going_on_;  // shared with the cuts that they have queued
+  bool over_ = false;
+};
+
+}  // namespace osteon

@@ -1,0 +1,218 @@
+// The people of a room: who is there, and what they decide about each other, draw, say and show.
+#include <grpcpp/grpcpp.h>
+
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "common/wire/convert.hpp"
+#include "osteon/v1/people.grpc.pb.h"
+#include "server/net/called_room.inl"
+#include "server/net/demonstration.hpp"
+#include "server/net/services.hpp"
+
+namespace osteon {
+namespace {
+
+class PeopleStream final : public OutStream<WriteReactor>, public PeopleSink {
+ public:
+  PeopleStream(std::shared_ptr<OpenRoom> room, AuthorId author) : room_(std::move(room)), author_(author) {}
+
+  void changed() override {
+    const std::lock_guard lock(mutex_);
+    pump();
+  }
+  void end(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
+  std::size_t waiting() const override { return 0; }
+
+ private:
+  bool take(ByteBuffer& message) override {
+    const PeopleRights rights{.others_supervision = may_receive(StreamContent::others_supervision),
+                              .others_words = may_receive(StreamContent::others_words)};
+    const Bytes news = room_->host().people().news(cursor_, author_, rights);
+    if (news) message = buffer_of({news});
+    return news != nullptr;
+  }
+  void leave() override {
+    room_->host().people().leave(*this);
+    room_->host().people().went(author_);
+  }
+
+  const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
+  const AuthorId author_;
+  PeopleCursor cursor_;
+};
+
+using PeopleBase = v1::PeopleService::WithRawCallbackMethod_WatchPeople<v1::PeopleService::WithCallbackMethod_Supervise<
+    v1::PeopleService::WithCallbackMethod_Annotate<v1::PeopleService::WithCallbackMethod_Say<v1::PeopleService::WithCallbackMethod_Demonstrate<
+        v1::PeopleService::WithCallbackMethod_EndDemonstration<v1::PeopleService::Service>>>>>>;
+
+class PeopleServiceImpl final : public PeopleBase {
+ public:
+  explicit PeopleServiceImpl(Rooms& rooms) : rooms_(rooms) {}
+
+  WriteReactor* WatchPeople(grpc::CallbackServerContext* context, const ByteBuffer* bytes) override {
+    const auto request = parse<v1::WatchPeopleRequest>(*bytes);
+    if (!request) return refused(invalid("the WatchPeopleRequest could not be parsed"));
+    const AuthorId author{request->author()};
+    const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context, author);
+    if (!room) return refused(status_of(room.error()));
+    if (!(*room)->host().knows(author)) return refused(not_joined("WatchPeopleRequest", request->author()));
+    const Result<Caller> caller = caller_of(rooms_, *context);
+    if (!caller) return refused(status_of(caller.error()));
+    PeopleStream* stream = PeopleStream::launch(std::make_shared<PeopleStream>(*room, author));
+    stream->stand_under(rooms_.gate, *caller, (*room)->name, author, "/osteon.v1.PeopleService/WatchPeople");
+    (*room)->host().people().came(author);
+    (*room)->host().people().watch(*stream);
+    return stream;
+  }
+
+  grpc::ServerUnaryReactor* Supervise(grpc::CallbackServerContext* context, const v1::SuperviseRequest* request,
+                                      v1::SuperviseResponse* response) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    const Result<Supervision> word = wire::from_wire(request->supervision());
+    if (!word) return refuse(reactor, invalid(word.error().message));
+    const std::shared_ptr<OpenRoom> room = called(*context, reactor, request->author());
+    if (!room) return reactor;
+    const AuthorId by{request->author()};
+    std::vector<AuthorId> subjects{AuthorId{request->subject()}};
+    if (request->subject() == 0) {
+      subjects = room->host().people().hands_overseen();
+      std::erase(subjects, by);
+      if (subjects.empty()) return refuse(reactor, {StatusCode::NOT_FOUND, "nobody else has a hand in this room"});
+    }
+    // One event each, in one tick; answered with the last.
+    struct Answer {
+      std::size_t left = 0;
+      std::optional<Error> failed;
+    };
+    const auto answer = std::make_shared<Answer>(Answer{subjects.size(), {}});  // by the events that are queued
+    for (const AuthorId subject : subjects)
+      room->host().queue_event([by, subject, word = *word](Room& r) { return r.supervise(by, subject, word); },
+                               [answer, reactor, response](const Result<RoomEvent>& decided) {
+                                 if (decided) response->set_room_seq(decided->room_seq.value);
+                                 else if (!answer->failed) answer->failed = decided.error();
+                                 if (--answer->left > 0) return;
+                                 reactor->Finish(answer->failed ? status_of(*answer->failed) : Status::OK);
+                               });
+    return reactor;
+  }
+
+  grpc::ServerUnaryReactor* Annotate(grpc::CallbackServerContext* context, const v1::AnnotateRequest* request,
+                                     v1::AnnotateResponse* response) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    const AuthorId by{request->author()};
+    const std::shared_ptr<OpenRoom> room = called(*context, reactor, request->author());
+    if (!room) return reactor;
+    const auto fill = [response](const RoomEvent& event) {
+      response->set_room_seq(event.room_seq.value);
+      response->set_annotation(std::get<AnnotationRow>(event.people).id);
+    };
+    if (request->has_drawn()) {
+      const Result<Annotation> drawn = wire::from_wire(request->drawn());
+      if (!drawn) return refuse(reactor, invalid(drawn.error().message));
+      return change(*room, reactor, [by, drawn = *drawn](Room& r) { return r.annotate(by, drawn); }, fill);
+    }
+    if (request->wipe_off() != 0)
+      return change(*room, reactor, [by, id = request->wipe_off()](Room& r) { return r.wipe_off(by, id); }, fill);
+    // All of the caller's: one event each, answered with the last.
+    wipe_next(room, by, reactor, response);
+    return reactor;
+  }
+
+  grpc::ServerUnaryReactor* Say(grpc::CallbackServerContext* context, const v1::SayRequest* request,
+                                v1::SayResponse* response) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    const std::shared_ptr<OpenRoom> room = called(*context, reactor, request->author());
+    if (!room) return reactor;
+    return change(
+        *room, reactor,
+        [by = AuthorId{request->author()}, to = AuthorId{request->to()}, words = request->words()](Room& r) { return r.say(by, to, words); },
+        [response](const RoomEvent& event) { response->set_room_seq(event.room_seq.value); });
+  }
+
+  grpc::ServerUnaryReactor* Demonstrate(grpc::CallbackServerContext* context, const v1::DemonstrateRequest* request,
+                                        v1::DemonstrateResponse* response) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    const std::shared_ptr<OpenRoom> room = called(*context, reactor, request->author());
+    if (!room) return reactor;
+    // A journal is read, which takes a while.
+    rooms_.files.run([this, room, reactor, request, response] {
+      const Result<Shown> shown = room->demonstrations().begin(
+          rooms_, *room, AuthorId{request->author()},
+          {.room = request->room(), .of = AuthorId{request->of_author()}, .from = RoomSeq{request->from_room_seq()},
+           .to = RoomSeq{request->to_room_seq()}, .speed = request->speed()});
+      if (!shown) return reactor->Finish(status_of(shown.error()));
+      response->set_demonstrator(shown->demonstrator.value);
+      response->set_cuts(static_cast<std::uint32_t>(shown->cuts));
+      reactor->Finish(Status::OK);
+    });
+    return reactor;
+  }
+
+  grpc::ServerUnaryReactor* EndDemonstration(grpc::CallbackServerContext* context, const v1::EndDemonstrationRequest* request,
+                                             v1::EndDemonstrationResponse*) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    const std::shared_ptr<OpenRoom> room = called(*context, reactor, request->author());
+    if (!room) return reactor;
+    rooms_.files.run([room, reactor, which = AuthorId{request->demonstrator()}] {
+      const Result<void> ended = room->demonstrations().end(which);
+      reactor->Finish(ended ? Status::OK : status_of(ended.error()));
+    });
+    return reactor;
+  }
+
+ private:
+  static grpc::ServerUnaryReactor* refuse(grpc::ServerUnaryReactor* reactor, Status status) {
+    reactor->Finish(std::move(status));
+    return reactor;
+  }
+  // The room that is called by one who has joined it; null once `reactor` was told why not.
+  std::shared_ptr<OpenRoom> called(const grpc::CallbackServerContext& context, grpc::ServerUnaryReactor* reactor, std::uint64_t author) {
+    Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, context, AuthorId{author});
+    if (!room) {
+      reactor->Finish(status_of(room.error()));
+    } else if (!(*room)->host().knows(AuthorId{author})) {
+      reactor->Finish(invalid("author " + std::to_string(author) + " has not joined this room; call Join first"));
+    } else {
+      return std::move(*room);
+    }
+    return nullptr;
+  }
+  template <class Fill>
+  static grpc::ServerUnaryReactor* change(OpenRoom& room, grpc::ServerUnaryReactor* reactor,
+                                          std::function<Result<RoomEvent>(Room&)> event, Fill fill) {
+    room.host().queue_event(std::move(event), [reactor, fill](const Result<RoomEvent>& decided) {
+      if (decided) fill(*decided);
+      reactor->Finish(decided ? Status::OK : status_of(decided.error()));
+    });
+    return reactor;
+  }
+  // Until none of the caller's is left.
+  static void wipe_next(const std::shared_ptr<OpenRoom>& room, AuthorId by, grpc::ServerUnaryReactor* reactor,
+                        v1::AnnotateResponse* response) {
+    room->host().queue_event(
+        [by](Room& r) -> Result<RoomEvent> {
+          for (const auto& [id, drawn] : r.people().annotations())
+            if (drawn.author == by) return r.wipe_off(by, id);
+          return RoomEvent{};
+        },
+        [room, by, reactor, response](const Result<RoomEvent>& decided) {
+          if (!decided) return reactor->Finish(status_of(decided.error()));
+          if (!decided->room_seq) return reactor->Finish(Status::OK);
+          response->set_room_seq(decided->room_seq.value);
+          response->set_annotation(std::get<AnnotationRow>(decided->people).id);
+          wipe_next(room, by, reactor, response);
+        });
+  }
+
+  Rooms& rooms_;
+};
+
+}  // namespace
+
+std::unique_ptr<grpc::Service> make_people_service(Rooms& rooms) { return std::make_unique<PeopleServiceImpl>(rooms); }
+
+}  // namespace osteon
