@@ -4,13 +4,16 @@
 #include <cstdio>
 #include <optional>
 #include <string>
+#include <thread>
 
 #include "common/input/space_mouse.hpp"
 #include "common/runtime/command_line.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
 #include "common/runtime/stop_signal.hpp"
+#include "viewer_client/app/console.hpp"
 #include "viewer_client/app/viewer.hpp"
+#include "viewer_client/net/people_client.hpp"
 #include "viewer_client/net/room_watch.hpp"
 #include "viewer_client/render/window.hpp"
 
@@ -52,9 +55,9 @@ constexpr const char* kScriptHelp =
 
 struct Arguments {
   wire::DoorArguments door;
-  std::string server, room, size = "1280x720", script, screenshot, frame_log, summary;
+  std::string server, room, name, size = "1280x720", script, screenshot, frame_log, summary;
   double patience_s = 5.0;
-  bool space_mouse = false;
+  bool space_mouse = false, console = false;
 };
 
 Result<WindowOptions> window_options(const std::string& size) {
@@ -72,7 +75,36 @@ Result<WindowOptions> window_options(const std::string& size) {
                  "--size " + size + " is not a size: give WIDTHxHEIGHT in pixels, each 64 to 8192, as in 1280x720");
 }
 
+// Commands as they come, until the input ends.
+Result<void> run_console(const Arguments& arguments) {
+  StopSignal stop;
+  const Result<wire::Door> door = wire::door_of(arguments.door);
+  if (!door) return tl::unexpected(door.error());
+  PeopleClientOptions options{.address = arguments.server, .room = arguments.room, .door = *door};
+  if (!arguments.name.empty()) options.name = arguments.name;
+  options.patience = std::chrono::milliseconds(static_cast<long>(1000.0 * arguments.patience_s));
+  const auto room = PeopleClient::start(options, [&stop] { return stop.requested(); });
+  if (!room) return tl::unexpected(room.error());
+  auto lines = ScriptReader::open("-");
+  if (!lines) return tl::unexpected(lines.error());
+  Console console(**room);
+  while (!console.over() && !lines->ended() && !stop.requested()) {
+    if (const auto failed = (*room)->failure_seen()) return tl::unexpected(*failed);
+    const std::optional<std::string> line = lines->next();
+    if (!line) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      continue;
+    }
+    const std::optional<std::string> answer = console.answer(*line);
+    if (!answer) continue;
+    std::printf("%s\n", answer->c_str());
+    std::fflush(stdout);
+  }
+  return {};
+}
+
 Result<void> run(const Arguments& arguments) {
+  if (arguments.console) return run_console(arguments);
   StopSignal stop;
 
   // What can be wrong with the arguments is told before anything is started.
@@ -98,6 +130,7 @@ Result<void> run(const Arguments& arguments) {
   watch_options.address = arguments.server;
   watch_options.room = arguments.room;
   watch_options.door = *door;
+  if (!arguments.name.empty()) watch_options.name = arguments.name;
   watch_options.patience = std::chrono::milliseconds(static_cast<long>(1000.0 * arguments.patience_s));
   watch_options.keep_trying = !scripted;
   const auto seen_from = [size = *window_size](const CameraView& view) { return look_of(view, size.width_px, size.height_px); };
@@ -170,8 +203,10 @@ Result<void> run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   Arguments arguments;
   CLI::App app{"Shows the bone of an Osteon server and the tools that work on it.", kProgram};
-  app.footer(kScriptHelp);
-  app.add_option("--server", arguments.server, "Address of the server, HOST:PORT")->required();
+  app.footer(std::string(kScriptHelp) + "\n\n" + Console::help());
+  app.add_option("--server,--connect", arguments.server, "Address of the server, HOST:PORT")->required();
+  app.add_option("--name", arguments.name, "Who you are, shown to others");
+  app.add_flag("--console", arguments.console, "No window: oversee the room by commands on standard input");
   app.add_option("--room", arguments.room, "Name of the room; not needed where the server has one");
   wire::add_door_options(app, arguments.door);
   app.add_option("--size", arguments.size, "Size of the window in pixels")->capture_default_str();

@@ -1,0 +1,55 @@
+// An instructor's connection to a room: hears of its people and asks for what they may decide.
+#pragma once
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "common/core/result.hpp"
+#include "common/wire/door.hpp"
+#include "viewer_client/scene/room_desk.hpp"
+
+namespace osteon {
+
+struct PeopleClientOptions {
+  std::string address;           // host:port
+  std::string room{};            // empty: the only one that is open
+  wire::Door door{};
+  std::string name = "console";  // shown to others
+  std::chrono::milliseconds patience{5000};
+};
+
+// Any thread. It has one thread, which reads; a lost connection is made again until the room refuses it.
+class PeopleClient final : public RoomDesk {
+ public:
+  // Joins, and waits for the first news. Errors: those of wire::join_room.
+  [[nodiscard]] static Result<std::unique_ptr<PeopleClient>> start(const PeopleClientOptions& options, std::function<bool()> stop);
+  ~PeopleClient() override;
+  // What went wrong for good.
+  [[nodiscard]] std::optional<Error> failure_seen() const;
+
+  AuthorId self() const override;
+  std::vector<PersonSeen> people() const override;
+  std::vector<Annotation> annotations() const override;
+  std::vector<WordsSeen> words() const override;
+  bool wait(const std::function<bool()>& done, std::chrono::milliseconds patience) const override;
+  Result<RoomSeq> supervise(AuthorId subject, const Supervision& supervision) override;
+  Result<std::pair<RoomSeq, std::size_t>> undo(const WhatToUndo& what) override;
+  Result<std::pair<RoomSeq, std::size_t>> redo(std::uint32_t count) override;
+  Result<RoomSeq> mark(const std::string& label) override;
+  Result<std::uint32_t> draw(const Annotation& drawn) override;
+  Result<void> wipe_off(std::uint32_t annotation) override;
+  Result<RoomSeq> say(AuthorId to, const std::string& words) override;
+  Result<std::pair<AuthorId, std::size_t>> demonstrate(const WhatToDemonstrate& what) override;
+  Result<void> end_demonstration(AuthorId demonstrator) override;
+  Result<std::vector<std::pair<std::string, Digest>>> tools() override;
+  Result<RoomSeen> status() override;
+
+ private:
+  struct Impl;
+  explicit PeopleClient(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace osteon
