@@ -25,6 +25,9 @@ std::optional<EventKind> kind_of(const RoomRow& row) {
     EventKind operator()(const ItemRow&) const { return EventKind::scene; }
     EventKind operator()(const ToolRow&) const { return EventKind::tool; }
     EventKind operator()(const MarkRow&) const { return EventKind::mark; }
+    EventKind operator()(const SuperviseRow&) const { return EventKind::supervise; }
+    EventKind operator()(const AnnotationRow&) const { return EventKind::annotation; }
+    EventKind operator()(const WordsRow&) const { return EventKind::words; }
   };
   return std::visit(Kind{}, row.what);
 }
@@ -44,6 +47,7 @@ std::string_view name(Invariant invariant) {
     case Invariant::decided: return "decided";
     case Invariant::served: return "served";
     case Invariant::datagrams: return "datagrams";
+    case Invariant::overseen: return "overseen";
     case Invariant::settled: return "settled";
   }
   return "unknown";
@@ -103,6 +107,7 @@ void Ledger::check_rows(std::span<const RoomRow> rows) {
           "the room was said to stand at " + number(furthest_) + ", and " + std::to_string(rows.size()) + " rows are kept");
   std::map<AuthorId, std::uint64_t> newest, lease;  // of the leases that are not 1
   std::map<RoomSeq, bool> of_bone;                  // places of events that can be undone: whether bone comes back with them
+  std::map<AuthorId, Supervision> held;
   const auto lease_of = [&](AuthorId author) {
     const auto found = lease.find(author);
     return found == lease.end() ? std::uint64_t{1} : found->second;
@@ -120,6 +125,10 @@ void Ledger::check_rows(std::span<const RoomRow> rows) {
             "row " + number(row.place) + ", " + whose(cut->cut.author, cut->cut.author_seq) + ", is of lease " +
                 std::to_string(cut->cut.lease_epoch) + " where " + std::to_string(lease_of(cut->cut.author)) + " holds");
       of_bone[row.place] = true;
+      const Rejection breached = breach(held[cut->cut.author], cut->cut);
+      check(breached == Rejection::none, Invariant::overseen,
+            "row " + number(row.place) + ", " + whose(cut->cut.author, cut->cut.author_seq) + ", is what was forbidden: " +
+                std::string(sentence(breached)));
     } else if (const auto* rejection = std::get_if<RejectionRow>(&row.what)) {
       kept = {EventKind::cut, true, rejection->author, rejection->author_seq, {}};
       check_author(row, rejection->author, rejection->author_seq, rejection->bytes, newest);
@@ -132,6 +141,11 @@ void Ledger::check_rows(std::span<const RoomRow> rows) {
       }
     } else if (const auto* join = std::get_if<JoinRow>(&row.what)) {
       lease[join->author] = 1;
+    } else if (const auto* decided = std::get_if<SuperviseRow>(&row.what)) {
+      Supervision& before = held[decided->subject];
+      const Supervision& now = decided->supervision;
+      if (before.stopped != now.stopped || before.taken_by != now.taken_by) lease[decided->subject] = row.place.value + 1;
+      before = now;
     } else if (const auto* undo = std::get_if<UndoRow>(&row.what)) {
       bone_back = std::ranges::any_of(undo->places, [&](RoomSeq place) { return of_bone[place]; });
     } else if (const auto* redo = std::get_if<RedoRow>(&row.what)) {
@@ -148,6 +162,13 @@ void Ledger::check_rows(std::span<const RoomRow> rows) {
   for (const auto& [author, author_seq] : decided_)
     check(newest[author] >= author_seq, Invariant::acknowledged,
           whose(author, author_seq) + " was said to be decided, and is not kept");
+}
+
+std::map<AuthorId, Supervision> Ledger::held(std::span<const RoomRow> rows) {
+  std::map<AuthorId, Supervision> held;
+  for (const RoomRow& row : rows)
+    if (const auto* decided = std::get_if<SuperviseRow>(&row.what)) held[decided->subject] = decided->supervision;
+  return held;
 }
 
 std::optional<std::vector<Cut>> Ledger::standing(std::span<const RoomRow> rows) {

@@ -25,6 +25,7 @@ enum class Invariant {
   decided,         // every cut of a client that is there is decided
   served,          // nobody is turned away, and what must work works
   datagrams,       // only what a peer has sealed is taken, once, and it says what the stream says
+  overseen,        // what an instructor forbids is not committed, and after quiet each hand knows what holds for it
   settled,         // after quiet all is decided and told within two seconds
 };
 [[nodiscard]] std::string_view name(Invariant invariant);
@@ -54,6 +55,8 @@ class Ledger {
 
   // Everything that the rows of a journal can be held against.
   void check_rows(std::span<const RoomRow> rows);
+  // What holds for each hand of whom anything was decided.
+  [[nodiscard]] static std::map<AuthorId, Supervision> held(std::span<const RoomRow> rows);
   // Cuts that no undo has taken back; nothing when pieces came apart.
   [[nodiscard]] static std::optional<std::vector<Cut>> standing(std::span<const RoomRow> rows);
 

@@ -13,6 +13,7 @@ TEST(Simulation, KeepsItsPromisesWhateverHappens) {
     const SimulationReport one = simulate_quietly(seed);
     expect_no_faults(one, "");
     sum.committed += one.committed, sum.rejected += one.rejected, sum.undone += one.undone, sum.crashes += one.crashes;
+    sum.decisions += one.decisions, sum.forbidden += one.forbidden;
     sum.disk_failures += one.disk_failures, sum.breaks += one.breaks, sum.resumed += one.resumed;
     fast_path += one.fast_path ? 1 : 0;
     sum.datagrams.opened += one.datagrams.opened, sum.datagrams.forged += one.datagrams.forged;
@@ -23,6 +24,8 @@ TEST(Simulation, KeepsItsPromisesWhateverHappens) {
   EXPECT_GT(sum.committed, 5000u);
   EXPECT_GT(sum.rejected, 300u);
   EXPECT_GT(sum.undone, 100u);
+  EXPECT_GT(sum.decisions, 500u);
+  EXPECT_GT(sum.forbidden, 100u);
   EXPECT_GT(sum.crashes, 300u);
   EXPECT_GT(sum.disk_failures, 10u);
   EXPECT_GT(sum.breaks, 300u);
@@ -55,6 +58,8 @@ TEST(Simulation, FindsRowsThatAreLeftOut) { EXPECT_GT(found(Breakage::skipping, 
 TEST(Simulation, FindsCutsThatAreTakenTwice) { EXPECT_GT(found(Breakage::dedup, 40), 0u); }
 TEST(Simulation, FindsAReplicaThatDoesNotComeBackRight) { EXPECT_GT(found(Breakage::replica, 40), 0u); }
 TEST(Simulation, FindsAJournalThatWaitsForNoDisk) { EXPECT_GT(found(Breakage::forgetful, 40), 0u); }
+
+TEST(Simulation, FindsAHandThatIsNotTold) { EXPECT_GT(found(Breakage::unsaid, 40), 0u); }
 
 TEST(Simulation, FindsRowsThatDatagramsLose) { EXPECT_GT(found(Breakage::pruning, 150), 0u); }
 

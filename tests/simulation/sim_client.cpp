@@ -288,6 +288,11 @@ void SimClient::compare(const v1::SessionResponse& response) {
     if (response.has_rejected())
       return row.kind == wire::SessionRowKind::rejected && row.room_seq.value == response.rejected().room_seq() &&
              row.author_seq == response.rejected().author_seq() && row.lease_epoch == response.rejected().lease_epoch();
+    if (response.has_supervised()) {
+      const Result<Supervision> decided = wire::from_wire(response.supervised().supervision());
+      return row.kind == wire::SessionRowKind::supervised && row.room_seq.value == response.supervised().room_seq() &&
+             row.lease_epoch == response.supervised().lease_epoch() && decided && *decided == row.supervision;
+    }
     return false;
   }();
   ledger_.check(same, Invariant::datagrams,
@@ -323,6 +328,14 @@ RoomEvents SimClient::events() {
     pass(std::move(part));
   };
   events.scene = [this](RoomSeq place, const std::vector<SceneItem>&) { pass(Noted{place}); };
+  events.supervised = [this](const HandSupervised& decided) {
+    if (decided.place) ledger_.told_event(decided.place, EventKind::supervise);
+    pass(decided);
+  };
+  events.said = [this](const WordsSaid& said) {
+    ledger_.told_event(said.place, EventKind::words);
+    pass(Noted{said.place});
+  };
   events.noted = [this](RoomSeq place) { pass(Noted{place}); };
   return events;
 }
@@ -396,6 +409,14 @@ void SimClient::take(const Rejected& rejected) {
 void SimClient::take(const BonePart& part) {
   replica_->change(part.place, part.bodies, part.leaves);
   follow_lease(part.lease_epoch);
+}
+
+// The lease of what held before the leaves comes with them.
+void SimClient::take(const HandSupervised& decided) {
+  held_ = decided.supervision;
+  if (!decided.place) return;
+  replica_->note(decided.place);
+  follow_lease(decided.lease_epoch);
 }
 
 void SimClient::follow_lease(std::uint64_t epoch) {
@@ -494,6 +515,8 @@ void SimClient::do_something_else() {
   }
   if (chance(hand_.redo)) return change([count](Room& room, AuthorId by) { return room.redo_last(by, count); });
   if (chance(hand_.mark)) return change([](Room& room, AuthorId by) { return room.mark(by, "here"); });
+  if (chance(hand_.oversee)) return oversee();
+  if (chance(hand_.say)) return change([](Room& room, AuthorId by) { return room.say(by, {}, "well done"); });
   if (chance(hand_.again) && stream_ && underway_->may_go() && stream_->writable(SimStream::client)) {
     // Sent again although it is decided: the answer was lost, for all the server knows.
     const std::size_t sent = own_.size() - underway_->undecided();
@@ -502,6 +525,25 @@ void SimClient::do_something_else() {
     *request.mutable_cut() = wire::to_wire(own_[random_.index(sent)]);
     stream_->write(SimStream::client, request.SerializeAsString());
   }
+}
+
+// Everybody is an instructor here, and nobody heeds what they are told: their cuts go on, for the room to refuse.
+void SimClient::oversee() {
+  Supervision word;
+  const double which = random_.unit();
+  word.stopped = which < 0.2;
+  if (which >= 0.2 && which < 0.3) word.taken_by = room_->author;
+  if (which >= 0.3 && which < 0.4) word.zone = ZoneLimit{at_.position, 1 + static_cast<std::int32_t>(random_.index(4096))};
+  if (which >= 0.4 && which < 0.5) word.tools = {hand_.tools[random_.index(hand_.tools.size())].hash()};
+  if (which < 0.6) word.words = "as I say";
+  const std::uint64_t pick = random_.index(1000);
+  change([word, pick](Room& room, AuthorId by) -> Result<RoomEvent> {
+    // Of those who came last: others may have gone.
+    const AuthorId subject{room.authors() - pick % std::min<std::uint64_t>(room.authors(), 4)};
+    Supervision said = word;
+    if (said.taken_by == subject) said.taken_by = {};
+    return room.supervise(by, subject, said);
+  });
 }
 
 void SimClient::change(std::function<Result<RoomEvent>(Room&, AuthorId)> change) {

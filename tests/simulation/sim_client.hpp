@@ -31,7 +31,7 @@ struct HandPlan {
   int run = 8;                   // cuts behind each other, at most
   std::chrono::nanoseconds pause_most = std::chrono::milliseconds(800);  // between two runs
   // Between two runs, with these chances:
-  double undo = 0.12, redo = 0.06, mark = 0.05, again = 0.15, beyond = 0.08;
+  double undo = 0.12, redo = 0.06, mark = 0.05, again = 0.15, beyond = 0.08, oversee = 0.35, say = 0.05;
 };
 
 // How a client's datagrams fare.
@@ -70,6 +70,8 @@ class SimClient {
   // It is on the line, and what the network has held back until now has come.
   [[nodiscard]] bool connected() const;
   [[nodiscard]] std::string standing() const;        // for messages
+  [[nodiscard]] AuthorId author() const { return room_ ? room_->author : AuthorId{}; }
+  [[nodiscard]] const Supervision& held() const { return held_; }  // for its hand, as it was told
   [[nodiscard]] Digest hash() const { return replica_->hash(); }
   [[nodiscard]] RoomSeq room_seq() const { return replica_->room_seq(); }
   [[nodiscard]] std::uint64_t cuts() const { return cuts_made_; }
@@ -93,7 +95,7 @@ class SimClient {
     RoomSeq place;
   };
   struct Interrupted {};
-  using FromRoom = std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, Noted, Interrupted>;
+  using FromRoom = std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, Noted, HandSupervised, Interrupted>;
 
   template <class Answer>
   void ask(std::function<void(std::function<void(const Result<Answer>&)>)> request, Time patience,
@@ -123,6 +125,7 @@ class SimClient {
   void take(const Committed& committed);
   void take(const Rejected& rejected);
   void take(const BonePart& part);
+  void take(const HandSupervised& decided);
   void take(const Noted& noted) { replica_->note(noted.place); }
   void take(const Interrupted&);
   void follow_lease(std::uint64_t epoch);
@@ -131,6 +134,7 @@ class SimClient {
   void move_hand();
   void cut(int left);
   void do_something_else();
+  void oversee();
   void change(std::function<Result<RoomEvent>(Room&, AuthorId)> change);
 
   VirtualTime& time_;
@@ -174,6 +178,7 @@ class SimClient {
   std::vector<Cut> own_;
   bool work_planned_ = false, bone_is_here_ = false, interrupted_ = false, heard_ = false;
   std::uint64_t lease_epoch_ = 0;
+  Supervision held_;
   std::map<std::uint64_t, std::uint64_t> felt_;      // own cuts that must be predicted: their leases
   QuantisedPose at_;
 };

@@ -81,6 +81,8 @@ class SimServer::Session final : public SessionSink,
     if (closing_ || done_) return;
     const auto chance = [&] { return outbox_.takes(place) && server_.random_.index(8) == 0; };
     if (server_.condition_.breakage == Breakage::skipping && chance()) return;
+    if (server_.condition_.breakage == Breakage::unsaid && fast.kind == wire::SessionRowKind::supervised && server_.random_.index(2) == 0)
+      return tell(place, noted_row(place, {}), {.room_seq = place});
     if (server_.condition_.breakage == Breakage::ordering) {
       if (!held_back_ && chance()) {
         held_back_.emplace(HeldBack{place, row, fast});
@@ -92,6 +94,9 @@ class SimServer::Session final : public SessionSink,
       return;
     }
     tell(place, row, fast);
+  }
+  void hold(const wire::SessionRow& supervised) override {
+    if (link_) link_->tell(0, supervised);
   }
   void know_tool(std::uint32_t number, const Digest& tool) override {
     if (link_) link_->know_tool(number, tool);
@@ -489,7 +494,7 @@ void SimServer::join(const JoinRequest& request, std::function<void(const Result
     answer(Joined{*author, keeper_->server_epoch(), host_->lease_epoch(*author), secret});
   };
   if (!request.resume) {
-    host_->join(MemberKind::surgeon, request.name, digest_of_secret(secret), reply);
+    host_->join(MemberKind::surgeon, request.name, digest_of_secret(secret), Role::none, reply);
   } else if (const Result<void> may = host_->resume(request.resume, digest_of_secret(secret), request.kept); !may) {
     reply(tl::unexpected(may.error()));
   } else {

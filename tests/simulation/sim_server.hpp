@@ -26,6 +26,7 @@ enum class Breakage {
   skipping,     // now and then a row is left out
   replica,      // on coming back a client takes leaves over what it holds, instead of taking on what is held there
   forgetful,    // the journal waits for no disk
+  unsaid,       // now and then a hand is not told what was decided about it
   pruning,      // what goes in datagrams is not said over the stream, before the client says that it has come
 };
 

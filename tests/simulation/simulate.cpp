@@ -97,6 +97,9 @@ class Simulation {
       report.committed += std::holds_alternative<CutRow>(row.what);
       report.rejected += std::holds_alternative<RejectionRow>(row.what);
       report.undone += std::holds_alternative<UndoRow>(row.what);
+      report.decisions += std::holds_alternative<SuperviseRow>(row.what);
+      const auto* rejection = std::get_if<RejectionRow>(&row.what);
+      report.forbidden += rejection != nullptr && rejection->reason >= Rejection::frozen;
       report.splits += std::holds_alternative<SplitRow>(row.what);
     }
   }
@@ -277,6 +280,13 @@ class Simulation {
     rows_ = server_.rows();
     ledger_.check(rows_.size() == status.room_seq.value, Invariant::replay, "the journal ends elsewhere than the room");
     ledger_.check(server_.replayed() == live, Invariant::replay, "the journal's rows make another room");
+    const std::map<AuthorId, Supervision> held = Ledger::held(rows_);
+    for (const auto& client : clients_) {
+      if (!client->here() || !client->settled()) continue;
+      const auto own = held.find(client->author());
+      ledger_.check(client->held() == (own == held.end() ? Supervision{} : own->second), Invariant::overseen,
+                    "a hand does not know what holds for it: " + client->standing());
+    }
     if (const auto standing = Ledger::standing(rows_)) check_set(*standing, status.field_hash);
     ledger_.check(server_.reopened(false) == live, Invariant::replay, "the room is another one after it was opened again");
     ledger_.check(server_.reopened(true) == live, Invariant::replay, "a checkpoint makes another room");
