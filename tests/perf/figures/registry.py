@@ -395,6 +395,17 @@ FIGURES = [
           ("all", "all of these together"))],
     Figure("felt_stage_close", "ms", "from a motion until its cut closes, at most, by construction", "felt_stages",
            baseline="at 40 +- 10 ms and 30 % loss", full=True),
+    # An instructor's word.
+    Figure("freeze_p99", "ms", "from the answer to an instructor who stops a hand until its loop cuts no more, less the time "
+           "of the way, 99th percentile of the worst of 0, 50 and 150 ms one way; two ticks of the server are 16.7 ms", "override",
+           ("<=", 16.7), baseline="median", full=True),
+    Figure("freeze_p99_loss", "ms", "the same with 30 % of the datagrams lost", "override", baseline="median", full=True),
+    Figure("freeze_missing", "count", "words that stopped no hand before the next, on all these lines", "override", ("==", 0),
+           full=True),
+    Figure("override_force_step", "ratio", "largest growth of force in a tick that the hand did not cause, of hands that are "
+           "stopped, taken over, given back, limited, led and undone under, over the slew limit", "override", ("<=", 1.0), full=True),
+    Figure("override_energy", "ratio", "most that one contact, or the pull of a leading hand, gave such a hand beyond what it "
+           "got, as a part of 0.01 mJ", "override", ("<=", 1.0), full=True),
     # What one tool costs its line and its room's disk.
     Figure("uplink_cutting", "kbit_per_s", "a tool's uplink while it cuts: sealed datagrams and the stream's bytes and "
            "acknowledgements, headers included", "uplink", ("<=", 300.0), full=True),

@@ -196,6 +196,33 @@ def observers(run):
     }
 
 
-GROUPS = {"simulated": simulated, "simulated_full": simulated_full, "simulated_broken": simulated_broken, "journal": journal,
+def override(run):
+    run.say("how soon and how gently an instructor's word takes hold")
+    out = json.loads(run.output("osteon-override", 100 if run.soak else 40))
+    rows = [("one way ms", "loss", "stopped", "p50 ms", "p99 ms", "most ms", "from asking p50 ms", "p99 ms", "cuts refused")]
+    for line in out["lines"]:
+        after, asked = line["after_answer"], line["after_asking"]
+        rows.append((line["one_way_ms"], line["loss"], f"{line['stopped']} of {line['asked']}", after["p50"], after["p99"],
+                     after["max"], asked["p50"], asked["p99"], line["cuts_stopped"]))
+    run.tables.append(("From an instructor's word until the hand cuts no more, less the way; hand and line are simulated", rows))
+    touch = out["touch"]
+    run.tables.append(("What hands feel of it", [(name, value) for name, value in touch.items()]))
+    whole = [line for line in out["lines"] if line["loss"] == 0]
+    lossy = [line for line in out["lines"] if line["loss"] > 0]
+    def worst(lines, what):
+        return max(line["after_answer"][what] for line in lines)
+
+    missing = sum(line["asked"] - line["stopped"] for line in out["lines"])
+    return {
+        "freeze_p99": (worst(whole, "p99"), worst(whole, "p50")),
+        "freeze_p99_loss": (worst(lossy, "p99"), worst(lossy, "p50")),
+        "freeze_missing": (missing, None),
+        "override_force_step": (touch["step_over_slew"], None),
+        "override_energy": (max(touch["contact_mj"], touch["led_mj"]) / touch["budget_mj"], None),
+    }
+
+
+GROUPS = {"override": override,
+          "simulated": simulated, "simulated_full": simulated_full, "simulated_broken": simulated_broken, "journal": journal,
           "server_kills": server_kills, "bad_network": bad_network, "felt_stages": felt_stages, "uplink": uplink,
           "rooms_per_core": rooms_per_core, "forgery": forgery, "observers": observers}
