@@ -69,6 +69,12 @@ void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
     if (!newer) return half_.malformed();
     if (*newer) states.push_back(std::move(state));
   }
+  std::optional<BoneSeen> bone;
+  if (packet.has_bone()) {
+    const auto seen = from_wire(packet.bone());
+    if (!seen) return half_.malformed();
+    bone = *seen;
+  }
 
   half_.left_out(left_out);
   if (!token.empty()) {
@@ -90,6 +96,10 @@ void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
     if (row.row.kind != SessionRowKind::streamed) rows_.offer(row.index, row.row);
   if (!rows->empty() || left_out > 0) half_.answer();
   for (HeardState& state : states) keep_partner(std::move(state), now);
+  if (bone && bone->seen_seq > bone_seq_) {
+    bone_ = bone;
+    bone_seq_ = bone->seen_seq;
+  }
 }
 
 void ClientLink::keep_partner(HeardState state, Time now) {
@@ -118,6 +128,8 @@ Time ClientLink::state_due() const {
   return state_ && at_the_bone(*state_) ? effort_at_ + half_.options().effort_interval : Time::max();
 }
 
+Time ClientLink::push_due() const { return push_ ? pushed_at_ + half_.options().bone_interval : Time::max(); }
+
 // A part of the packet that goes now, empty where there is nothing new to say.
 v1::UpPacket ClientLink::state_part(Time now) const {
   v1::UpPacket part;
@@ -135,7 +147,7 @@ void ClientLink::said_state(const v1::UpPacket& part, Time now) {
   moved_ = false;
 }
 
-Time ClientLink::next(Time now) const { return half_.next(now, state_due()); }
+Time ClientLink::next(Time now) const { return half_.next(now, std::min(state_due(), push_due())); }
 
 std::span<const std::uint8_t> ClientLink::send(Time now, std::span<std::uint8_t> into) {
   if (next(now) > now) return {};
@@ -148,7 +160,13 @@ std::span<const std::uint8_t> ClientLink::send(Time now, std::span<std::uint8_t>
   }
   const bool has_room = filler.add(head);
   OSTEON_CHECK(has_room);
-  // The state goes before repeated cuts, but not before a cut that would never find room beside it.
+  // Push and state go before repeated cuts, but not before a cut that would never find room beside it.
+  v1::UpPacket push;
+  if (push_due() <= now) *push.mutable_push() = to_wire(*push_);
+  if (push.has_push() && push.ByteSizeLong() + half_.window().least_room(now) <= filler.room() && filler.add(push)) {
+    push_.reset();
+    pushed_at_ = now;
+  }
   const v1::UpPacket state = state_part(now);
   if (state.ByteSizeLong() + half_.window().least_room(now) <= filler.room() && filler.add(state)) said_state(state, now);
   half_.add_items(filler, now);

@@ -28,6 +28,7 @@ struct LinkOptions {
   PoseDeadband deadband;
   std::chrono::nanoseconds effort_interval = std::chrono::milliseconds(33);   // between forces and the like of one tool
   std::chrono::nanoseconds state_interval = std::chrono::milliseconds(16);    // between states of one tool that moves
+  std::chrono::nanoseconds bone_interval = std::chrono::milliseconds(8);      // between pushes, and between places of the bone
   std::chrono::nanoseconds times_interval = std::chrono::milliseconds(30);    // between packets that hold times
 };
 // The way down has no limit as tight as the way up, and what a session is told waits for its next packet.

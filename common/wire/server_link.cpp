@@ -48,6 +48,12 @@ void ServerLink::receive(const Endpoint& from, std::span<const std::uint8_t> dat
   HeardState state = state_;
   const auto newer = packet.has_state() ? take_over(packet.state(), state) : false;
   if (!newer) return half_.malformed();
+  std::optional<BonePush> push;
+  if (packet.has_push()) {
+    const auto read = from_wire(packet.push());
+    if (!read) return half_.malformed();
+    push = *read;
+  }
 
   half_.left_out(left_out);
   path_.heard(from, opened->newest, datagram.size(), now);
@@ -63,6 +69,10 @@ void ServerLink::receive(const Endpoint& from, std::span<const std::uint8_t> dat
     state_ = std::move(state);
     state_.state.author = author_;
     state_is_new_ = true;
+  }
+  if (push && push->push_seq > push_seq_) {
+    push_ = push;
+    push_seq_ = push->push_seq;
   }
 }
 
@@ -121,9 +131,11 @@ Time ServerLink::due(const Partner& partner) const {
   return partner.said_at + (is_new ? half_.options().state_interval : kPartnerRefresh);
 }
 
+Time ServerLink::bone_due() const { return bone_ ? bone_at_ + half_.options().bone_interval : Time::max(); }
+
 Time ServerLink::next(Time now) const {
   if (!path_.address().is_set()) return Time::max();
-  Time wanted = Time::max();
+  Time wanted = bone_due();
   for (const auto& [author, partner] : partners_) wanted = std::min(wanted, due(partner));
   return half_.next(now, wanted);
 }
@@ -148,6 +160,12 @@ std::optional<ServerLink::Out> ServerLink::send(Time now, std::span<std::uint8_t
   head.set_frozen(frozen_);
   const bool has_room = filler.add(head);
   OSTEON_CHECK(has_room);
+  v1::DownPacket bone;
+  if (bone_due() <= now) *bone.mutable_bone() = to_wire(*bone_);
+  if (bone.has_bone() && bone.ByteSizeLong() + half_.window().least_room(now) <= filler.room() && filler.add(bone)) {
+    bone_.reset();
+    bone_at_ = now;
+  }
   // Tools may take half of the room before rows, which are repeated as far as it goes, and then what is left.
   add_partners(filler, now, std::max(filler.room() / 2, half_.window().least_room(now)));
   half_.add_items(filler, now);

@@ -5,9 +5,11 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include "common/link/path_watch.hpp"
 #include "common/link/receive_window.hpp"
+#include "common/wire/bone_motion.hpp"
 #include "common/wire/cut_run.hpp"
 #include "common/wire/link_half.hpp"
 #include "common/wire/tool_state.hpp"
@@ -39,6 +41,8 @@ class ServerLink {
   void decided(std::uint64_t author_seq);
   // Newest state of the tool, once.
   [[nodiscard]] std::optional<HeardState> take_state();
+  // Newest push on the bone, once.
+  [[nodiscard]] std::optional<BonePush> take_push() { return std::exchange(push_, std::nullopt); }
 
   // Every row of the session, in order of its index. False: the client gets it over the stream only, since it is of kind
   // streamed or too long for a packet, or since too much is unacknowledged. While the link is not alive(), every row above
@@ -53,6 +57,8 @@ class ServerLink {
   void forget(AuthorId author) { sender_.forget(author); }
   // Newest states of others' tools; at most kMostPartners count. Who is not among them is not spoken of any more.
   void set_partners(std::span<const HeardState> partners);
+  // Newest place of the bone on its mount: it goes once, soon, where none newer comes before.
+  void set_bone(const BoneSeen& bone) { bone_ = bone; }
   void set_lease_epoch(std::uint64_t epoch);
   void set_frozen(bool frozen);
 
@@ -84,6 +90,7 @@ class ServerLink {
     Time said_at = -std::chrono::hours(1), effort_at = said_at;
   };
   [[nodiscard]] Time due(const Partner& partner) const;
+  [[nodiscard]] Time bone_due() const;
   [[nodiscard]] std::optional<Out> challenge(Time now, std::span<std::uint8_t> into);
   void add_partners(PacketFiller<v1::DownPacket>& filler, Time now, std::size_t keep_free);
 
@@ -95,6 +102,10 @@ class ServerLink {
   std::uint64_t decided_;
   HeardState state_;
   bool state_is_new_ = false;
+  std::optional<BonePush> push_;   // newest that was not taken
+  std::uint64_t push_seq_ = 0;
+  std::optional<BoneSeen> bone_;   // newest that has not gone
+  Time bone_at_ = -std::chrono::hours(1);
 
   RowSender sender_;
   std::map<std::uint64_t, Partner> partners_;  // by author
