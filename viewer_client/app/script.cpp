@@ -68,13 +68,14 @@ Parsed parse_wait(const std::vector<std::string_view>& words) {
   if (words.size() == 3 && words[1] == "seq") {
     if (const auto seq = number<std::uint64_t>(words[2])) return Command(WaitForSeq{RoomSeq{*seq}});
   }
-  if (words.size() == 3 && (words[1] == "bodies" || words[1] == "items")) {
+  if (words.size() == 3 && (words[1] == "bodies" || words[1] == "items" || words[1] == "drawn")) {
     if (const auto count = number<std::size_t>(words[2])) {
+      if (words[1] == "drawn") return Command(WaitForDrawn{*count});
       if (words[1] == "bodies") return Command(WaitForBodies{*count});
       return Command(WaitForItems{*count});
     }
   }
-  return expected("wait surface`, `wait seq NUMBER`, `wait bodies NUMBER` or `wait items NUMBER");
+  return expected("wait surface`, `wait seq NUMBER`, `wait bodies NUMBER`, `wait items NUMBER` or `wait drawn NUMBER");
 }
 
 // undo N, redo N, take-away BODY: one number.
@@ -149,6 +150,58 @@ Parsed parse_item_command(const std::vector<std::string_view>& words) {
   return Command(RoomRequest(seat));
 }
 
+// A name, which may stand in quotes.
+std::string unquoted(std::string name) {
+  if (name.size() > 1 && name.front() == '"' && name.back() == '"') return name.substr(1, name.size() - 2);
+  return name;
+}
+
+// look as WHO, follow WHO.
+Parsed parse_who(std::string_view line, const std::vector<std::string_view>& words) {
+  const bool look = words[0] == "look";
+  const std::string who = unquoted(rest_of(line, look ? words[1] : words[0]));
+  if (who.empty()) return expected(look ? "look as WHO" : "follow WHO` or `follow off");
+  if (look) return Command(LookAs{who});
+  return Command(Follow{who == "off" ? "" : who});
+}
+
+// point X Y Z [WORDS], label X Y Z WORDS, draw X Y Z X Y Z ...
+Parsed parse_draw(std::string_view line, const std::vector<std::string_view>& words) {
+  const std::string_view verb = words[0];
+  const std::string_view form = verb == "draw"    ? "draw X Y Z X Y Z`, with as many more points as you like, `X Y Z"
+                                : verb == "point" ? "point X Y Z` or `point X Y Z WORDS"
+                                                  : "label X Y Z WORDS";
+  Draw draw;
+  draw.kind = verb == "draw" ? AnnotationKind::line : verb == "point" ? AnnotationKind::pointer : AnnotationKind::label;
+  const std::size_t end = verb == "draw" ? words.size() : 4;
+  if (words.size() < 4 || (end - 1) % 3 != 0) return expected(form);
+  for (std::size_t first = 1; first < end; first += 3) {
+    const auto point = vector_at(words, first);
+    if (!point) return expected(form);
+    draw.points_mm.push_back(*point);
+  }
+  if (verb != "draw") draw.words = rest_of(line, words[3]);
+  if ((verb == "draw" && draw.points_mm.size() < 2) || (verb == "label" && draw.words.empty())) return expected(form);
+  return Command(draw);
+}
+
+Parsed parse_wipe(const std::vector<std::string_view>& words) {
+  if (words.size() == 2 && words[1] == "all") return Command(WipeOff{});
+  const auto id = words.size() == 2 ? number<std::uint32_t>(words[1]) : std::nullopt;
+  if (!id || *id == 0) return expected("wipe NUMBER` or `wipe all");
+  return Command(WipeOff{*id});
+}
+
+// Who is meant turns out when it is obeyed: only the room knows who there is.
+Parsed parse_say(std::string_view line, const std::vector<std::string_view>& words) {
+  const std::string text = rest_of(line, words[0]);
+  const bool quoted = text.starts_with('"');
+  const std::size_t end = quoted ? text.find('"', 1) : std::min(text.find_first_of(" \t"), text.size());
+  if (text.empty() || end == std::string::npos) return expected("say WORDS`, `say WHO WORDS` or `say \"A NAME\" WORDS");
+  const std::size_t next = text.find_first_not_of(" \t", end + (quoted ? 1 : 0));
+  return Command(Say{quoted ? text.substr(1, end - 1) : text.substr(0, end), next == std::string::npos ? "" : text.substr(next)});
+}
+
 Parsed parse_look(const std::vector<std::string_view>& words) {
   if (words.size() == 2 && words[1] == "overview") return Command(LookAtWhole{});
   if (words.size() == 3 && words[1] == "tool") {
@@ -171,7 +224,7 @@ Parsed parse_look(const std::vector<std::string_view>& words) {
                      "of sight");
     }
   }
-  return expected("look overview`, `look tool DISTANCE_MM` or `look at X Y Z from X Y Z up X Y Z");
+  return expected("look overview`, `look tool DISTANCE_MM`, `look as WHO` or `look at X Y Z from X Y Z up X Y Z");
 }
 
 }  // namespace
@@ -181,7 +234,11 @@ Parsed parse_command(std::string_view line) {
   if (words.empty() || words[0].starts_with('#')) return std::optional<Command>{};
   const std::string_view verb = words[0];
   if (verb == "wait") return parse_wait(words);
+  if (verb == "follow" || (verb == "look" && words.size() > 1 && words[1] == "as")) return parse_who(line, words);
   if (verb == "look") return parse_look(words);
+  if (verb == "point" || verb == "draw" || verb == "label") return parse_draw(line, words);
+  if (verb == "wipe") return parse_wipe(words);
+  if (verb == "say") return parse_say(line, words);
   if (verb == "tool") {
     if (words.size() == 2 && (words[1] == "on" || words[1] == "off")) return Command(ShowTool{words[1] == "on"});
     return expected("tool on` or `tool off");
@@ -210,8 +267,8 @@ Parsed parse_command(std::string_view line) {
   if (verb == "save") return Command(RoomRequest(SaveBone{rest_of(line, verb)}));
   if (verb == "quit" && words.size() == 1) return Command(Quit{});
   return failure(ErrorCode::invalid_input, "there is no command `" + std::string(verb) +
-                                               "`; the commands are wait, look, tool, mark, undo, redo, take-away, place, move, turn, seat, "
-                                               "remove, save, screenshot, status and quit");
+                                               "`; the commands are wait, look, follow, tool, mark, undo, redo, take-away, place, move, "
+                                               "turn, seat, remove, point, draw, label, wipe, say, save, screenshot, status and quit");
 }
 
 Result<ScriptReader> ScriptReader::open(const std::string& file) {

@@ -6,10 +6,12 @@
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "common/core/id.hpp"
 #include "common/core/result.hpp"
 #include "common/geometry/pose.hpp"
+#include "common/tools/annotation.hpp"
 #include "viewer_client/scene/camera_view.hpp"
 #include "viewer_client/scene/item_place.hpp"
 
@@ -41,6 +43,30 @@ struct WaitForBodies {
 };
 struct WaitForItems {
   std::size_t count = 0;
+};
+
+struct WaitForDrawn {
+  std::size_t count = 0;
+};
+
+// Of the people of the room; WHO is a name or #NUMBER.
+struct LookAs {
+  std::string who;
+};
+struct Follow {
+  std::string who;  // empty: nobody any more
+};
+struct Draw {
+  AnnotationKind kind = AnnotationKind::pointer;
+  std::vector<Vec3> points_mm;
+  std::string words;
+};
+struct WipeOff {
+  std::uint32_t annotation = 0;  // 0: all own ones
+};
+struct Say {
+  std::string who;    // "all", a name or #NUMBER; or a first word that nobody is called, which then is said as well
+  std::string words;  // after it
 };
 
 // What is asked of the room; obeyed when its event is drawn.
@@ -86,7 +112,7 @@ struct SaveBone {
 using RoomRequest = std::variant<UndoLast, RedoLast, UndoTo, MarkMoment, TakeAway, PlaceTool, MoveItem, TurnItem, SeatItem, RemoveItem, SaveBone>;
 
 using Command = std::variant<WaitForSurface, WaitForSeq, WaitForBodies, WaitForItems, LookAtWhole, LookFrom, LookAtTool,
-                             ShowTool, SaveScreenshot, SaveStatus, RoomRequest, Quit>;
+                             ShowTool, SaveScreenshot, SaveStatus, RoomRequest, WaitForDrawn, LookAs, Follow, Draw, WipeOff, Say, Quit>;
 
 // Null for an empty line and for one that begins with #. Error invalid_input, naming the form expected.
 [[nodiscard]] Result<std::optional<Command>> parse_command(std::string_view line);

@@ -10,6 +10,7 @@
 #include "common/runtime/files.hpp"
 #include "viewer_client/scene/camera_view.hpp"
 #include "viewer_client/scene/gauges.hpp"
+#include "viewer_client/scene/stroke.hpp"
 
 namespace osteon {
 
@@ -21,6 +22,8 @@ constexpr std::chrono::milliseconds kFramePeriod{33};
 // How long a turn waits for the network; mouse and script are asked as often.
 constexpr std::chrono::milliseconds kTurn{10};
 constexpr double kToolKeyDistance_mm = 120.0;
+// How often it is asked what there is new of the people.
+constexpr std::chrono::milliseconds kMeetings{50};
 
 std::int64_t mono_ns(Clock::time_point at) { return std::chrono::nanoseconds(at.time_since_epoch()).count(); }
 
@@ -47,7 +50,7 @@ Result<Viewer> Viewer::make(const ViewerOptions& options, BoneWindow& window, In
 }
 
 Viewer::Viewer(const ViewerOptions& options, BoneWindow& window, Inbox& inbox, std::optional<ScriptReader> script)
-    : options_(options), window_(&window), inbox_(&inbox), script_(std::move(script)) {}
+    : options_(options), window_(&window), inbox_(&inbox), script_(std::move(script)), people_(options.hand) {}
 
 Result<Viewer::State> Viewer::turn(bool interrupted) {
   inbox_->wait_for(kTurn);
@@ -60,8 +63,11 @@ Result<Viewer::State> Viewer::turn(bool interrupted) {
   if (events.wants_overview) dirty_ = obey(LookAtWhole{}).has_value();
   if (events.wants_tool && !states_.empty()) dirty_ = obey(LookAtTool{kToolKeyDistance_mm}).has_value();
 
+  draw_by_hand(events);
+
   if (options_.cap) follow_cap();
   receive();
+  meet_people();
   draw_if_due(false);
   const auto state = obey_script();
   if (options_.looked) options_.looked(window_->camera());
@@ -132,6 +138,53 @@ void Viewer::rebuild() {
   regions_rebuilt_ += regions.size();
   update_times_.record(Clock::now() - begin);
   dirty_ = true;
+}
+
+void Viewer::meet_people() {
+  const auto now = Clock::now();
+  if (options_.people == nullptr || now < next_meeting_) return;
+  next_meeting_ = now + kMeetings;
+  const RoomDesk& room = *options_.people;
+  people_.take({room.people(), room.annotations(), room.words()}, room.self(), now);
+  show_people(now);
+  if (followed_.empty()) return;
+  // Who went or does not look any more leaves the camera where it is.
+  const Result<PersonSeen> person = people_.find(followed_, PeopleView::Fit::looking);
+  if (!person || !person->look || person->look == look_taken_) return;
+  look_taken_ = person->look;
+  window_->look(looking_as(*person->look, window_->camera()));
+  dirty_ = true;
+}
+
+void Viewer::show_people(Clock::time_point now) {
+  if (people_.annotations() != drawn_) {
+    drawn_ = people_.annotations();
+    window_->show_annotations(drawn_);
+    dirty_ = true;
+  }
+  if (auto names = people_.names(); names != names_) {
+    names_ = std::move(names);
+    window_->show_names(names_);
+    dirty_ = true;
+  }
+  auto said = people_.notices(now);
+  auto holding = people_.holding();
+  if (said == said_ && holding == holding_) return;
+  said_ = std::move(said);
+  holding_ = std::move(holding);
+  window_->show_words(said_, holding_);
+  dirty_ = true;
+}
+
+void Viewer::draw_by_hand(const WindowEvents& events) {
+  const auto told = [this](const Result<void>& outcome) {
+    if (!outcome) people_.tell(outcome.error().message, Clock::now());
+    next_meeting_ = {};  // seen at once
+  };
+  const auto only_outcome = [](const auto& result) { return result ? Result<void>{} : tl::unexpected(result.error()); };
+  if (events.pointed) told(only_outcome(draw_for_all(AnnotationKind::pointer, {*events.pointed}, {})));
+  if (!events.drawn.empty()) told(only_outcome(draw_for_all(AnnotationKind::line, events.drawn, {})));
+  if (events.wants_wipe) told(*obey_people(WipeOff{}));
 }
 
 std::string Viewer::notice() const {
@@ -235,6 +288,14 @@ std::optional<Result<void>> Viewer::obey(const Command& command) {
             return surface_shown_ && !dirty_ && items_.size() == wait.count ? Answer(Result<void>{}) : Answer{};
           },
           [&](const RoomRequest& request) { return obey_room(request); },
+          [&](const WaitForDrawn& wait) {
+            return surface_shown_ && !dirty_ && drawn_.size() == wait.count ? Answer(Result<void>{}) : Answer{};
+          },
+          [&](const LookAs&) { return obey_people(command); },
+          [&](const Follow&) { return obey_people(command); },
+          [&](const Draw&) { return obey_people(command); },
+          [&](const WipeOff&) { return obey_people(command); },
+          [&](const Say&) { return obey_people(command); },
           [&](const LookAtWhole&) {
             window_->look(overview(options_.bounds));
             return done();
@@ -263,6 +324,63 @@ std::optional<Result<void>> Viewer::obey(const Command& command) {
           [&](const Quit&) { return Answer(Result<void>{}); },
       },
       command);
+}
+
+std::optional<Result<void>> Viewer::obey_people(const Command& command) {
+  using Outcome = Result<void>;
+  if (options_.people == nullptr) return Outcome(failure(ErrorCode::unavailable, "this viewer has no room whose people it sees"));
+  next_meeting_ = {};
+  meet_people();
+  if (const auto* look = std::get_if<LookAs>(&command)) return look_as(look->who);
+  if (const auto* follow = std::get_if<Follow>(&command)) {
+    const Outcome seen = follow->who.empty() ? Outcome{} : look_as(follow->who);
+    if (seen) followed_ = follow->who;
+    return seen;
+  }
+  if (const auto* draw = std::get_if<Draw>(&command)) {
+    const auto annotation = draw_for_all(draw->kind, draw->points_mm, draw->words);
+    if (!annotation) return Outcome(tl::unexpected(annotation.error()));
+    pending_->line += ": annotation " + std::to_string(*annotation);
+    return Outcome{};
+  }
+  if (const auto* wipe = std::get_if<WipeOff>(&command)) return options_.people->wipe_off(wipe->annotation);
+  if (const auto* words = std::get_if<Say>(&command)) return say(*words);
+  return Outcome{};
+}
+
+Result<void> Viewer::look_as(const std::string& who) {
+  const Result<PersonSeen> person = people_.find(who, PeopleView::Fit::looking);
+  if (!person) return tl::unexpected(person.error());
+  if (!person->look) return failure(ErrorCode::unavailable, "nobody knows where " + who + " looks: they have no window open");
+  look_taken_ = person->look;
+  window_->look(looking_as(*person->look, window_->camera()));
+  dirty_ = true;
+  return {};
+}
+
+Result<std::uint32_t> Viewer::draw_for_all(AnnotationKind kind, const std::vector<Vec3>& points_mm,
+                                           const std::string& words) {
+  if (options_.people == nullptr) return failure(ErrorCode::unavailable, "this viewer has no room to draw for");
+  Annotation drawn;
+  drawn.kind = kind;
+  for (const Vec3& point : points_mm) drawn.points.push_back(in_steps(point));
+  drawn.words = words;
+  drawn.colour = colour_of(options_.people->self());
+  if (const Result<void> sound = check(drawn); !sound) return tl::unexpected(sound.error());
+  return options_.people->draw(drawn);
+}
+
+Result<void> Viewer::say(const Say& say) {
+  const auto to = [&](AuthorId addressee, const std::string& words) -> Result<void> {
+    if (words.empty()) return failure(ErrorCode::invalid_input, "there are no words to say after `" + say.who + "`");
+    const auto place = options_.people->say(addressee, words);
+    return place ? Result<void>{} : tl::unexpected(place.error());
+  };
+  if (say.who == "all") return to({}, say.words);
+  const Result<PersonSeen> person = people_.find(say.who);
+  if (person) return to(person->author, say.words);
+  if (say.who.starts_with('#')) return tl::unexpected(person.error());
+  return to({}, say.words.empty() ? say.who : say.who + " " + say.words);
 }
 
 std::optional<Result<void>> Viewer::obey_room(const RoomRequest& request) {
@@ -303,6 +421,8 @@ std::string Viewer::summary_json() const {
                         {"turns", item.turns},
                         {"seated", item.seated}});
   }
+  const CameraView camera = window_->camera();
+  const auto numbers = [](const Vec3& v) { return nlohmann::ordered_json{v.x(), v.y(), v.z()}; };
   const nlohmann::ordered_json summary{
       {"blocks", scene_.blocks()},
       {"regions", scene_.regions()},
@@ -312,6 +432,10 @@ std::string Viewer::summary_json() const {
       {"bodies", bodies},
       {"items", items_.size()},
       {"standing", standing},
+      {"camera", {{"eye_mm", numbers(camera.eye_mm)}, {"target_mm", numbers(camera.target_mm)}}},
+      {"drawn", drawn_.size()},
+      {"said", said_},
+      {"holding", holding_},
       {"frames", frames_},
       {"frame_ms", milliseconds(frame_times_)},
       {"update_ms", milliseconds(update_times_)},

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +17,7 @@
 #include "viewer_client/app/script.hpp"
 #include "viewer_client/render/window.hpp"
 #include "viewer_client/scene/inbox.hpp"
+#include "viewer_client/scene/people_view.hpp"
 #include "viewer_client/scene/room_answer.hpp"
 
 namespace osteon {
@@ -30,6 +32,8 @@ struct ViewerOptions {
   std::function<SpaceMouseState()> cap;           // moves the camera; its first button shows the whole, its second the tool
   // Asks the room and waits for its answer.
   std::function<Result<RoomAnswer>(const RoomRequest&)> ask;
+  RoomDesk* people = nullptr;  // of the room, must outlive the viewer; null: neither seen nor drawn for
+  std::string hand;            // who sits before this window with a hand, a name or #NUMBER; empty: nobody
 };
 
 // [render]
@@ -53,6 +57,9 @@ class Viewer {
   void receive();
   void follow_cap();
   void rebuild();
+  void meet_people();
+  void show_people(std::chrono::steady_clock::time_point now);
+  void draw_by_hand(const WindowEvents& events);
   void draw_if_due(bool at_once);
   void draw_now();
   void log_shown(std::int64_t rendered_mono_ns);
@@ -60,6 +67,12 @@ class Viewer {
   // Null: not yet, ask again in the next turn.
   [[nodiscard]] std::optional<Result<void>> obey(const Command& command);
   [[nodiscard]] std::optional<Result<void>> obey_room(const RoomRequest& request);
+  [[nodiscard]] std::optional<Result<void>> obey_people(const Command& command);
+  [[nodiscard]] Result<void> look_as(const std::string& who);
+  // Which annotation it is.
+  [[nodiscard]] Result<std::uint32_t> draw_for_all(AnnotationKind kind, const std::vector<Vec3>& points_mm,
+                                                   const std::string& words);
+  [[nodiscard]] Result<void> say(const Say& say);
   [[nodiscard]] std::string notice() const;
 
   ViewerOptions options_;
@@ -82,6 +95,15 @@ class Viewer {
   std::size_t snapshot_blocks_ = 0, snapshot_received_ = 0;
   RoomSeq received_seq_, shown_seq_;
   std::vector<Arrival> not_logged_;
+
+  PeopleView people_;
+  std::chrono::steady_clock::time_point next_meeting_{};
+  std::vector<Annotation> drawn_;  // as the window shows them
+  std::map<AuthorId, std::string> names_;
+  std::vector<std::string> said_;
+  std::string holding_;
+  std::string followed_;           // who moves the camera; empty: nobody
+  std::optional<Look> look_taken_;
 
   struct Pending {
     std::string line;

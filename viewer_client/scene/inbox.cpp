@@ -41,15 +41,6 @@ void Inbox::put_tool(Tool tool) {
   next_.tools.push_back(std::move(tool));
 }
 
-void Inbox::put_people(PeopleSeen people) {
-  {
-    const std::lock_guard lock(mutex_);
-    next_.people = std::move(people);
-    waiting_ = true;
-  }
-  arrived_.notify_one();
-}
-
 void Inbox::put_states(std::vector<CuttingState> states, std::vector<SceneItem> items, std::vector<BodyId> bodies) {
   {
     const std::lock_guard lock(mutex_);

@@ -5,13 +5,11 @@
 #include <cstdint>
 #include <map>
 #include <mutex>
-#include <optional>
 #include <vector>
 
 #include "common/core/id.hpp"
 #include "common/mechanics/cutting_state.hpp"
 #include "common/tools/scene_item.hpp"
-#include "viewer_client/scene/people_seen.hpp"
 #include "viewer_client/scene/surface_scene.hpp"
 
 namespace osteon {
@@ -36,7 +34,6 @@ struct Delivery {
   std::vector<SceneItem> items;   // with any_states
   std::vector<BodyId> bodies;     // with any_states
   std::vector<Tool> tools;        // that this program did not know
-  std::optional<PeopleSeen> people;
 };
 
 // Any thread may call any function; one mutex, held for a few moves at a time.
@@ -48,7 +45,6 @@ class Inbox {
                 std::uint32_t snapshot_blocks, std::int64_t received_mono_ns);
   void put_states(std::vector<CuttingState> states, std::vector<SceneItem> items = {}, std::vector<BodyId> bodies = {});
   void put_tool(Tool tool);
-  void put_people(PeopleSeen people);
 
   [[nodiscard]] Delivery take();
   // Returns early when something waits.

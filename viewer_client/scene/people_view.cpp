@@ -1,6 +1,7 @@
 #include "viewer_client/scene/people_view.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cstdio>
 #include <set>
@@ -73,6 +74,12 @@ std::string wrapped(std::string_view text, std::size_t columns, std::size_t most
   return lines.size() > most ? out + " ..." : out;
 }
 
+std::uint32_t colour_of(AuthorId author) {
+  // Apart from bone, steel and each other, for most who tell colours badly as well (after Okabe and Ito 2008).
+  constexpr std::array<std::uint32_t, 6> kColours{0xf0e442, 0x56b4e9, 0x1ecc8a, 0xff7a1a, 0xe377c2, 0x2f7fff};
+  return kColours[author.value % kColours.size()];
+}
+
 void PeopleView::take(const PeopleSeen& seen, AuthorId self, Clock::time_point now) {
   self_ = self;
   std::map<AuthorId, PersonSeen> before = std::exchange(people_, {});
@@ -86,11 +93,11 @@ void PeopleView::take(const PeopleSeen& seen, AuthorId self, Clock::time_point n
     const auto addressee = people_.find(said.to);
     const bool to_us = said.to && (said.to == self_ || (addressee != people_.end() && is_hand(addressee->second)));
     const std::string to = !said.to ? "" : " to " + (to_us ? std::string("you") : name_of(said.to));
-    notice(name_of(said.from) + to + ": " + said.words, now);
+    tell(name_of(said.from) + to + ": " + said.words, now);
   }
 }
 
-void PeopleView::notice(std::string text, Clock::time_point now) {
+void PeopleView::tell(std::string text, Clock::time_point now) {
   if (notices_.size() == kMostNotices) notices_.pop_front();
   notices_.push_back({now + kShown, std::move(text)});
 }
@@ -133,7 +140,7 @@ void PeopleView::notice_decision(const PersonSeen& person, const Supervision& wa
     if (said.empty()) said.push_back(by + " about " + hand);
     said.back() += ": " + is.words;
   }
-  for (std::string& text : said) notice(std::move(text), now);
+  for (std::string& text : said) tell(std::move(text), now);
 }
 
 Result<PersonSeen> PeopleView::find(std::string_view who, Fit fit) const {

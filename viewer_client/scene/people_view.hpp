@@ -1,6 +1,7 @@
 // What a window shows of the people: notices that pass, what holds for a hand, what is drawn, who is called what.
 #pragma once
 #include <chrono>
+#include <cstdint>
 #include <deque>
 #include <map>
 #include <string>
@@ -15,6 +16,9 @@ namespace osteon {
 // The text in lines of at most `columns` characters, broken at blanks where there are some; after `most` lines it is cut off.
 [[nodiscard]] std::string wrapped(std::string_view text, std::size_t columns, std::size_t most);
 
+// In which somebody draws: red, green, blue. Those who come one after the other have different ones.
+[[nodiscard]] std::uint32_t colour_of(AuthorId author);
+
 // [render]
 class PeopleView {
  public:
@@ -27,6 +31,9 @@ class PeopleView {
 
   // `self`: this window's own identity; what is said to it is said "to you".
   void take(const PeopleSeen& seen, AuthorId self, Clock::time_point now);
+
+  // A notice of the program's own.
+  void tell(std::string text, Clock::time_point now);
 
   // By name, or by # and the author's number. Of several of one name - a person's hand and their window - those who fit better,
   // then those who are here, then the newest. Error not_found, naming those who are here.
@@ -50,7 +57,6 @@ class PeopleView {
   [[nodiscard]] bool is_hand(const PersonSeen& person) const;
   [[nodiscard]] std::string overseer() const;
   void notice_decision(const PersonSeen& person, const Supervision& before, Clock::time_point now);
-  void notice(std::string text, Clock::time_point now);
 
   std::string hand_;
   AuthorId self_{};

@@ -5,7 +5,6 @@
 
 #include "common/tools/tool.hpp"
 #include "viewer_client/scene/camera_view.hpp"
-#include "viewer_client/scene/inbox.hpp"
 
 namespace osteon {
 namespace {
@@ -188,6 +187,14 @@ TEST(PeopleView, OfOneNameWhoFitsBetterIsMeant) {
   EXPECT_EQ(view.holding(), "Your hand is stopped");
 }
 
+TEST(PeopleView, TheProgramItselfMaySaySomething) {
+  PeopleView view;
+  view.tell("no", kNow);
+  EXPECT_THAT(view.notices(kNow), ElementsAre("no"));
+  EXPECT_NE(colour_of(kAda), colour_of(kBerg));
+  EXPECT_EQ(colour_of(kAda) >> 24, 0u);
+}
+
 TEST(PeopleView, DrawingsAreThoseOfTheRoom) {
   PeopleView view;
   PeopleSeen seen;
@@ -196,17 +203,6 @@ TEST(PeopleView, DrawingsAreThoseOfTheRoom) {
   EXPECT_EQ(view.annotations(), seen.annotations);
   view.take({}, kSelf, kNow);
   EXPECT_TRUE(view.annotations().empty());
-}
-
-TEST(Inbox, KeepsTheNewestOfThePeople) {
-  Inbox inbox;
-  EXPECT_FALSE(inbox.take().people);
-  inbox.put_people(all_three());
-  inbox.put_people(about_ada({.stopped = true}));
-  const Delivery delivery = inbox.take();
-  ASSERT_TRUE(delivery.people);
-  EXPECT_TRUE(delivery.people->people[0].supervision.stopped);
-  EXPECT_FALSE(inbox.take().people);
 }
 
 TEST(Wrapped, BreaksAtBlanksAndCutsOff) {

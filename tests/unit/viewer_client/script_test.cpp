@@ -89,6 +89,39 @@ TEST(Script, AnswersSayWhereAnItemStands) {
   EXPECT_EQ(standing_text(item), "item 3 at 1.00 -2.50 3.00 along 0.000 0.000 -1.000, 4.50 turns in, seated");
 }
 
+TEST(Script, ReadsWhatConcernsThePeople) {
+  EXPECT_EQ(parsed<LookAs>("look as Dr. Berg ").who, "Dr. Berg");
+  EXPECT_EQ(parsed<LookAs>("look as \"Ada\"").who, "Ada");
+  EXPECT_EQ(parsed<Follow>("follow #12").who, "#12");
+  EXPECT_EQ(parsed<Follow>("follow off").who, "");
+  EXPECT_EQ(parsed<WaitForDrawn>("wait drawn 3").count, 3u);
+  const Draw pointer = parsed<Draw>("point 1 -2 3.5  here,  now");
+  EXPECT_EQ(pointer.kind, AnnotationKind::pointer);
+  EXPECT_EQ(pointer.points_mm, std::vector<Vec3>{Vec3(1, -2, 3.5)});
+  EXPECT_EQ(pointer.words, "here,  now");
+  EXPECT_EQ(parsed<Draw>("point 1 2 3").words, "");
+  const Draw line = parsed<Draw>("draw 0 0 0 1 2 3 4 5 6");
+  EXPECT_EQ(line.kind, AnnotationKind::line);
+  EXPECT_EQ(line.points_mm, (std::vector<Vec3>{Vec3(0, 0, 0), Vec3(1, 2, 3), Vec3(4, 5, 6)}));
+  const Draw label = parsed<Draw>("label 1 2 3 facial nerve");
+  EXPECT_EQ(label.kind, AnnotationKind::label);
+  EXPECT_EQ(label.words, "facial nerve");
+  EXPECT_EQ(parsed<WipeOff>("wipe 7").annotation, 7u);
+  EXPECT_EQ(parsed<WipeOff>("wipe all").annotation, 0u);
+  EXPECT_EQ(parsed<Say>("say all good morning").who, "all");
+  EXPECT_EQ(parsed<Say>("say all good morning").words, "good morning");
+  EXPECT_EQ(parsed<Say>("say \"Dr. Berg\" may I?").who, "Dr. Berg");
+  EXPECT_EQ(parsed<Say>("say \"Dr. Berg\" may I?").words, "may I?");
+  EXPECT_EQ(parsed<Say>("say hello").words, "");
+  for (const char* wrong : {"look as", "follow", "point", "point 1 2", "point 1 2 x", "draw", "draw 1 2 3", "draw 1 2 3 4",
+                            "draw 1 2 3 4 5", "draw 1 2 3 4 5 x", "label 1 2 3", "label 1 2", "wipe", "wipe 0", "wipe x",
+                            "wipe 1 2", "say", "say \"Ada", "wait drawn"}) {
+    const auto command = parse_command(wrong);
+    ASSERT_FALSE(command) << wrong;
+    EXPECT_NE(command.error().message.find('`'), std::string::npos) << command.error().message;
+  }
+}
+
 TEST(Script, SkipsEmptyLinesAndComments) {
   for (const char* line : {"", "   ", "\t\r", "# look overview", "#"}) {
     const auto command = parse_command(line);
