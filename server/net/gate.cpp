@@ -202,7 +202,9 @@ tl::expected<Caller, Refusal> Gate::judge(const CallClaims& call) {
                 .role = ticket->role,
                 .ends = ticket->expires,
                 .certificate_ends = certificate->ends};
-  const std::string room(call.room.empty() ? std::string_view(ticket->room) : call.room);
+  // A role may hold in one room alone: that room has to be known here, however the call names it.
+  std::string room(call.room.empty() ? std::string_view(ticket->room) : call.room);
+  if (room == kAnyRoom && only_room_) room = only_room_();
   if (std::optional<Refusal> refusal = judge_again(caller, room, call.method)) return tl::unexpected(std::move(*refusal));
   return caller;
 }
@@ -243,10 +245,12 @@ void Gate::joined(const Caller& caller, const std::string& room, int kind, Autho
     AuthorId& sitting = seats_[seat];
     if (sitting && sitting != author) {
       ++counts_.displaced;
-      authors_.erase({room, sitting});
+      // A room of the same name may have been made anew since, and the number may be somebody else's in it.
+      const auto known = authors_.find({room, sitting});
+      if (known != authors_.end() && known->second.seat == seat) authors_.erase(known);
       for (const std::weak_ptr<Watched>& weak : streams_) held.push_back(weak.lock());
       std::ranges::copy_if(held, std::back_inserter(displaced), [&](const std::shared_ptr<Watched>& stream) {
-        return stream && stream->room == room && stream->author == sitting;
+        return stream && stream->room == room && stream->author == sitting && stream->caller.user == caller.user;
       });
     }
     sitting = author;

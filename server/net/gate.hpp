@@ -83,6 +83,9 @@ class Gate {
   Gate(const Gate&) = delete;
   Gate& operator=(const Gate&) = delete;
 
+  // Which room a call is to that names none, with a ticket for every room; empty: there is no such. Before the first call.
+  void set_only_room(std::function<std::string()> name) { only_room_ = std::move(name); }
+
   // Mutual TLS, with this gate before every call. It outlives the server.
   [[nodiscard]] std::shared_ptr<grpc::ServerCredentials> credentials();
 
@@ -121,6 +124,7 @@ class Gate {
   const TicketCheckKey key_;
   RefusalCounts& refusals_;
   const Now now_;
+  std::function<std::string()> only_room_;
   mutable std::mutex mutex_;
   AccessFile access_;
   std::string access_fault_;  // that was logged last

@@ -109,6 +109,10 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
     if (!gate) return tl::unexpected(gate.error());
     impl->gate = std::move(*gate);
     impl->rooms->gate = impl->gate.get();
+    impl->gate->set_only_room([all = impl->rooms.get()] {
+      const Result<std::shared_ptr<OpenRoom>> only = all->find("");
+      return only ? (*only)->name : std::string();
+    });
     credentials = impl->gate->credentials();
   }
   // Beside the streams; without it all goes over them.

@@ -65,6 +65,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     return slowly(context, request->name(), [this, request, response] {
       const Result<RoomSummary> closed = rooms_.close(request->name());
       if (!closed) return status_of(closed.error());
+      if (rooms_.gate) rooms_.gate->forget_room(request->name());
       response->mutable_room()->set_name(request->name());
       for (const RoomListing& listing : rooms_.list())
         if (listing.name == request->name()) *response->mutable_room() = to_wire(listing);
@@ -84,7 +85,10 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     return slowly(context, request->name(), [this, request, response] {
       const Result<std::vector<std::string>> gone = rooms_.remove(request->name(), request->with_branches());
       if (!gone) return status_of(gone.error());
-      for (const std::string& name : *gone) response->add_deleted(name);
+      for (const std::string& name : *gone) {
+        if (rooms_.gate) rooms_.gate->forget_room(name);
+        response->add_deleted(name);
+      }
       return Status(Status::OK);
     });
   }

@@ -209,15 +209,17 @@ class RoomServiceImpl final : public RoomBase {
     if (!served) return refused({StatusCode::NOT_FOUND, "this server has no case " + to_hex(*hash)});
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused(status_of(caller.error()));
+    std::string of_room;
     if (rooms_.gate) {
       // A ticket for a room opens no other room's case.
       const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context);
       if (!room) return refused(status_of(room.error()));
       if ((*room)->host().bone().hash() != *hash)
         return refused({StatusCode::PERMISSION_DENIED, "case " + to_hex(*hash) + " is not that of room " + (*room)->name});
+      of_room = (*room)->name;
     }
     CaseStream* stream = CaseStream::launch(std::make_shared<CaseStream>(rooms_.files, served->folder));
-    stream->stand_under(rooms_.gate, *caller, caller->ticket_room, {}, "/osteon.v1.RoomService/GetCase");
+    stream->stand_under(rooms_.gate, *caller, of_room, {}, "/osteon.v1.RoomService/GetCase");
     stream->start();
     return stream;
   }

@@ -262,6 +262,36 @@ TEST_F(Doors, TakeATicketOnceOnly) {
   EXPECT_EQ(status.error_code(), StatusCode::INVALID_ARGUMENT) << status.error_message();
 }
 
+TEST_F(Doors, TakeNewCertificatesWithoutAStartAnew) {
+  // A surgeon's certificate of an authority that comes to be trusted while the server runs.
+  test::People others;
+  const std::filesystem::path guest = others.person("guest");
+  std::filesystem::copy_file(people_.server() / "ca.pem", guest / "ca.pem", std::filesystem::copy_options::overwrite_existing);
+  const wire::Door door{.certificates = guest, .ticket = people_.ticket("guest", "ward", Role::observer)};
+  EXPECT_NE(refusal(door), "");
+  const std::string both = content(people_.server() / "ca.pem") + content(others.server() / "ca.pem");
+  std::ofstream(dir_ / "both.pem") << both;
+  std::filesystem::rename(dir_ / "both.pem", people_.server() / "ca.pem");
+  EXPECT_TRUE(test::wait_until([&] { return refusal(door).empty(); }, test::kPatience));
+  // And a new key of the server's own.
+  people_.certs({"server", "127.0.0.1"});
+  const std::string fresh = content(people_.server() / "server.pem");
+  EXPECT_TRUE(test::wait_until(
+      [&] {
+        const auto line = grpc::CreateChannel(address(), grpc::SslCredentials({.pem_root_certs = content(people_.server() / "ca.pem"),
+                                                                               .pem_private_key = content(people_.person("anna") / "person.key"),
+                                                                               .pem_cert_chain = content(people_.person("anna") / "person.pem")}));
+        grpc::ClientContext context;
+        context.set_deadline(std::chrono::system_clock::now() + 2s);
+        v1::GetStatusResponse response;
+        (void)v1::RoomService::NewStub(line)->GetStatus(&context, {}, &response);
+        const auto auth = context.auth_context();
+        const auto shown = auth ? auth->FindPropertyValues(GRPC_X509_PEM_CERT_PROPERTY_NAME) : std::vector<grpc::string_ref>();
+        return shown.size() == 1 && std::string(shown[0].data(), shown[0].size()) == fresh;
+      },
+      test::kPatience));
+}
+
 TEST_F(Doors, KeepRoomsApart) {
   // Without a room's name a call is to the ticket's.
   const auto in_theatre = join(people_.door("anna", Role::trainee, "theatre"), wire::ClientKind::viewer, "");

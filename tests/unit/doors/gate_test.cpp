@@ -184,6 +184,30 @@ TEST_F(GateTest, ANewerSessionTakesThePlaceOfAnOlderOne) {
   EXPECT_EQ(gate_->counts().displaced, 1u);
 }
 
+TEST_F(GateTest, ARoomThatIsMadeAnewLeavesItsNewPeopleAlone) {
+  const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
+  gate_->joined(anna, "ward", 1, AuthorId{1});
+  // Deleted and made again behind the gate's back: its authors are counted anew.
+  gate_->joined(ben, "ward", 1, AuthorId{1});
+  std::string ended;
+  const auto bens = gate_->enter(ben, "ward", AuthorId{1}, kWatch, [&](const Refusal& why) { ended += why.sentence; });
+  gate_->joined(anna, "ward", 1, AuthorId{2});
+  EXPECT_EQ(ended, "");
+  EXPECT_TRUE(gate_->check_author(ben, "ward", AuthorId{1}));
+  EXPECT_TRUE(gate_->check_author(anna, "ward", AuthorId{2}));
+}
+
+TEST_F(GateTest, KnowsWhichRoomIsMeantThatIsNotNamed) {
+  people_->append_access("role anna observer ward");
+  gate_->look();
+  const std::string everywhere = ticket("anna", "*", Role::instructor);
+  gate_->set_only_room([] { return std::string("ward"); });
+  EXPECT_THAT(refused("anna", everywhere, "", kUndo, true), HasSubstr("an observer may not"));
+  EXPECT_THAT(refused("anna", everywhere, "ward", kUndo, true), HasSubstr("an observer may not"));
+  gate_->set_only_room([] { return std::string("theatre"); });
+  EXPECT_EQ(refused("anna", everywhere, "", kUndo, true), "");
+}
+
 TEST_F(GateTest, EndsStreamsOfWhoMayHaveThemNoMore) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
   std::optional<Refusal> ended[3];
