@@ -200,7 +200,8 @@ struct RoomSession::Impl {
   std::thread thread;
   // Of that thread.
   wire::JoinedRoom joined;                    // newest
-  std::optional<v1::LinkOffer> offer;         // of the present stream
+  std::optional<v1::LinkOffer> offer;         // of the present stream, as the next two
+  std::string redial_why;                     // of a server that stops in good order
   std::vector<std::pair<std::uint32_t, Digest>> numbered_tools;
 
   // Order: read_mutex, then mutex, then fast_mutex.
@@ -263,6 +264,7 @@ void RoomSession::Impl::write(Line& open) {
 void RoomSession::Impl::follow(const v1::SessionResponse& response) {
   if (response.has_link()) offer = response.link();
   if (response.has_redial()) {
+    redial_why = response.redial().why();
     const std::lock_guard lock(mutex);
     redial = std::min<std::chrono::milliseconds>(std::chrono::milliseconds(response.redial().after_ms()), kLongestRedial);
     wake.notify_all();
@@ -337,6 +339,7 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
     reader->begin();
   }
   offer.reset();
+  redial_why.clear();
   numbered_tools.clear();
   std::thread writer([&] { write(open); });
   v1::SessionResponse response;
@@ -414,7 +417,8 @@ void RoomSession::Impl::run() {
     std::optional<Error> broken;
     const grpc::Status status = serve(open, broken);
     if (ends()) break;
-    const std::string said = status.error_message().empty() ? "it closed the connection" : status.error_message();
+    const std::string end = redial_why.empty() ? "it closed the connection" : redial_why;
+    const std::string said = status.error_message().empty() ? end : status.error_message();
     if (broken) {
       why = broken;
     } else if (!may_come_again(status)) {

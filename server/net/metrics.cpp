@@ -144,6 +144,12 @@ std::vector<MetricFamily> figures_of(RoomServer& server, const fs::path& certifi
   if (!certificate.empty())
     if (const Result<double> days = certificate_days_left(certificate))
       page.gauge("osteon_certificate_days_left", "Until the server's certificate is over.", {}, *days);
+  const DoorHealth doors = server.door_health();
+  page.gauge("osteon_connections", "Open connections.", {}, static_cast<double>(doors.connections.open));
+  page.counter("osteon_connections_refused_total", "Connections closed at once, beyond the limit.", {},
+               static_cast<double>(doors.connections.refused));
+  page.counter("osteon_streams_ended_total", "Streams ended since a right to them was over.", {},
+               static_cast<double>(doors.gate.ended));
   const LinkServerHealth links = server.link_health();
   const char* paths = "Fast paths, and those over which datagrams have come lately.";
   page.gauge("osteon_links", paths, {{"state", "open"}}, static_cast<double>(links.links));
@@ -212,7 +218,8 @@ Result<std::unique_ptr<Metrics>> Metrics::start(const std::string& listen, RoomS
                                   &Impl::answer, impl.get(), MHD_OPTION_SOCK_ADDR, place, MHD_OPTION_CONNECTION_LIMIT,
                                   kMostConnections, MHD_OPTION_CONNECTION_TIMEOUT, kPatience_s, MHD_OPTION_END);
   if (!impl->daemon)
-    return failure(ErrorCode::unavailable, "--metrics " + listen + " cannot be listened on: " + std::generic_category().message(errno) +
+    return failure(ErrorCode::unavailable, "--metrics " + listen + " cannot be listened on: " +
+                                               std::generic_category().message(errno) +
                                                "; choose another port, or 0 for a free one");
   const MHD_DaemonInfo* bound = MHD_get_daemon_info(impl->daemon, MHD_DAEMON_INFO_BIND_PORT);
   impl->address = host + ":" + std::to_string(bound ? bound->port : at->port);

@@ -163,7 +163,8 @@ TEST(Operators, TheFiguresOfARoomAreThereForPrometheus) {
        {"osteon_cut_stage_seconds", "osteon_tick_late_seconds", "osteon_tick_work_seconds", "osteon_ticks_missed_total",
         "osteon_journal_commit_seconds", "osteon_journal_bytes", "osteon_queue_length", "osteon_sessions", "osteon_streams",
         "osteon_cuts_total", "osteon_rejections_total", "osteon_refusals_total", "osteon_rooms", "osteon_room_serving",
-        "osteon_room_event", "osteon_draining", "osteon_links"})
+        "osteon_room_event", "osteon_draining", "osteon_links", "osteon_connections", "osteon_connections_refused_total",
+        "osteon_streams_ended_total"})
     EXPECT_NE(text.find("# TYPE " + std::string(family) + " "), std::string::npos) << family;
   for (const char* stage_name : {"wait", "decide", "commit", "tell"}) {
     const std::string labels = R"(room="anna",stage=")" + std::string(stage_name) + "\"";
@@ -338,8 +339,9 @@ class OlderServer final : public v1::RoomService::Service {
     server_ = builder.BuildAndStart();
   }
   grpc::Status Join(grpc::ServerContext*, const v1::JoinRequest* request, v1::JoinResponse*) override {
-    return {grpc::StatusCode::FAILED_PRECONDITION, "the client speaks protocol version " + std::to_string(request->protocol_version()) +
-                                                       " and the server protocol version 3; install the same Osteon release on both"};
+    return {grpc::StatusCode::FAILED_PRECONDITION,
+            "the client speaks protocol version " + std::to_string(request->protocol_version()) +
+                " and the server protocol version 3; install the same Osteon release on both"};
   }
   [[nodiscard]] std::string address() const { return "127.0.0.1:" + std::to_string(port_); }
 
