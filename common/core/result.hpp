@@ -12,6 +12,7 @@ enum class ErrorCode {
   unavailable,     // a peer or device does not answer now; trying again may help
   cancelled,       // the user asked to stop
   denied,          // the caller may not do that here
+  exhausted,       // more than a quota allows
   exists,          // it is already there, or in use by another
   internal,        // a library failed in a way that the user cannot mend
 };

@@ -19,6 +19,7 @@
 #include "common/runtime/progress.hpp"
 #include "common/runtime/stop_signal.hpp"
 #include "common/volume/mesh_distance.hpp"
+#include "server/app/case_commands.hpp"
 #include "server/app/journal_commands.hpp"
 #include "server/app/room_commands.hpp"
 #include "server/app/server_config.hpp"
@@ -157,6 +158,23 @@ Result<Room> open_journal(const ServerConfig& options, const Case& bone, std::sh
   return std::move(kept->room);
 }
 
+// Cases that were uploaded earlier are served as those of the command line are. One that cannot be read is none.
+Result<void> open_uploads(const std::filesystem::path& folder, RoomsOptions& rooms) {
+  Result<std::unique_ptr<CaseStore>> store = CaseStore::open(folder, "/proc/self/exe");
+  if (!store) return tl::unexpected(store.error());
+  for (const std::filesystem::path& kept : (*store)->folders()) {
+    Result<Case> bone = Case::load(kept);
+    if (!bone) {
+      log::error("an uploaded case cannot be read", {{"folder", kept.string()}, {"reason", bone.error().message}});
+      continue;
+    }
+    log::info("case", {{"title", bone->info().title}, {"hash", to_hex(bone->hash())}, {"uploaded", true}});
+    rooms.cases.push_back({std::move(*bone), kept});
+  }
+  rooms.store = std::move(*store);
+  return {};
+}
+
 // What the command line asks for: the rooms of a folder, or one room.
 Result<std::unique_ptr<Rooms>> open_rooms(const ServerConfig& options) {
   Result<std::function<std::shared_ptr<ToolBox>()>> tools = tool_boxes(options);
@@ -176,6 +194,8 @@ Result<std::unique_ptr<Rooms>> open_rooms(const ServerConfig& options) {
                        {"hash", to_hex(bone->hash())}});
     rooms_options.cases.push_back({std::move(*bone), folder});
   }
+  if (!options.uploads_folder.empty())
+    if (Result<void> opened = open_uploads(options.uploads_folder, rooms_options); !opened) return tl::unexpected(opened.error());
   const Case bone = rooms_options.cases.front().bone;
   auto rooms = std::make_unique<Rooms>(std::move(rooms_options));
   Progress progress("surface");
@@ -264,6 +284,7 @@ int check(const std::filesystem::path& file, std::vector<std::string> faults, co
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (const auto checked = case_check_command(argc, argv)) return *checked;
   ServerConfig options;
   CLI::App app("Owns the bone of a case: applies the cuts of haptic clients in one order and streams the surface and the "
                "tools' states to viewers and audio clients.",
@@ -273,6 +294,7 @@ int main(int argc, char** argv) {
   std::function<Result<void>()> command;
   add_journal_commands(app, command);
   add_room_commands(app, command);
+  add_case_commands(app, command);
   add_ticket_command(app, command);
   app.require_subcommand(0, 1);
   app.add_option("--listen", options.listen, "HOST:PORT on this machine; port 0 lets the system choose")->capture_default_str();
@@ -299,6 +321,8 @@ int main(int argc, char** argv) {
       ->excludes(resume)
       ->excludes("--journal")
       ->excludes("--save");
+  app.add_option("--uploads", options.uploads_folder,
+                 "Folder in which cases are kept that \"osteon-server cases upload\" sends, for rooms of their own; without it none are taken");
   app.add_option("--retention-days", options.retention_days,
                  "After so many days a room's journal forgets who somebody was, when it is opened and once a day; what they did stays")
       ->check(CLI::Range(1, 36500));

@@ -125,6 +125,7 @@ const std::vector<Field>& fields() {
       {"save", [](const Value& v, Config& c) { c.save_file = path(v); }},
       {"summary", [](const Value& v, Config& c) { c.summary_file = path(v); }},
       {"tools", [](const Value& v, Config& c) { c.tools_folder = path(v); }},
+      {"uploads", [](const Value& v, Config& c) { c.uploads_folder = path(v); }},
   };
   return all;
 }
@@ -246,6 +247,8 @@ Result<void> check_server_config(const ServerConfig& config) {
       if (ways[i].second && ways[j].second)
         return wrong(std::string(ways[i].first) + " excludes " + ways[j].first +
                      ", on the command line as in a --config file; leave one");
+  if (!config.uploads_folder.empty() && config.rooms_folder.empty())
+    return wrong("--uploads needs --rooms, since a case that is uploaded is for rooms of its own; give --rooms FOLDER too");
   if (ways[0].second && !config.save_file.empty())
     return wrong("--rooms excludes --save, on the command line as in a --config file; leave one");
   if (config.plain == !config.certificates.empty())
@@ -271,7 +274,8 @@ Result<void> check_server_places(const ServerConfig& config) {
                                                            {"journal (--journal)", config.journal_file},
                                                            {"save (--save)", config.save_file},
                                                            {"summary (--summary)", config.summary_file},
-                                                           {"rooms (--rooms)", config.rooms_folder}};
+                                                           {"rooms (--rooms)", config.rooms_folder},
+                                                           {"uploads (--uploads)", config.uploads_folder}};
   for (const auto& [what, path] : written) {
     if (!path.empty() && !is_there(fs::absolute(path).parent_path(), true))
       return missing(what, path, "lies in a folder that is not there; make it");

@@ -22,7 +22,7 @@ struct ServerConfig {
   bool plain = false;                   // without: plain text, on this machine alone
   int most_connections = 512;           // of everybody together
   std::filesystem::path address_file, summary_file, tools_folder;
-  std::filesystem::path save_file, resume_file, journal_file, rooms_folder;
+  std::filesystem::path save_file, resume_file, journal_file, rooms_folder, uploads_folder;
   int retention_days = 0;               // 0: nobody is forgotten
   Detail detail = Detail::automatic;
   std::string metrics;                  // HOST:PORT or PORT, of this machine alone; empty: none are served

@@ -50,6 +50,7 @@ inline Status status_of(const Error& error) {
     case ErrorCode::invalid_input: return invalid(error.message);
     case ErrorCode::not_found: return {StatusCode::NOT_FOUND, error.message};
     case ErrorCode::denied: return {StatusCode::PERMISSION_DENIED, error.message};
+    case ErrorCode::exhausted: return {StatusCode::RESOURCE_EXHAUSTED, error.message};
     case ErrorCode::exists: return {StatusCode::ALREADY_EXISTS, error.message};
     case ErrorCode::unavailable:
     case ErrorCode::unsupported: return {StatusCode::FAILED_PRECONDITION, error.message};

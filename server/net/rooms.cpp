@@ -164,6 +164,7 @@ void OpenRoom::keep_up(const std::function<bool()>& stop) {
 
 Rooms::Rooms(RoomsOptions options) : options_(std::move(options)) {
   OSTEON_CHECK(!options_.cases.empty());
+  cases_.assign(options_.cases.begin(), options_.cases.end());
   jobs.start();
   files.start();
   upkeep_ = std::thread([this] { run_upkeep(); });
@@ -230,8 +231,23 @@ std::vector<std::shared_ptr<OpenRoom>> Rooms::open_rooms() const {
 }
 
 const ServedCase* Rooms::find_case(const Digest& hash) const {
-  const auto found = std::ranges::find_if(options_.cases, [&](const ServedCase& one) { return one.bone.hash() == hash; });
-  return found == options_.cases.end() ? nullptr : &*found;
+  const std::lock_guard lock(cases_mutex_);
+  const auto found = std::ranges::find_if(cases_, [&](const ServedCase& one) { return one.bone.hash() == hash; });
+  return found == cases_.end() ? nullptr : &*found;
+}
+
+std::vector<const ServedCase*> Rooms::cases() const {
+  const std::lock_guard lock(cases_mutex_);
+  std::vector<const ServedCase*> all;
+  for (const ServedCase& one : cases_) all.push_back(&one);
+  std::ranges::sort(all, {}, [](const ServedCase* one) { return one->bone.hash(); });
+  return all;
+}
+
+void Rooms::add_case(ServedCase served) {
+  const std::lock_guard lock(cases_mutex_);
+  const bool known = std::ranges::any_of(cases_, [&](const ServedCase& one) { return one.bone.hash() == served.bone.hash(); });
+  if (!known) cases_.push_back(std::move(served));
 }
 
 fs::path Rooms::journal_of(const std::string& name) const { return options_.folder / (name + kEnding); }
@@ -359,9 +375,9 @@ void Rooms::resume_all(const std::function<void(double)>& progress) {
 Result<std::shared_ptr<OpenRoom>> Rooms::create(const std::string& name, const Digest* case_hash) {
   const std::lock_guard changing(changing_);
   if (Result<void> may = check_new(name); !may) return tl::unexpected(may.error());
-  if (!case_hash && options_.cases.size() > 1)
+  if (!case_hash && cases().size() > 1)
     return failure(ErrorCode::invalid_input, "the server has several cases; say which with --case-hash");
-  const ServedCase* served = case_hash ? find_case(*case_hash) : &options_.cases.front();
+  const ServedCase* served = case_hash ? find_case(*case_hash) : cases().front();
   if (!served) return failure(ErrorCode::not_found, "the server has no case " + to_hex(*case_hash));
   if (!options_.folder.empty()) return open(name, *served, true, {});
   return take_in(std::make_shared<OpenRoom>(name, *served, Room(served->bone, options_.limits, options_.tools()), options_,

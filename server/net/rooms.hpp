@@ -4,6 +4,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -19,6 +20,7 @@
 #include "common/core/result.hpp"
 #include "common/tools/tool_box.hpp"
 #include "common/volume/case.hpp"
+#include "server/intake/case_store.hpp"
 #include "server/net/demonstration.hpp"
 #include "server/net/job_thread.hpp"
 #include "server/net/refusals.hpp"
@@ -52,6 +54,7 @@ struct RoomsOptions {
   HostRates rates{};
   Detail detail = Detail::automatic;
   int retention_days = 0;             // after which it is forgotten who somebody was; 0: never
+  std::shared_ptr<CaseStore> store{};  // where uploaded cases are kept, shared with uploads under way; null: none are taken
 };
 
 // A room that is open. Streams and calls hold it, so that it is there until the last of them is over.
@@ -117,7 +120,11 @@ class Rooms {
   // The open room of that name; without a name the only one that is open. The error says which there are.
   [[nodiscard]] Result<std::shared_ptr<OpenRoom>> find(const std::string& name) const;
   [[nodiscard]] std::vector<std::shared_ptr<OpenRoom>> open_rooms() const;  // in the order of their names
+  // There as long as this is.
   [[nodiscard]] const ServedCase* find_case(const Digest& hash) const;
+  [[nodiscard]] std::vector<const ServedCase*> cases() const;
+  void add_case(ServedCase served);  // one that is known stays as it is
+  [[nodiscard]] CaseStore* store() const { return options_.store.get(); }
   [[nodiscard]] std::vector<RoomListing> list() const;
 
   // A room that was made elsewhere, with its keeper. `save`: see OpenRoom. `progress` hears how far its first surface is.
@@ -170,6 +177,8 @@ class Rooms {
   [[nodiscard]] UpkeepCalls until_the_end() const;
 
   const RoomsOptions options_;
+  mutable std::mutex cases_mutex_;  // never held with another that is taken within
+  std::deque<ServedCase> cases_;    // none goes, so that none moves
   mutable std::mutex changing_;  // held by whatever changes the rooms; taken before mutex_, never within it
   mutable std::mutex mutex_;
   std::map<std::string, std::shared_ptr<OpenRoom>> open_;

@@ -1,6 +1,8 @@
 // Asks a server about its rooms as a whole: for the command line.
 #pragma once
 #include <chrono>
+#include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -54,6 +56,15 @@ class RoomsClient {
     std::string file;
   };
   [[nodiscard]] Result<Copied> back_up(const std::string& name, const std::string& file_name);
+  struct CaseLine {
+    Digest hash;
+    std::string title;
+    std::uint64_t bytes = 0;
+    bool known = false;  // it was there before the upload
+  };
+  [[nodiscard]] Result<std::vector<CaseLine>> cases();
+  // `archive`: a zip of a case. `progress` hears the fraction that is sent. Errors: also not_found (no such file).
+  [[nodiscard]] Result<CaseLine> upload_case(const std::filesystem::path& archive, const std::function<void(double)>& progress);
 
  private:
   explicit RoomsClient(std::shared_ptr<grpc::Channel> channel) : channel_(std::move(channel)) {}

@@ -24,5 +24,6 @@ class LinkServer;
 [[nodiscard]] std::unique_ptr<grpc::Service> make_watch_service(Rooms& rooms);
 [[nodiscard]] std::unique_ptr<grpc::Service> make_people_service(Rooms& rooms);
 [[nodiscard]] std::unique_ptr<grpc::Service> make_rooms_service(Rooms& rooms);
+[[nodiscard]] std::unique_ptr<grpc::Service> make_case_service(Rooms& rooms);
 
 }  // namespace osteon

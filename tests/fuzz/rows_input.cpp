@@ -89,6 +89,7 @@ class Changes {
 
   void change(JoinRow& join) {
     if (below(2)) number(join.author.value);
+    else if (below(2)) join.role = static_cast<Role>(below(static_cast<std::size_t>(kRoles) + 1));
     else join.kind = static_cast<MemberKind>(below(3));
   }
   void change(CutRow& row) {
@@ -141,6 +142,45 @@ class Changes {
   void change(MarkRow& row) {
     if (below(2)) row.label.resize(below(300), static_cast<char>('a' + below(26)));
     else row.label.clear();
+  }
+  void change(std::string& words) {
+    if (below(2)) words.resize(below(1200), static_cast<char>('a' + below(26)));
+    else words.clear();
+  }
+  void change(SuperviseRow& row) {
+    Supervision& set = row.supervision;
+    switch (below(9)) {
+      case 0: number(row.subject.value); break;
+      case 1: set.stopped = !set.stopped; break;
+      case 2: number(set.taken_by.value); break;
+      case 3: number(set.guide.value); break;
+      case 4: number(set.guide_share); break;
+      case 5: number(set.force_limit); break;
+      case 6:
+        if (!set.zone) set.zone.emplace();
+        number(below(2) ? set.zone->radius : set.zone->centre[below(3)]);
+        break;
+      case 7: one_of(set.tools); break;
+      default: change(set.words);
+    }
+  }
+  void change(AnnotationRow& row) {
+    if (!row.drawn || below(4) == 0) return number(row.id);
+    Annotation& drawn = *row.drawn;
+    switch (below(6)) {
+      case 0: number(drawn.id); break;
+      case 1: number(drawn.author.value); break;
+      case 2: drawn.kind = static_cast<AnnotationKind>(below(5)); break;
+      case 3: number(drawn.colour); break;
+      case 4: change(drawn.words); break;
+      default:
+        if (drawn.points.empty() || below(4) == 0) drawn.points.push_back({1, 2, 3});
+        else number(drawn.points[below(drawn.points.size())][below(3)]);
+    }
+  }
+  void change(WordsRow& row) {
+    if (below(2)) number(row.to.value);
+    else change(row.words);
   }
 
  private:

@@ -185,6 +185,11 @@ std::vector<Bytes> rooms() {
     OSTEON_CHECK(room.set_item(hand, a_guide()) && room.remove_item(hand, 1));
     OSTEON_CHECK(room.split(BodyId{0}, {half(true)}, room.bone_epoch()) && room.remove_body(hand, BodyId{1}));
     OSTEON_CHECK(room.undo_last(hand, 2, {}) && room.redo_last(hand, 1));
+    const AuthorId teacher = room.join(MemberKind::surgeon, 3, {}, Role::instructor);
+    OSTEON_CHECK(room.supervise(teacher, hand, {.stopped = true, .taken_by = teacher, .guide = teacher, .guide_share = 500, .force_limit = 300,
+                                                .zone = ZoneLimit{{1, 2, 3}, 1000}, .tools = {drill().hash()}, .words = "wait"}));
+    OSTEON_CHECK(room.annotate(teacher, {.kind = AnnotationKind::line, .points = {{1, 2, 3}, {4, 5, 6}}, .words = "here"}));
+    OSTEON_CHECK(room.wipe_off(teacher, 1) && room.say(hand, teacher, "why?"));
     std::array<bool, std::variant_size_v<decltype(RoomRow::what)>> seen{};
     const RowsInput input = as_input(room, kGoOn, 0);
     Room again = begun();

@@ -16,6 +16,7 @@
 #include "tests/fuzz/datagram_target.hpp"
 #include "tests/fuzz/journal_target.hpp"
 #include "tests/fuzz/ticket_target.hpp"
+#include "tests/fuzz/upload_target.hpp"
 
 namespace osteon::fuzz {
 namespace {
@@ -35,6 +36,15 @@ SceneItem an_item() {
   item.tool = builtin_tools()[0].hash();
   item.pose_bone_item = pose_along({1, 2, 3}, {0, 0, -1});
   return item;
+}
+
+Supervision a_supervision() {
+  return {.stopped = true, .taken_by = {2}, .guide = {3}, .guide_share = 500, .force_limit = 300, .zone = ZoneLimit{{1, 2, 3}, 1000},
+          .tools = {builtin_tools()[0].hash()}, .words = "wait"};
+}
+
+Annotation an_annotation() {
+  return {.id = 1, .author = {2}, .kind = AnnotationKind::line, .points = {{1, 2, 3}, {4, 5, 6}}, .words = "here", .colour = 0x00ff00};
 }
 
 // What is accepted must come back the same when it is sent on.
@@ -165,8 +175,9 @@ Bytes a_down_packet() {
   wire::RowSender sender(window, tools);
   OSTEON_CHECK(sender.push({.room_seq = {1}, .kind = wire::SessionRowKind::committed, .cut = a_cut()}));
   OSTEON_CHECK(sender.push({.room_seq = {2}, .kind = wire::SessionRowKind::rejected, .author_seq = 2, .reason = 1}));
+  OSTEON_CHECK(sender.push({.room_seq = {3}, .kind = wire::SessionRowKind::supervised, .lease_epoch = 4, .supervision = a_supervision()}));
   v1::DownPacket packet;
-  OSTEON_CHECK(packet.ParseFromString(window.item(2).bytes));
+  OSTEON_CHECK(packet.ParseFromString(window.item(2).bytes + window.item(3).bytes));  // parts merge
   packet.mutable_times()->set_sent_us(1'000'000);
   packet.set_lease_epoch(1);
   *packet.add_partners() = wire::to_tool_state(a_state(), 1, true);
@@ -202,7 +213,10 @@ std::vector<Target> targets() {
           rows_target(),
           evaluated_rows_target(),
           genesis_target(),
-          journal_file_target()};
+          journal_file_target(),
+          {"supervision", parse_and_convert<v1::Supervision>, {bytes_of(wire::to_wire(a_supervision()).SerializeAsString())}},
+          {"annotation", parse_and_convert<v1::Annotation>, {bytes_of(wire::to_wire(an_annotation()).SerializeAsString())}},
+          upload_target()};
 }
 
 }  // namespace osteon::fuzz

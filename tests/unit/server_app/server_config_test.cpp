@@ -43,6 +43,7 @@ save: save.vdb
 resume: resume.vdb
 journal: room.journal
 rooms: rooms
+uploads: uploads
 retention_days: 365
 detail: near
 certificates: certs
@@ -71,6 +72,7 @@ limits:
   EXPECT_EQ(c.resume_file, dir_ / "resume.vdb");
   EXPECT_EQ(c.journal_file, dir_ / "room.journal");
   EXPECT_EQ(c.rooms_folder, dir_ / "rooms");
+  EXPECT_EQ(c.uploads_folder, dir_ / "uploads");
   EXPECT_EQ(c.retention_days, 365);
   EXPECT_EQ(c.detail, Detail::near);
   EXPECT_EQ(c.certificates, dir_ / "certs");
@@ -119,6 +121,7 @@ const std::multimap<std::string, std::pair<std::string, std::string>> kWrong{
     {"save", {"{}", "write a path"}},
     {"summary", {"{}", "write a path"}},
     {"tools", {"{}", "write a path"}},
+    {"uploads", {"[x]", "write a path"}},
 };
 
 TEST_F(ServerConfigTest, EveryFieldIsWrongOnce) {
@@ -186,6 +189,11 @@ TEST_F(ServerConfigTest, WhatDoesNotFitTogetherIsSaid) {
   EXPECT_NE(check_server_config(two).error().message.find("--rooms"), std::string::npos);
   two.rooms_folder = "r";
   EXPECT_TRUE(check_server_config(two).has_value());
+  ServerConfig uploads = config;
+  uploads.uploads_folder = "u";
+  EXPECT_NE(check_server_config(uploads).error().message.find("--rooms"), std::string::npos);
+  uploads.rooms_folder = "r";
+  EXPECT_TRUE(check_server_config(uploads).has_value());
   using Change = void (*)(ServerConfig&);
   const std::vector<std::pair<Change, Change>> pairs{
       {[](ServerConfig& c) { c.journal_file = "j"; }, [](ServerConfig& c) { c.rooms_folder = "r"; }},

@@ -1,0 +1,172 @@
+#include "server/intake/case_archive.hpp"
+
+#include <archive.h>
+#include <archive_entry.h>
+
+#include <algorithm>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <vector>
+
+namespace osteon {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kChunk = 1 << 18;
+
+struct CloseReader {
+  void operator()(archive* a) const { archive_read_free(a); }
+};
+struct CloseWriter {
+  void operator()(archive* a) const { archive_write_free(a); }
+};
+struct FreeEntry {
+  void operator()(archive_entry* entry) const { archive_entry_free(entry); }
+};
+using Reader = std::unique_ptr<archive, CloseReader>;
+using Writer = std::unique_ptr<archive, CloseWriter>;
+
+Reader zip_reader() {
+  Reader a(archive_read_new());
+  archive_read_support_format_zip(a.get());
+  return a;
+}
+
+std::string reason_of(archive* a) {
+  const char* reason = archive_error_string(a);
+  return reason != nullptr ? reason : "unknown reason";
+}
+
+// Takes an open archive apart, counting as it goes.
+class Unpacker {
+ public:
+  Unpacker(archive* a, std::string name, std::uint64_t packed_bytes, const IntakeQuota& quota, const PutPiece& put)
+      : archive_(a), name_(std::move(name)), packed_bytes_(packed_bytes), quota_(quota), put_(put) {}
+
+  Result<std::map<std::string, std::uint64_t>> run() {
+    int entries = 0;
+    archive_entry* entry = nullptr;
+    while (true) {
+      const int status = archive_read_next_header(archive_, &entry);
+      if (status == ARCHIVE_EOF) break;
+      if (status != ARCHIVE_OK && status != ARCHIVE_WARN) return damaged();
+      if (++entries > quota_.entries)
+        return failure(ErrorCode::exhausted, name_ + " has more than " + std::to_string(quota_.entries) + " entries; a case has " +
+                                                 std::to_string(std::size(kCaseFiles)) + " files");
+      if (Result<void> taken = take(entry); !taken) return tl::unexpected(taken.error());
+    }
+    for (const std::string_view file : kCaseFiles)
+      if (!files_.contains(std::string(file))) return bad("has no " + std::string(file) + "; pack the whole folder of a case");
+    return files_;
+  }
+
+ private:
+  tl::unexpected<Error> bad(const std::string& what) const { return failure(ErrorCode::invalid_input, name_ + " " + what); }
+  tl::unexpected<Error> damaged() const { return bad("is no sound zip archive (" + reason_of(archive_) + "); pack the case again"); }
+
+  // The file of a case that an entry is, if it may be one at all.
+  Result<std::string> file_of(archive_entry* entry) {
+    const char* given = archive_entry_pathname(entry);
+    const std::string path = given != nullptr ? given : "";
+    // Not said as it is: what a stranger calls an entry belongs in no log.
+    const auto refuse = [&](const std::string& why) -> Result<std::string> { return bad("has an entry that " + why); };
+    if (archive_entry_is_encrypted(entry) != 0) return refuse("is encrypted; pack the case without a password");
+    if (archive_entry_symlink(entry) != nullptr || archive_entry_hardlink(entry) != nullptr)
+      return refuse("is a link; pack the files themselves");
+    if (archive_entry_filetype(entry) != AE_IFREG) return refuse("is no plain file; pack the files of the case alone");
+    const std::size_t slash = path.find('/');
+    const std::string folder = slash == std::string::npos ? "" : path.substr(0, slash);
+    const std::string file = slash == std::string::npos ? path : path.substr(slash + 1);
+    const bool plain = folder != ".." && folder != "." && (slash == std::string::npos || !folder.empty()) &&
+                       folder.find('\\') == std::string::npos;
+    if (!plain || std::ranges::find(kCaseFiles, file) == std::end(kCaseFiles))
+      return refuse("is no file of a case; pack case.json and bone.vdb alone");
+    if (folder_ && *folder_ != folder) return refuse("lies in another folder than those before it; pack one case");
+    folder_ = folder;
+    if (files_.contains(file)) return refuse("comes twice; pack the case again");
+    return file;
+  }
+
+  Result<void> take(archive_entry* entry) {
+    if (archive_entry_filetype(entry) == AE_IFDIR) return {};  // holds nothing; its files are judged by their own names
+    const Result<std::string> file = file_of(entry);
+    if (!file) return tl::unexpected(file.error());
+    std::uint64_t& size = files_[*file];
+    std::vector<std::byte> piece(kChunk);
+    while (true) {
+      const la_ssize_t n = archive_read_data(archive_, piece.data(), piece.size());
+      if (n < 0) return damaged();
+      if (n == 0) return {};
+      size += static_cast<std::uint64_t>(n);
+      unpacked_bytes_ += static_cast<std::uint64_t>(n);
+      if (unpacked_bytes_ > quota_.unpacked_bytes)
+        return failure(ErrorCode::exhausted, name_ + " holds more than the " + std::to_string(quota_.unpacked_bytes) +
+                                                 " bytes that a case may have here; ask the operator for a larger quota");
+      if (unpacked_bytes_ > quota_.ratio_free_bytes &&
+          static_cast<double>(unpacked_bytes_) > quota_.ratio * static_cast<double>(packed_bytes_))
+        return failure(ErrorCode::exhausted, name_ + " unpacks to more than " + std::to_string(static_cast<int>(quota_.ratio)) +
+                                                 " times its size, as no case does");
+      if (Result<void> put = put_(*file, std::span(piece).first(static_cast<std::size_t>(n))); !put) return put;
+    }
+  }
+
+  archive* const archive_;
+  const std::string name_;
+  const std::uint64_t packed_bytes_;
+  const IntakeQuota& quota_;
+  const PutPiece& put_;
+  std::optional<std::string> folder_;
+  std::map<std::string, std::uint64_t> files_;
+  std::uint64_t unpacked_bytes_ = 0;
+};
+
+}  // namespace
+
+Result<std::map<std::string, std::uint64_t>> unpack_case(const fs::path& file, const IntakeQuota& quota, const PutPiece& put) {
+  std::error_code error;
+  const std::uint64_t bytes = fs::file_size(file, error);
+  if (error) return failure(ErrorCode::not_found, file.string() + " cannot be read: " + error.message());
+  const std::string name = file.filename().string();
+  if (bytes > quota.archive_bytes)
+    return failure(ErrorCode::exhausted, name + " is larger than the " + std::to_string(quota.archive_bytes) + " bytes that are taken here");
+  const Reader a = zip_reader();
+  if (archive_read_open_filename(a.get(), file.c_str(), kChunk) != ARCHIVE_OK)
+    return failure(ErrorCode::invalid_input, name + " is no zip archive (" + reason_of(a.get()) + "); pack the case as one");
+  return Unpacker(a.get(), name, bytes, quota, put).run();
+}
+
+Result<std::map<std::string, std::uint64_t>> unpack_case(std::span<const std::byte> bytes, const std::string& name,
+                                                         const IntakeQuota& quota, const PutPiece& put) {
+  const Reader a = zip_reader();
+  if (archive_read_open_memory(a.get(), bytes.data(), bytes.size()) != ARCHIVE_OK)
+    return failure(ErrorCode::invalid_input, name + " is no zip archive (" + reason_of(a.get()) + "); pack the case as one");
+  return Unpacker(a.get(), name, bytes.size(), quota, put).run();
+}
+
+Result<void> pack_case(const fs::path& folder, const fs::path& file) {
+  const Writer a(archive_write_new());
+  const auto disk = [&] { return failure(ErrorCode::internal, "cannot write " + file.string() + ": " + reason_of(a.get())); };
+  archive_write_set_format_zip(a.get());
+  if (archive_write_open_filename(a.get(), file.c_str()) != ARCHIVE_OK) return disk();
+  for (const std::string_view name : kCaseFiles) {
+    const fs::path from = folder / name;
+    std::error_code error;
+    const std::uint64_t size = fs::file_size(from, error);
+    std::ifstream in(from, std::ios::binary);
+    if (error || !in) return failure(ErrorCode::not_found, folder.string() + " is no case: it has no " + std::string(name));
+    const std::unique_ptr<archive_entry, FreeEntry> entry(archive_entry_new());
+    archive_entry_set_pathname(entry.get(), std::string(name).c_str());
+    archive_entry_set_size(entry.get(), static_cast<la_int64_t>(size));
+    archive_entry_set_filetype(entry.get(), AE_IFREG);
+    archive_entry_set_perm(entry.get(), 0644);
+    if (archive_write_header(a.get(), entry.get()) != ARCHIVE_OK) return disk();
+    std::vector<char> piece(kChunk);
+    while (in.read(piece.data(), static_cast<std::streamsize>(piece.size())), in.gcount() > 0)
+      if (archive_write_data(a.get(), piece.data(), static_cast<std::size_t>(in.gcount())) != in.gcount()) return disk();
+  }
+  return archive_write_close(a.get()) == ARCHIVE_OK ? Result<void>{} : disk();
+}
+
+}  // namespace osteon

@@ -1,0 +1,151 @@
+#include "server/intake/case_store.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <system_error>
+#include <utility>
+
+#include "server/intake/case_check.hpp"
+
+namespace osteon {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kIncoming = "incoming-", kArchive = "upload.zip";
+
+tl::unexpected<Error> disk(const fs::path& where, const std::string& why) {
+  return failure(ErrorCode::internal, "cannot write " + where.string() + ": " + why);
+}
+
+std::uint64_t bytes_in(const fs::path& folder) {
+  std::uint64_t bytes = 0;
+  std::error_code error;
+  for (fs::recursive_directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
+    if (std::error_code none; at->is_regular_file(none)) bytes += at->file_size(none);
+  return bytes;
+}
+
+// A file of the case as it is unpacked.
+class Files {
+ public:
+  explicit Files(fs::path folder) : folder_(std::move(folder)) {}
+  Result<void> put(std::string_view file, std::span<const std::byte> piece) {
+    if (file != name_) {
+      out_ = std::ofstream(folder_ / file, std::ios::binary | std::ios::trunc);
+      name_ = file;
+    }
+    out_.write(reinterpret_cast<const char*>(piece.data()), static_cast<std::streamsize>(piece.size()));
+    if (!out_) return disk(folder_ / file, "the disk takes no more");
+    return {};
+  }
+  Result<void> close() {
+    out_.close();
+    return out_ ? Result<void>{} : Result<void>(disk(folder_, "the disk takes no more"));
+  }
+
+ private:
+  const fs::path folder_;
+  std::string name_;
+  std::ofstream out_;
+};
+
+}  // namespace
+
+struct Upload::File {
+  std::ofstream out;
+};
+
+Upload::Upload(fs::path folder, const IntakeQuota& quota, std::atomic<int>& open)
+    : folder_(std::move(folder)), quota_(quota), open_(open), file_(std::make_unique<File>()) {
+  file_->out.open(folder_ / kArchive, std::ios::binary | std::ios::trunc);
+}
+
+Upload::~Upload() {
+  file_.reset();
+  std::error_code ignored;
+  fs::remove_all(folder_, ignored);
+  --open_;
+}
+
+Result<void> Upload::add(std::string_view piece) {
+  bytes_ += piece.size();
+  if (bytes_ > quota_.archive_bytes)
+    return failure(ErrorCode::exhausted, "the upload is larger than the " + std::to_string(quota_.archive_bytes) +
+                                             " bytes that are taken here; ask the operator for a larger quota");
+  file_->out.write(piece.data(), static_cast<std::streamsize>(piece.size()));
+  return file_->out ? Result<void>{} : Result<void>(disk(folder_ / kArchive, "the disk takes no more"));
+}
+
+Result<std::unique_ptr<CaseStore>> CaseStore::open(fs::path folder, fs::path program, IntakeQuota quota) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (!error && ::access(folder.c_str(), W_OK) != 0) error = std::error_code(errno, std::generic_category());
+  if (error) return failure(ErrorCode::internal, "the folder --cases " + folder.string() + " cannot be written: " + error.message());
+  std::vector<fs::path> left;
+  for (const auto& entry : fs::directory_iterator(folder, error))
+    if (entry.path().filename().string().starts_with(kIncoming)) left.push_back(entry.path());
+  for (const fs::path& one : left) fs::remove_all(one, error);
+  return std::unique_ptr<CaseStore>(new CaseStore(fs::absolute(folder), std::move(program), quota));
+}
+
+std::uint64_t CaseStore::kept_bytes() const { return bytes_in(folder_); }
+
+Result<std::unique_ptr<Upload>> CaseStore::begin() {
+  if (++open_ > kMostUploads) {
+    --open_;
+    return failure(ErrorCode::exhausted, std::to_string(kMostUploads) + " uploads are under way; try again later");
+  }
+  if (kept_bytes() > quota_.kept_bytes) {
+    --open_;
+    return failure(ErrorCode::exhausted, "the server's folder of cases is full; ask the operator to delete some");
+  }
+  const fs::path place = folder_ / (std::string(kIncoming) + std::to_string(::getpid()) + "-" + std::to_string(++next_));
+  std::error_code error;
+  fs::create_directory(place, error);
+  if (error) {
+    --open_;
+    return disk(place, error.message());
+  }
+  return std::unique_ptr<Upload>(new Upload(place, quota_, open_));
+}
+
+Result<StoredCase> CaseStore::keep(std::unique_ptr<Upload> upload) {
+  upload->file_->out.close();
+  if (!upload->file_->out) return disk(upload->folder(), "the disk takes no more");
+  const fs::path sent = upload->folder() / "sent", sound = upload->folder() / "sound";
+  std::error_code error;
+  fs::create_directory(sent, error);
+  if (error) return disk(sent, error.message());
+  Files files(sent);
+  const auto unpacked = unpack_case(upload->folder() / kArchive, quota_, [&](std::string_view file, std::span<const std::byte> piece) {
+    return files.put(file, piece);
+  });
+  if (!unpacked) return tl::unexpected(unpacked.error());
+  if (Result<void> closed = files.close(); !closed) return tl::unexpected(closed.error());
+  const Result<CheckedCase> checked = check_case(program_, sent, sound, quota_);
+  if (!checked) return tl::unexpected(checked.error());
+
+  const std::lock_guard lock(keeping_);
+  StoredCase stored{checked->hash, checked->title, folder_ / to_hex(checked->hash), bytes_in(sound), false};
+  if (fs::exists(stored.folder, error)) {
+    stored.known = true;
+    return stored;
+  }
+  fs::rename(sound, stored.folder, error);
+  if (error) return disk(stored.folder, error.message());
+  return stored;
+}
+
+std::vector<fs::path> CaseStore::folders() const {
+  std::vector<fs::path> found;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder_, error))
+    if (digest_from_hex(entry.path().filename().string())) found.push_back(entry.path());
+  std::ranges::sort(found);
+  return found;
+}
+
+}  // namespace osteon

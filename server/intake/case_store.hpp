@@ -1,0 +1,76 @@
+// A folder of cases that people have uploaded: each in a folder of its own, called by its hash.
+#pragma once
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "common/core/digest.hpp"
+#include "common/core/result.hpp"
+#include "server/intake/case_archive.hpp"
+
+namespace osteon {
+
+struct StoredCase {
+  Digest hash;
+  std::string title;
+  std::filesystem::path folder;
+  std::uint64_t bytes = 0;
+  bool known = false;  // it was there before
+};
+
+// An archive on its way in, in a file of the store that is gone with this.
+class Upload {
+ public:
+  ~Upload();
+  Upload(const Upload&) = delete;
+  Upload& operator=(const Upload&) = delete;
+  // Errors: exhausted (beyond the quota), internal (disk).
+  [[nodiscard]] Result<void> add(std::string_view piece);
+  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+
+ private:
+  friend class CaseStore;
+  Upload(std::filesystem::path folder, const IntakeQuota& quota, std::atomic<int>& open);
+  std::filesystem::path folder_;
+  const IntakeQuota quota_;
+  std::atomic<int>& open_;
+  std::uint64_t bytes_ = 0;
+  struct File;
+  std::unique_ptr<File> file_;
+};
+
+// Any thread.
+class CaseStore {
+ public:
+  static constexpr int kMostUploads = 4;  // at once
+
+  // `program`: what check_case() starts. What was left half done by an earlier process goes. Error internal: the folder
+  // cannot be made or written.
+  [[nodiscard]] static Result<std::unique_ptr<CaseStore>> open(std::filesystem::path folder, std::filesystem::path program,
+                                                               IntakeQuota quota = {});
+
+  // Error exhausted: so many are under way already, or the store is full.
+  [[nodiscard]] Result<std::unique_ptr<Upload>> begin();
+  // Takes it apart, looks it through and keeps it; takes long. Errors: those of unpack_case() and check_case(), exhausted (the
+  // store is full), internal (disk).
+  [[nodiscard]] Result<StoredCase> keep(std::unique_ptr<Upload> upload);
+  // Folders of the cases that are kept, in the order of their hashes.
+  [[nodiscard]] std::vector<std::filesystem::path> folders() const;
+
+ private:
+  CaseStore(std::filesystem::path folder, std::filesystem::path program, IntakeQuota quota)
+      : folder_(std::move(folder)), program_(std::move(program)), quota_(quota) {}
+  [[nodiscard]] std::uint64_t kept_bytes() const;
+
+  const std::filesystem::path folder_, program_;
+  const IntakeQuota quota_;
+  std::mutex keeping_;  // one is moved to its place at a time
+  std::atomic<int> open_{0};
+  std::atomic<std::uint64_t> next_{0};
+};
+
+}  // namespace osteon

@@ -1,0 +1,9 @@
+// Uploaded archives as a fuzz target: whatever they are, they come out as files of a case within the quota, or not at all.
+#pragma once
+#include "tests/fuzz/targets.hpp"
+
+namespace osteon::fuzz {
+
+[[nodiscard]] Target upload_target();
+
+}  // namespace osteon::fuzz

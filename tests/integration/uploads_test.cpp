@@ -1,0 +1,89 @@
+// Cases on their way to a server that runs: what is sound gets rooms of its own, and what is not is one sentence.
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "server/intake/case_archive.hpp"
+#include "tests/integration/stage.hpp"
+
+namespace osteon::test {
+namespace {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+
+class Uploads : public ::testing::Test {
+ protected:
+  Uploads() : stage_(16.0, {"--rooms", rooms_.path(), "--uploads", uploads_.path()}) {
+    const RunResult imported = run(program("osteon-import"), {"phantom", "block", "--layers", "6:1.2", "--width", "10", "--pitch", "0.5",
+                                                              "--title", "A block from elsewhere", "--out", stage_ / "other"}, 120s);
+    EXPECT_EQ(imported.exit_code, 0) << imported.err;
+  }
+  RunResult ask(const std::string& what, std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), what);
+    arguments.insert(arguments.end(), {"--plain", "--server", stage_.address()});
+    return run(program("osteon-server"), arguments, 120s);
+  }
+  [[nodiscard]] std::size_t kept() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(uploads_.path()), fs::directory_iterator{}));
+  }
+
+  TempDir rooms_, uploads_;
+  Stage stage_;
+};
+
+TEST_F(Uploads, ACaseIsSentAndGetsARoomAndIsThereAfterARestart) {
+  const RunResult sent = ask("cases", {"upload", stage_ / "other"});
+  ASSERT_EQ(sent.exit_code, 0) << sent.err;
+  const std::string hash = sent.out.substr(0, 64);
+  EXPECT_EQ(hash, read_json(stage_ / "other" / "case.json")["content_hash"].get<std::string>());
+  EXPECT_NE(ask("cases", {"list"}).out.find("A block from elsewhere"), std::string::npos);
+  const RunResult made = ask("rooms", {"create", "elsewhere", "--case-hash", hash});
+  EXPECT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_NE(ask("rooms", {"list"}).out.find("elsewhere"), std::string::npos);
+
+  EXPECT_EQ(stage_.server().terminate(), 0) << stage_.server().err();
+  stage_.start_server({"--rooms", rooms_.path(), "--uploads", uploads_.path()});
+  const RunResult again = ask("rooms", {"list"});
+  EXPECT_NE(again.out.find("elsewhere"), std::string::npos) << again.out << stage_.server().err();
+}
+
+TEST_F(Uploads, WhatIsNoSoundCaseIsOneSentenceAndNothingIsKept) {
+  std::ofstream(stage_ / "text.zip") << "this is no archive";
+  const auto expect_refused = [&](const fs::path& what, const std::string& why) {
+    const RunResult refused = ask("cases", {"upload", what});
+    EXPECT_NE(refused.exit_code, 0);
+    EXPECT_NE(refused.err.find(why), std::string::npos) << refused.err;
+    EXPECT_EQ(kept(), 0U);
+  };
+  expect_refused(stage_ / "text.zip", "zip archive");
+  expect_refused(stage_ / "no-such-file", "no-such-file");
+  expect_refused(rooms_.path(), "is no case");
+
+  fs::create_directory(stage_ / "broken");
+  fs::copy_file(stage_ / "other" / "case.json", stage_ / "broken" / "case.json");
+  std::ofstream(stage_ / "broken" / "bone.vdb") << std::string(5000, 'x');
+  expect_refused(stage_ / "broken", "not sound");
+
+  // A bomb: a thousand times its size.
+  fs::create_directory(stage_ / "bomb");
+  fs::copy_file(stage_ / "other" / "case.json", stage_ / "bomb" / "case.json");
+  std::ofstream(stage_ / "bomb" / "bone.vdb");
+  fs::resize_file(stage_ / "bomb" / "bone.vdb", 300 << 20);
+  expect_refused(stage_ / "bomb", "times its size");
+
+  // The server has taken no harm.
+  EXPECT_TRUE(stage_.server().running());
+  EXPECT_EQ(ask("cases", {"upload", stage_ / "other"}).exit_code, 0);
+  EXPECT_EQ(kept(), 1U);
+}
+
+TEST(UploadsNotTaken, AServerWithoutAFolderForThemSaysSo) {
+  const Stage stage(16.0);
+  const RunResult refused = run(program("osteon-server"), {"cases", "upload", stage / "case", "--plain", "--server", stage.address()}, 60s);
+  EXPECT_NE(refused.exit_code, 0);
+  EXPECT_NE(refused.err.find("--uploads"), std::string::npos) << refused.err;
+}
+
+}  // namespace
+}  // namespace osteon::test

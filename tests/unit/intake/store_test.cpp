@@ -1,0 +1,157 @@
+#include "server/intake/case_store.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "common/volume/case.hpp"
+#include "server/intake/case_check.hpp"
+#include "tests/support/process.hpp"
+#include "tests/support/scenes/bones.hpp"
+#include "tests/support/temp_dir.hpp"
+
+namespace osteon {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string content_of(const fs::path& file) {
+  std::ostringstream out;
+  out << std::ifstream(file, std::ios::binary).rdbuf();
+  return out.str();
+}
+
+class StoreTest : public ::testing::Test {
+ protected:
+  StoreTest() : bone_(test::plain_block(6, 3, 0.5)) {
+    EXPECT_TRUE(bone_.save(temp_ / "case"));
+    EXPECT_TRUE(pack_case(temp_ / "case", temp_ / "case.zip"));
+    store_ = make_store({});
+  }
+  std::unique_ptr<CaseStore> make_store(const IntakeQuota& quota, const fs::path& program = test::program("osteon-server")) {
+    auto store = CaseStore::open(temp_ / "cases", program, quota);
+    EXPECT_TRUE(store) << store.error().message;
+    return std::move(*store);
+  }
+  static Result<StoredCase> keep(CaseStore& store, const std::string& archive) {
+    auto upload = store.begin();
+    if (!upload) return tl::unexpected(upload.error());
+    if (Result<void> added = (*upload)->add(archive); !added) return tl::unexpected(added.error());
+    return store.keep(std::move(*upload));
+  }
+  [[nodiscard]] std::size_t left_over() const {
+    std::size_t count = 0;
+    for (const auto& entry : fs::directory_iterator(temp_ / "cases")) count += digest_from_hex(entry.path().filename().string()) ? 0 : 1;
+    return count;
+  }
+
+  test::TempDir temp_;
+  Case bone_;
+  std::unique_ptr<CaseStore> store_;
+};
+
+TEST_F(StoreTest, ACaseIsKeptUnderItsHashAndIsTheSameCase) {
+  const auto stored = keep(*store_, content_of(temp_ / "case.zip"));
+  ASSERT_TRUE(stored) << stored.error().message;
+  EXPECT_EQ(stored->hash, bone_.hash());
+  EXPECT_FALSE(stored->known);
+  EXPECT_EQ(store_->folders(), std::vector{stored->folder});
+  const auto again = Case::load(stored->folder);
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->hash(), bone_.hash());
+  EXPECT_EQ(left_over(), 0U);
+
+  const auto twice = keep(*store_, content_of(temp_ / "case.zip"));
+  ASSERT_TRUE(twice) << twice.error().message;
+  EXPECT_TRUE(twice->known);
+  EXPECT_EQ(store_->folders().size(), 1U);
+}
+
+// Every byte of a case is covered by its hash or by the form of its files: flipped, it is another case, or none.
+TEST_F(StoreTest, ADamagedCaseIsRefusedAndNothingIsLeft) {
+  const std::string vdb = content_of(temp_ / "case" / "bone.vdb");
+  for (int i = 0; i < 12; ++i) {
+    std::string broken = vdb;
+    broken[vdb.size() * static_cast<std::size_t>(i) / 12 + 7] ^= 0x41;
+    std::ofstream(temp_ / "case" / "bone.vdb", std::ios::binary) << broken;
+    ASSERT_TRUE(pack_case(temp_ / "case", temp_ / "broken.zip"));
+    const auto out = keep(*store_, content_of(temp_ / "broken.zip"));
+    if (out) {
+      EXPECT_EQ(out->hash, bone_.hash());  // it was a byte that says nothing
+      continue;
+    }
+    EXPECT_TRUE(out.error().code == ErrorCode::invalid_input || out.error().code == ErrorCode::exhausted) << out.error().message;
+  }
+  std::ofstream(temp_ / "case" / "bone.vdb", std::ios::binary) << std::string(100, 'x');
+  ASSERT_TRUE(pack_case(temp_ / "case", temp_ / "broken.zip"));
+  EXPECT_FALSE(keep(*store_, content_of(temp_ / "broken.zip")));
+  EXPECT_EQ(left_over(), 0U);
+}
+
+TEST_F(StoreTest, QuotasHold) {
+  const std::string archive = content_of(temp_ / "case.zip");
+  auto small = make_store({.archive_bytes = 100});
+  const auto out = keep(*small, archive);
+  ASSERT_FALSE(out);
+  EXPECT_EQ(out.error().code, ErrorCode::exhausted);
+
+  auto full = make_store({.kept_bytes = 1});
+  ASSERT_TRUE(keep(*full, archive));  // the first is let in, since nothing is there
+  const auto beyond = keep(*full, archive);
+  ASSERT_FALSE(beyond);
+  EXPECT_EQ(beyond.error().code, ErrorCode::exhausted);
+
+  std::vector<std::unique_ptr<Upload>> open;
+  for (int i = 0; i < CaseStore::kMostUploads; ++i) {
+    auto one = store_->begin();
+    ASSERT_TRUE(one);
+    open.push_back(std::move(*one));
+  }
+  EXPECT_FALSE(store_->begin());
+  open.pop_back();
+  EXPECT_TRUE(store_->begin());
+}
+
+TEST_F(StoreTest, AReaderThatDiesOrHangsOrWantsTooMuchIsOneSentence) {
+  const std::string archive = content_of(temp_ / "case.zip");
+  const auto with = [&](const std::string& script, const IntakeQuota& quota = {}) {
+    const fs::path program = temp_ / "reader";
+    std::ofstream(program) << "#!/bin/sh\n" << script << "\n";
+    fs::permissions(program, fs::perms::owner_all);
+    auto store = make_store(quota, program);
+    const auto out = keep(*store, archive);
+    EXPECT_FALSE(out) << script;
+    return out ? Error{} : out.error();
+  };
+  EXPECT_EQ(with("kill -SEGV $$").code, ErrorCode::invalid_input);
+  EXPECT_EQ(with("exit 0").code, ErrorCode::invalid_input);
+  EXPECT_EQ(with("echo '{\"hash\":\"00\",\"title\":\"x\"}'").code, ErrorCode::invalid_input);
+  EXPECT_EQ(with("exec sleep 60", {.time = std::chrono::seconds(1)}).code, ErrorCode::exhausted);
+  EXPECT_EQ(with("exec yes").code, ErrorCode::exhausted);
+  EXPECT_EQ(left_over(), 0U);
+  // The real one, with less memory than a case takes.
+  auto poor = make_store({.memory_bytes = 8 << 20});
+  EXPECT_FALSE(keep(*poor, archive));
+  auto none = make_store({}, temp_ / "no-such-program");
+  const auto out = keep(*none, archive);
+  ASSERT_FALSE(out);
+  EXPECT_EQ(out.error().code, ErrorCode::internal);
+}
+
+TEST_F(StoreTest, WhatAnEarlierProcessLeftHalfDoneGoes) {
+  fs::create_directories(temp_ / "cases" / "incoming-1-1" / "sent");
+  store_ = make_store({});
+  EXPECT_EQ(left_over(), 0U);
+}
+
+TEST(CaseStore, AFolderThatCannotBeMadeIsSaid) {
+  const test::TempDir temp;
+  std::ofstream(temp / "file") << "x";
+  const auto out = CaseStore::open(temp / "file" / "cases", "/bin/true");
+  ASSERT_FALSE(out);
+  EXPECT_NE(out.error().message.find("--cases"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace osteon
