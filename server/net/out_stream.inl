@@ -88,8 +88,8 @@ class OutStream : public Reactor {
       const std::lock_guard lock(mutex_);
       done_ = true;
     }
-    watched_.reset();
     leave();
+    watched_.reset();  // nobody asks it any more: what came beside the stream has ended too
     const std::shared_ptr<void> last = std::move(self_);
   }
 
