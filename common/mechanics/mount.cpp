@@ -46,6 +46,12 @@ bool MountParams::good() const {
          std::abs(pose_world_rest.rotation.norm() - 1.0) < 1e-6;
 }
 
+MountParams mount_about(const Vec3& centre_mm) {
+  MountParams mount;
+  mount.centre_mm = centre_mm;
+  return mount;
+}
+
 Pose pose_world_bone(const MountParams& mount, const Shift& shift) {
   const double angle = shift.turn_rad.norm();
   Pose about_centre;

@@ -46,6 +46,9 @@ struct MountParams {
   [[nodiscard]] bool good() const;             // all finite, masses, springs and stops positive, damping not negative
 };
 
+// The mount of a room's bone, as all its members know it: about this place, where it rests as it was imported.
+[[nodiscard]] MountParams mount_about(const Vec3& centre_mm);
+
 // Where that puts the bone.
 [[nodiscard]] Pose pose_world_bone(const MountParams& mount, const Shift& shift);
 

@@ -184,6 +184,7 @@ Result<std::unique_ptr<Rooms>> open_rooms(const ServerConfig& options) {
   rooms_options.limits = options.limits;
   rooms_options.tools = *tools;
   rooms_options.detail = options.detail;
+  rooms_options.rates.mount = options.mount;
   rooms_options.retention_days = options.retention_days;
   for (const std::filesystem::path& folder : options.case_folders) {
     Result<Case> bone = Case::load(folder);
@@ -327,6 +328,8 @@ int main(int argc, char** argv) {
                  "After so many days a room's journal forgets who somebody was, when it is opened and once a day; what they did stays")
       ->check(CLI::Range(1, 36500));
   const std::map<std::string, Detail> details{{"auto", Detail::automatic}, {"full", Detail::full}, {"near", Detail::near}};
+  app.add_flag("--mount", options.mount,
+               "The bone stands on a compliant mount, so that whoever pushes it is felt by all who have a tool at it");
   app.add_option("--detail", options.detail,
                  "full: viewers are sent the whole bone at its own pitch; near: that only where they look and where tools "
                  "work, coarser elsewhere; auto: near for a bone of more than " + std::to_string(kMostFullBlocks) + " blocks")

@@ -26,6 +26,7 @@ struct ServerConfig {
   int retention_days = 0;               // 0: nobody is forgotten
   Detail detail = Detail::automatic;
   std::string metrics;                  // HOST:PORT or PORT, of this machine alone; empty: none are served
+  bool mount = false;                   // the bones of rooms stand on mounts
   int drain_seconds = 5;                // that clients are given to leave in good order
   CutLimits limits = kServedLimits;
 };

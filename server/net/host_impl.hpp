@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/net/bone_mount.hpp"
 #include "server/net/host_parts.hpp"
 #include "server/net/job_thread.hpp"
 #include "server/net/mesh_room.hpp"
@@ -44,6 +45,7 @@ struct RoomHost::Impl {
         committer(k ? [k](std::span<const RoomRow> rows) { return k->write(rows); } : Committer::Write{},
                   [this](const Error& why) { close_room(why); }, !driven()) {
     authors = room.authors();
+    if (rates_.mount && !p) mount.emplace(SharedBoneParams{.mount = mount_about(room.bone().bounds().centre_mm())});
     if (p) player.emplace(std::move(*p), room.time());
     board.tell_hands([this](const std::vector<CuttingState>& states) { return tell_hands(states); });
   }
@@ -73,6 +75,7 @@ struct RoomHost::Impl {
   bool tell_hands(const std::vector<CuttingState>& states);
   [[nodiscard]] std::uint32_t number_of(const Digest& tool);
   void tell_kept(std::chrono::nanoseconds now);
+  void move_bone(std::chrono::nanoseconds now);  // [tick] on its mount
   void note_changed(Clock::time_point arrived) {
     if (!driven()) mesh.changed(arrived);
   }
@@ -115,6 +118,7 @@ struct RoomHost::Impl {
   Audience<SessionSink> sessions;
   std::map<AuthorId, SessionSink*> open_authors;
 
+  std::optional<BoneMount> mount;  // from the beginning
   PeopleBoard people;
   StateBoard board;
   MeshRoom mesh;

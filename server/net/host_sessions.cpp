@@ -260,6 +260,7 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, co
     }
     open = sink.get();
     impl_->sessions.add(*sink);
+    if (impl_->mount) impl_->mount->join(sink->author());
     sink->begin(impl_->room.room_seq(), std::move(before), serialised(complete));
     for (const ToolBox::Entry* entry : tools) sink->know_tool(impl_->number_of(entry->hash), entry->hash);
     if (held.place)
@@ -305,6 +306,9 @@ void RoomHost::leave(CuttingSink& sink) {
 }
 PeopleBoard& RoomHost::people() { return impl_->people; }
 void RoomHost::offer_state(CuttingState state) { impl_->board.offer(std::move(state)); }
+void RoomHost::push_bone(AuthorId author, const BonePush& push) {
+  if (impl_->mount) impl_->mount->push(author, push);
+}
 
 void RoomHost::leave(SessionSink& sink) {
   bool was_open = false;
@@ -312,6 +316,7 @@ void RoomHost::leave(SessionSink& sink) {
     const std::lock_guard lock(impl_->sessions_mutex);
     was_open = impl_->sessions.remove(sink);
     if (was_open) impl_->open_authors.erase(sink.author());
+    if (was_open && impl_->mount) impl_->mount->leave(sink.author());
   }
   if (!was_open) return;
   impl_->board.session_over(sink.author());

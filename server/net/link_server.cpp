@@ -32,6 +32,7 @@ SessionLink::News SessionLink::news() {
     state->state.author = author_;
     news.state = std::move(state->state);
   }
+  news.push = link_.take_push();
   if (link_.acknowledged() > arrived_) news.arrived = arrived_ = link_.acknowledged();
   return news;
 }
@@ -40,6 +41,7 @@ void SessionLink::say(News news) {
   if (!sink_) return;
   for (Cut& cut : news.cuts) sink_->take(std::move(cut));
   if (news.state) sink_->take(std::move(*news.state));
+  if (news.push) sink_->pushed(*news.push);
   if (news.arrived > 0) sink_->arrived(news.arrived);
 }
 
@@ -76,6 +78,16 @@ bool SessionLink::set_partners(std::span<const CuttingState> partners) {
     std::vector<wire::HeardState> heard;
     for (const CuttingState& state : partners) heard.push_back({state, 0});
     link_.set_partners(heard);
+  }
+  if (server_) server_->wake();
+  return true;
+}
+
+bool SessionLink::set_bone(const BoneSeen& seen) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!link_.alive(now_of_links())) return false;
+    link_.set_bone(seen);
   }
   if (server_) server_->wake();
   return true;

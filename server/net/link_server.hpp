@@ -29,6 +29,7 @@ class SessionLink {
     // Cuts in order of their author_seq, whichever way they came: over the link, or by offer().
     virtual void take(Cut cut) = 0;
     virtual void take(CuttingState state) = 0;
+    virtual void pushed(const BonePush& /*push*/) {}  // on the bone on its mount, the newest
     // The client has rows up to this one.
     virtual void arrived(std::uint64_t index) = 0;
   };
@@ -44,6 +45,8 @@ class SessionLink {
   void know_tool(std::uint32_t number, const Digest& tool);
   // Newest states of others' tools. False: nothing gets through now, so they are for the stream to tell.
   bool set_partners(std::span<const CuttingState> partners);
+  // Where the bone stands on its mount. False as above.
+  bool set_bone(const BoneSeen& seen);
   // Nothing is told to the sink any more once this returns.
   void close();
 
@@ -53,6 +56,7 @@ class SessionLink {
   struct News {
     std::vector<Cut> cuts;
     std::optional<CuttingState> state;
+    std::optional<BonePush> push;
     std::uint64_t arrived = 0;
   };
   [[nodiscard]] News news();  // under mutex_

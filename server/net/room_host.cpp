@@ -27,6 +27,7 @@ bool RoomHost::Impl::tick(std::chrono::nanoseconds now, bool last) {
     queue_closed = last;
   }
   if (!player) room.set_time(now);
+  if (mount) move_bone(now);
   for (Queued& queued : batch) std::visit([this](auto& one) { decide(one); }, queued);
   const bool decided = player ? play(now) : !batch.empty();
   batch.clear();
@@ -34,6 +35,13 @@ bool RoomHost::Impl::tick(std::chrono::nanoseconds now, bool last) {
   board.publish(RoomSeq{room_seq});
   people.publish(RoomSeq{room_seq}, Clock::time_point(std::chrono::duration_cast<Clock::duration>(now)));
   return decided;
+}
+
+void RoomHost::Impl::move_bone(std::chrono::nanoseconds now) {
+  if (!mount->step(now)) return;
+  // A tick does not wait for those who come, go or are told of rows: the next place is as good.
+  const std::unique_lock lock(sessions_mutex, std::try_to_lock);
+  if (lock) sessions.each([this](SessionSink& sink) { sink.show_bone(mount->seen(sink.author())); });
 }
 
 // Whether anything happened.

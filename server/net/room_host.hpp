@@ -10,6 +10,7 @@
 
 #include "common/core/result.hpp"
 #include "common/mechanics/cutting_state.hpp"
+#include "common/mechanics/passivity.hpp"
 #include "common/runtime/tick_stats.hpp"
 #include "common/surface/look.hpp"
 #include "common/wire/cut_run.hpp"
@@ -40,6 +41,8 @@ class SessionSink : public StreamSink {
   virtual void offer(RoomSeq place, const Bytes& row, const wire::SessionRow& /*fast*/) { offer(place, row); }
   // [thread of the tools' states] All tools' newest states. True: some of it is owed, and wants to be told again soon.
   virtual bool show_partners(const std::vector<CuttingState>& /*states*/) { return false; }
+  // [tick] Where the bone stands on its mount, to this one.
+  virtual void show_bone(const BoneSeen& /*seen*/) {}
   // What holds for the hand from the beginning, as a row that has no number: after begin().
   virtual void hold(const wire::SessionRow& /*supervised*/) {}
   // A tool's number in few bytes: after begin() for those of the room, and before the row that adds another.
@@ -57,6 +60,7 @@ struct HostRates {
   std::chrono::nanoseconds mesh{1'000'000'000 / 30};
   std::chrono::nanoseconds looks{250'000'000};   // at most so often the surface follows the looks of viewers and the tools
   std::chrono::nanoseconds pieces{1'000'000'000 / 8};  // at most so often is looked for what has come apart; zero: never
+  bool mount = false;  // the bone stands on one, about its middle, and whoever has a session pushes it; not in a playback
 };
 
 struct HostHealth {
@@ -152,6 +156,7 @@ class RoomHost {
   // Queued until the next tick. The sink, kept alive until then, hears the outcome.
   void queue_cut(std::shared_ptr<SessionSink> sink, Cut cut, Clock::time_point arrived);
   void offer_state(CuttingState state);  // newest of its author wins
+  void push_bone(AuthorId author, const BonePush& push);  // likewise; of no effect where there is no mount
   // Queued until the next tick too, behind the cuts that came before. `answer` is called there and must return at once;
   // by then every session has been told. Error unavailable: the room has stopped.
   void queue_event(std::function<Result<RoomEvent>(Room&)> change, std::function<void(const Result<RoomEvent>&)> answer);

@@ -1,5 +1,6 @@
 #include "server/net/room_rows.hpp"
 
+#include "common/wire/bone_motion.hpp"
 #include "common/wire/convert.hpp"
 
 namespace osteon {
@@ -109,6 +110,12 @@ Bytes partner_row(const CuttingState& state) {
   v1::SessionResponse response;
   *response.mutable_partner() = wire::to_wire(state);
   return serialised(response);
+}
+
+Bytes bone_row(const BoneSeen& seen) {
+  v1::SessionResponse row;
+  *row.mutable_bone() = wire::to_wire(seen);
+  return serialised(row);
 }
 
 Bytes noted_row(RoomSeq place, const std::string& mark) {

@@ -7,6 +7,7 @@
 
 #include "common/link/sealed.hpp"
 #include "common/mechanics/cutting_state.hpp"
+#include "common/mechanics/passivity.hpp"
 #include "server/journal/chain.hpp"
 #include "server/net/outbox.hpp"
 #include "server/room/room.hpp"
@@ -28,6 +29,7 @@ namespace osteon {
 [[nodiscard]] Bytes supervised_row(RoomSeq place, const Supervision& supervision, std::uint64_t lease_epoch);
 [[nodiscard]] Bytes said_row(RoomSeq place, AuthorId from, const WordsRow& words);
 [[nodiscard]] Bytes partner_row(const CuttingState& state);
+[[nodiscard]] Bytes bone_row(const BoneSeen& seen);
 [[nodiscard]] Bytes noted_row(RoomSeq place, const std::string& mark);
 [[nodiscard]] MessageParts change_rows(const RoomEvent& event);  // at least one; each of a bounded size
 

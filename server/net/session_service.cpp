@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/runtime/log.hpp"
+#include "common/wire/bone_motion.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/version.hpp"
 #include "osteon/v1/cutting.grpc.pb.h"
@@ -88,6 +89,15 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     pump();
     return partners_.waits();
   }
+  void show_bone(const BoneSeen& seen) override {
+    const bool by_link = link_ && link_->set_bone(seen);
+    const std::lock_guard lock(mutex_);
+    const auto now = PartnerOutbox::Clock::now();
+    if (by_link || closing() || now < next_bone_) return;
+    next_bone_ = now + PartnerOutbox::kApart;
+    bone_ = seen;
+    pump();
+  }
   void know_tool(std::uint32_t number, const Digest& tool) override {
     if (link_) link_->know_tool(number, tool);
   }
@@ -132,6 +142,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
       case v1::SessionRequest::kHeard: return hear(RoomSeq{request->heard().room_seq()});
       case v1::SessionRequest::kCut: return queue(request->cut());
       case v1::SessionRequest::kState: return show(request->state());
+      case v1::SessionRequest::kPush: return push(request->push());
       default: return close(invalid("SessionRequest.message is not set"));
     }
   }
@@ -191,6 +202,9 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   void take(CuttingState state) override {
     if (may_carry(DatagramContent::tool_state)) host_.offer_state(std::move(state));
   }
+  void pushed(const BonePush& push) override {
+    if (may_carry(DatagramContent::bone_push)) host_.push_bone(author_, push);
+  }
   void arrived(std::uint64_t index) override {
     const RoomSeq newest = [&] {
       const std::lock_guard lock(mutex_);
@@ -210,6 +224,14 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     if (state->author != author_) return close(invalid("state.author is not the author who opened the session"));
     if (!may_carry(DatagramContent::tool_state)) return close(not_allowed());
     host_.offer_state(std::move(*state));
+    read_on();
+  }
+
+  void push(const v1::BonePush& message) {
+    const Result<BonePush> push = wire::from_wire(message);
+    if (!push) return close(invalid(push.error().message));
+    if (!may_carry(DatagramContent::bone_push)) return close(not_allowed());
+    host_.push_bone(author_, *push);
     read_on();
   }
 
@@ -243,6 +265,10 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   }
   bool take(ByteBuffer& message) override {
     MessageParts parts = outbox_.take();
+    if (parts.empty() && outbox_.begun() && bone_) {
+      if (const Bytes row = in_its_version(bone_row(*bone_))) parts = {row};
+      bone_.reset();
+    }
     // Where others' tools are only after all rows: no row is held up.
     while (parts.empty() && outbox_.begun()) {
       const std::optional<CuttingState> partner = partners_.take(PartnerOutbox::Clock::now());
@@ -270,6 +296,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   bool opened_ = false;       // only reactions to reads use it, and these come one by one
   SessionOutbox outbox_;
   PartnerOutbox partners_;
+  std::optional<BoneSeen> bone_;                // newest place of the bone that the stream is to tell
+  PartnerOutbox::Clock::time_point next_bone_{};
   int queued_ = 0;            // cuts between reading and deciding
   std::uint64_t taken_ = 0;   // newest author_seq that was queued, here or in an earlier session
   bool paused_ = false, reading_ended_ = false;

@@ -49,6 +49,7 @@ detail: near
 certificates: certs
 plain: true
 most_connections: 40
+mount: true
 metrics: 9464
 drain_seconds: 7
 limits:
@@ -78,6 +79,7 @@ limits:
   EXPECT_EQ(c.certificates, dir_ / "certs");
   EXPECT_TRUE(c.plain);
   EXPECT_EQ(c.most_connections, 40);
+  EXPECT_TRUE(c.mount);
   EXPECT_EQ(c.metrics, "9464");
   EXPECT_EQ(c.drain_seconds, 7);
   EXPECT_EQ(c.limits.path_knots, 32);
@@ -114,6 +116,7 @@ const std::multimap<std::string, std::pair<std::string, std::string>> kWrong{
     {"metrics", {"0.0.0.0:9464", "this machine alone"}},
     {"metrics", {"port", "write a port"}},
     {"most_connections", {"0", "from 1 to 65535"}},
+    {"mount", {"soft", "true or false"}},
     {"plain", {"yes please", "true or false"}},
     {"resume", {"''", "write a path"}},
     {"retention_days", {"0", "from 1 to 36500"}},

@@ -1,0 +1,138 @@
+// The bone on its mount in a room: whoever has a session is told where it is, and moves it for all.
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <vector>
+
+#include "server/net/room_host.hpp"
+#include "tests/unit/room/cuts.hpp"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+
+// Keeps the places that a session is told.
+class HeardBone final : public SessionSink {
+ public:
+  explicit HeardBone(AuthorId author) : author_(author) {}
+  AuthorId author() const override { return author_; }
+  void begin(RoomSeq, MessageParts, Bytes) override {}
+  void set_leaves(std::vector<FieldLeaf>) override {}
+  void offer(RoomSeq, const Bytes&) override {}
+  void answer(const Bytes&) override {}
+  void refuse(const Error& why) override { ADD_FAILURE() << why.message; }
+  void decided() override {}
+  void end(const std::string&) override {}
+  std::size_t waiting() const override { return 0; }
+  void show_bone(const BoneSeen& seen) override { seen_.push_back(seen); }
+
+  std::vector<BoneSeen> seen_;
+
+ private:
+  const AuthorId author_;
+};
+
+// A driven host with two hands.
+struct Pair {
+  explicit Pair(bool mount) : host(Room(test::test_block()), {.tick = 0ns, .mesh = 1s, .pieces = 0ns, .mount = mount}, {}) {
+    for (auto& session : sessions) session = open(join());
+  }
+  AuthorId join() {
+    AuthorId author;
+    host.join(MemberKind::surgeon, "", {}, Role::none, [&](const Result<AuthorId>& given) { author = given.value(); });
+    tick();
+    return author;
+  }
+  std::shared_ptr<HeardBone> open(AuthorId author) {
+    auto session = std::make_shared<HeardBone>(author);
+    EXPECT_TRUE(host.open_session(session));
+    return session;
+  }
+  void tick(int times = 1) {
+    for (int i = 0; i < times; ++i) host.tick(now += 8ms);
+  }
+  void push(const std::shared_ptr<HeardBone>& session, const Load& load, double energy_mj = 0.0) {
+    host.push_bone(session->author(), {++pushes, load, energy_mj, session->seen_.empty() ? 0 : session->seen_.back().seen_seq});
+  }
+
+  std::chrono::nanoseconds now{};
+  std::uint64_t pushes = 0;
+  RoomHost host;
+  std::shared_ptr<HeardBone> sessions[2];
+};
+
+TEST(MountInARoom, APushMovesTheBoneOfAll) {
+  Pair room(true);
+  room.tick(20);
+  for (const auto& session : room.sessions) {
+    ASSERT_FALSE(session->seen_.empty()) << "it is told that there is a mount";
+    EXPECT_LE(session->seen_.size(), 5u) << "seldom, as the bone rests";
+    EXPECT_EQ(session->seen_.back().shift.place_mm, Vec3(Vec3::Zero()));
+  }
+  const Load load{{10.0, 0, 0}, Vec3::Zero()};
+  const std::size_t before = room.sessions[1]->seen_.size();
+  for (int i = 0; i < 250; ++i) {
+    room.push(room.sessions[0], load);
+    room.tick();
+  }
+  const double expected_mm = 10.0 / MountParams{}.stiffness_n_per_mm;
+  for (const auto& session : room.sessions) EXPECT_NEAR(session->seen_.back().shift.place_mm.x(), expected_mm, 1e-3 * expected_mm);
+  EXPECT_EQ(room.sessions[0]->seen_.back().push_seq, room.pushes);
+  EXPECT_EQ(room.sessions[1]->seen_.back().push_seq, 0u);
+  EXPECT_GE(room.sessions[1]->seen_.size() - before, 249u) << "at every tick while it moves";
+  // A push that is not renewed dies away.
+  room.tick(400);
+  EXPECT_LT(room.sessions[1]->seen_.back().shift.place_mm.norm(), 0.01 * expected_mm);
+}
+
+TEST(MountInARoom, GrantsWhatTheOtherGives) {
+  Pair room(true);
+  room.push(room.sessions[0], {}, 5.0);
+  room.tick(10);
+  room.push(room.sessions[0], {}, 8.0);
+  room.tick(10);
+  EXPECT_DOUBLE_EQ(room.sessions[1]->seen_.back().energy_mj, 3.0);
+  EXPECT_DOUBLE_EQ(room.sessions[0]->seen_.back().energy_mj, 0.0);
+}
+
+TEST(MountInARoom, WhoLeavesPushesNoMore) {
+  Pair room(true);
+  for (int i = 0; i < 100; ++i) {
+    room.push(room.sessions[0], {{0, 20.0, 0}, Vec3::Zero()});
+    room.tick();
+  }
+  EXPECT_GT(room.sessions[1]->seen_.back().shift.place_mm.y(), 3.0);
+  room.host.leave(*room.sessions[0]);
+  // Of whoever has no session a push is nothing; and it is told nothing more.
+  const std::size_t told = room.sessions[0]->seen_.size();
+  for (int i = 0; i < 200; ++i) {
+    room.push(room.sessions[0], {{0, 20.0, 0}, Vec3::Zero()});
+    room.tick();
+  }
+  EXPECT_EQ(room.sessions[0]->seen_.size(), told);
+  EXPECT_LT(room.sessions[1]->seen_.back().shift.place_mm.norm(), 0.1);
+  // In another session its numbers begin anew.
+  room.sessions[0] = room.open(room.sessions[0]->author());
+  room.tick(10);
+  ASSERT_FALSE(room.sessions[0]->seen_.empty());
+  EXPECT_EQ(room.sessions[0]->seen_.front().seen_seq, 1u);
+}
+
+// The bone's motion is nothing that a room keeps: rows, field and hash are as without.
+TEST(MountInARoom, IsNoEvent) {
+  Pair room(true), other(false);
+  for (int i = 0; i < 100; ++i) {
+    room.push(room.sessions[0], {{0, 20.0, 0}, {100, 0, 0}});
+    room.tick();
+    other.push(other.sessions[0], {{0, 20.0, 0}, {100, 0, 0}});
+    other.tick();
+  }
+  EXPECT_EQ(room.host.room_seq(), other.host.room_seq());
+  EXPECT_EQ(room.host.bone_status().field_hash, other.host.bone_status().field_hash);
+  EXPECT_TRUE(other.sessions[0]->seen_.empty()) << "where there is no mount, nothing is told of one";
+  EXPECT_TRUE(other.sessions[1]->seen_.empty());
+}
+
+}  // namespace
+}  // namespace osteon
