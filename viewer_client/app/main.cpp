@@ -46,16 +46,24 @@ constexpr const char* kScriptHelp =
     "  look overview                         the whole bone\n"
     "  look at X Y Z from X Y Z up X Y Z     millimetres in the bone's frame (x left, y back, z up)\n"
     "  look tool DIST_MM                     the tip of the tool from this distance\n"
+    "  look as WHO, follow WHO, follow off   from where a participant looks, by name or #NUMBER: now, or from now on\n"
+    "  point X Y Z [WORDS]                   an arrow for all to see, yours alone; says its number\n"
+    "  draw X Y Z X Y Z ...                  a line through all points\n"
+    "  label X Y Z WORDS                     words at a point\n"
+    "  wipe NUMBER|all                       takes it off again; all: what you drew\n"
+    "  wait drawn N                          until so many arrows, lines and labels are shown\n"
+    "  say [WHO|all] WORDS                   to one participant, or to all; \"A NAME\" with blanks in quotes\n"
     "  tool on|off                           draw the tool and its gauges\n"
     "  screenshot FILE.png\n"
     "  status FILE.json                      blocks, triangles, hash and times so far\n"
     "  quit                                  as does the script's end\n"
-    "Mouse: left turns, middle or shift-left shifts, right or wheel goes nearer. Keys: O overview, T tool, Q quit.\n"
+    "Mouse: left turns, middle or shift-left shifts, right or wheel goes nearer. Keys: O overview, T tool, Q quit;\n"
+    "P then a click: point there, L then a drag: draw a line, X: wipe off what you drew, Esc: not after all.\n"
     "SpaceMouse (--spacemouse): the bone follows the cap; first button overview, second tool.";
 
 struct Arguments {
   wire::DoorArguments door;
-  std::string server, room, name, size = "1280x720", script, screenshot, frame_log, summary;
+  std::string server, room, name, hand, size = "1280x720", script, screenshot, frame_log, summary;
   double patience_s = 5.0;
   bool space_mouse = false, console = false;
 };
@@ -141,7 +149,17 @@ Result<void> run(const Arguments& arguments) {
     return tl::unexpected(watch.error());
   }
 
+  // A server that tells nothing of its people shows its bone all the same.
+  PeopleClientOptions people_options;
+  people_options.address = arguments.server;
+  people_options.patience = watch_options.patience;
+  people_options.window = [&watch = **watch] { return watch.joined(); };
+  const auto people = PeopleClient::start(people_options, [&stop] { return stop.requested(); });
+  if (!people) log::warn("nothing is heard of the people", {{"reason", people.error().message}});
+
   ViewerOptions options;
+  if (people) options.people = people->get();
+  options.hand = arguments.hand;
   options.case_title = (*watch)->room().case_title;
   options.bounds = (*watch)->room().bounds;
   options.frame_log = arguments.frame_log;
@@ -206,6 +224,7 @@ int main(int argc, char** argv) {
   app.footer(std::string(kScriptHelp) + "\n\n" + Console::help());
   app.add_option("--server,--connect", arguments.server, "Address of the server, HOST:PORT")->required();
   app.add_option("--name", arguments.name, "Who you are, shown to others");
+  app.add_option("--of", arguments.hand, "Whose hand works before this window, NAME or #NUMBER: shows what is decided about it");
   app.add_flag("--console", arguments.console, "No window: oversee the room by commands on standard input");
   app.add_option("--room", arguments.room, "Name of the room; not needed where the server has one");
   wire::add_door_options(app, arguments.door);

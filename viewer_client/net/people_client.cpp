@@ -28,11 +28,15 @@ constexpr std::size_t kMostWords = 64;
 
 Error error_of(const grpc::Status& status) {
   switch (status.error_code()) {
-    case grpc::StatusCode::INVALID_ARGUMENT: return {ErrorCode::invalid_input, status.error_message()};
-    case grpc::StatusCode::NOT_FOUND: return {ErrorCode::not_found, status.error_message()};
+    case grpc::StatusCode::INVALID_ARGUMENT:
+      return {ErrorCode::invalid_input, status.error_message()};
+    case grpc::StatusCode::NOT_FOUND:
+      return {ErrorCode::not_found, status.error_message()};
     case grpc::StatusCode::PERMISSION_DENIED:
-    case grpc::StatusCode::UNAUTHENTICATED: return {ErrorCode::denied, status.error_message()};
-    default: return {ErrorCode::unavailable, status.error_message()};
+    case grpc::StatusCode::UNAUTHENTICATED:
+      return {ErrorCode::denied, status.error_message()};
+    default:
+      return {ErrorCode::unavailable, status.error_message()};
   }
 }
 
@@ -92,11 +96,13 @@ struct PeopleClient::Impl {
   }
   Result<void> take(const v1::WatchPeopleResponse& news);
   void read();
+  void read_beside_window();
   grpc::Status read_stream();
 
   // One question to a service and its answer.
   template <class Service, class Response, class Request>
-  Result<Response> ask(grpc::Status (Service::Stub::*call)(grpc::ClientContext*, const Request&, Response*), const Request& request) const {
+  Result<Response> ask(grpc::Status (Service::Stub::*call)(grpc::ClientContext*, const Request&, Response*),
+                       const Request& request) const {
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + kAnswerTime);
     Response response;
@@ -160,11 +166,28 @@ grpc::Status PeopleClient::Impl::read_stream() {
   return reads->Finish();
 }
 
+// A window that lost its room says so itself, or joins again; until then what is refused here means nothing.
+void PeopleClient::Impl::read_beside_window() {
+  while (!stopping()) {
+    {
+      const wire::JoinedRoom now = options.window();
+      const std::lock_guard lock(mutex);
+      joined = now;
+    }
+    const grpc::Status ended = read_stream();
+    if (ended.error_code() == grpc::StatusCode::UNIMPLEMENTED || ended.error_code() == grpc::StatusCode::INTERNAL)
+      return fail(error_of(ended));
+    if (!stopping()) std::this_thread::sleep_for(kRetryPause);
+  }
+}
+
 void PeopleClient::Impl::read() {
+  if (options.window) return read_beside_window();
   while (!stopping()) {
     const grpc::Status ended = read_stream();
     if (stopping()) return;
-    if (ended.error_code() == grpc::StatusCode::PERMISSION_DENIED || ended.error_code() == grpc::StatusCode::UNAUTHENTICATED ||
+    if (ended.error_code() == grpc::StatusCode::PERMISSION_DENIED ||
+        ended.error_code() == grpc::StatusCode::UNAUTHENTICATED ||
         ended.error_code() == grpc::StatusCode::UNIMPLEMENTED || ended.error_code() == grpc::StatusCode::INTERNAL)
       return fail(error_of(ended));
     log::warn("people stream ended", {{"server", options.address}, {"reason", ended.error_message()}});
@@ -183,12 +206,15 @@ void PeopleClient::Impl::read() {
 
 PeopleClient::PeopleClient(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-Result<std::unique_ptr<PeopleClient>> PeopleClient::start(const PeopleClientOptions& options, std::function<bool()> stop) {
+Result<std::unique_ptr<PeopleClient>> PeopleClient::start(const PeopleClientOptions& options,
+                                                          std::function<bool()> stop) {
   auto impl = std::make_unique<Impl>();
   impl->options = options;
   impl->stop = std::move(stop);
-  Result<wire::JoinedRoom> joined = wire::join_room(options.address, wire::ClientKind::viewer, options.name, options.patience,
-                                                    impl->stop, options.room, options.door);
+  Result<wire::JoinedRoom> joined = options.window
+                                        ? options.window()
+                                        : wire::join_room(options.address, wire::ClientKind::viewer, options.name,
+                                                          options.patience, impl->stop, options.room, options.door);
   if (!joined) return tl::unexpected(joined.error());
   impl->joined = std::move(*joined);
   std::unique_ptr<PeopleClient> client(new PeopleClient(std::move(impl)));
@@ -199,7 +225,8 @@ Result<std::unique_ptr<PeopleClient>> PeopleClient::start(const PeopleClientOpti
   };
   const bool told = client->wait(heard, options.patience);
   if (const auto failed = client->failure_seen()) return tl::unexpected(*failed);
-  if (!told) return failure(ErrorCode::unavailable, "the server at " + options.address + " does not say who is in the room");
+  if (!told)
+    return failure(ErrorCode::unavailable, "the server at " + options.address + " does not say who is in the room");
   return client;
 }
 
@@ -358,8 +385,13 @@ Result<RoomSeen> PeopleClient::status() {
   if (!answer) return tl::unexpected(answer.error());
   const Result<Digest> hash = wire::digest_from_wire(answer->field_hash());
   if (!hash) return tl::unexpected(hash.error());
-  RoomSeen seen{.name = impl_->room().name, .room_seq = RoomSeq{answer->room_seq()}, .field_hash = *hash,
-                .removed_mm3 = answer->removed_mm3(), .rejected = answer->rejected(), .bodies = {}, .marks = {}};
+  RoomSeen seen{.name = impl_->room().name,
+                .room_seq = RoomSeq{answer->room_seq()},
+                .field_hash = *hash,
+                .removed_mm3 = answer->removed_mm3(),
+                .rejected = answer->rejected(),
+                .bodies = {},
+                .marks = {}};
   for (const std::uint32_t body : answer->bodies()) seen.bodies.push_back(BodyId{body});
   for (const v1::RoomMark& mark : answer->marks()) seen.marks.emplace_back(RoomSeq{mark.room_seq()}, mark.label());
   return seen;

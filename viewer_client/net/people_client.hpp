@@ -8,23 +8,28 @@
 
 #include "common/core/result.hpp"
 #include "common/wire/door.hpp"
+#include "common/wire/room_client.hpp"
 #include "viewer_client/scene/room_desk.hpp"
 
 namespace osteon {
 
 struct PeopleClientOptions {
-  std::string address;           // host:port
-  std::string room{};            // empty: the only one that is open
+  std::string address;  // host:port
+  std::string room{};   // empty: the only one that is open
   wire::Door door{};
   std::string name = "console";  // shown to others
   std::chrono::milliseconds patience{5000};
+  // The newest join of a window that is in the room already: people are heard of under its identity, because a second
+  // one of the same person would push the window out. None: joins by itself.
+  std::function<wire::JoinedRoom()> window{};
 };
 
 // Any thread. It has one thread, which reads; a lost connection is made again until the room refuses it.
 class PeopleClient final : public RoomDesk {
  public:
   // Joins, and waits for the first news. Errors: those of wire::join_room.
-  [[nodiscard]] static Result<std::unique_ptr<PeopleClient>> start(const PeopleClientOptions& options, std::function<bool()> stop);
+  [[nodiscard]] static Result<std::unique_ptr<PeopleClient>> start(const PeopleClientOptions& options,
+                                                                   std::function<bool()> stop);
   ~PeopleClient() override;
   // What went wrong for good.
   [[nodiscard]] std::optional<Error> failure_seen() const;

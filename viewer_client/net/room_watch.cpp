@@ -425,6 +425,11 @@ RoomWatch::~RoomWatch() {
 
 const WatchedRoom& RoomWatch::room() const { return impl_->room; }
 
+wire::JoinedRoom RoomWatch::joined() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->joined;
+}
+
 std::optional<Error> RoomWatch::failure_seen() const {
   const std::lock_guard lock(impl_->mutex);
   return impl_->failed;

@@ -11,6 +11,7 @@
 #include "common/geometry/lattice.hpp"
 #include "common/surface/look.hpp"
 #include "common/wire/door.hpp"
+#include "common/wire/room_client.hpp"
 #include "viewer_client/scene/inbox.hpp"
 #include "viewer_client/scene/item_place.hpp"
 #include "viewer_client/scene/room_answer.hpp"
@@ -44,6 +45,8 @@ class RoomWatch {
   ~RoomWatch();
 
   [[nodiscard]] const WatchedRoom& room() const;
+  // The newest one: another after the connection was lost.
+  [[nodiscard]] wire::JoinedRoom joined() const;
   // What went wrong for good since the start; none while the room is watched.
   [[nodiscard]] std::optional<Error> failure_seen() const;
   // The connection is lost and being made anew.
