@@ -75,7 +75,8 @@ class Demonstration final : public SessionSink, public std::enable_shared_from_t
       lease_ = row.lease_epoch;
       // What fell with the lease is made again under the new one; what is wrong in itself is left out.
       const auto reason = static_cast<Rejection>(row.reason);
-      if (reason == Rejection::lease || reason == Rejection::frozen || reason == Rejection::taken) again_.push_back(undecided_.front());
+      if (reason == Rejection::lease || reason == Rejection::frozen || reason == Rejection::taken)
+        again_.push_back(undecided_.front());
       undecided_.pop_front();
     }
     wake_.notify_one();
@@ -201,9 +202,11 @@ Result<Recording> read_recording(Rooms& rooms, OpenRoom& in, const WhatToShow& w
   const Result<RoomGenesis> genesis = rooms.read(what.room.empty() ? in.name : what.room, what.to, take);
   if (!genesis) return tl::unexpected(genesis.error());
   if (genesis->case_hash != in.host().bone().hash())
-    return failure(ErrorCode::invalid_input, "room " + genesis->room + " is of another case; show one of the same bone");
+    return failure(ErrorCode::invalid_input,
+                   "room " + genesis->room + " is of another case; show one of the same bone");
   if (too_many)
-    return failure(ErrorCode::invalid_input, "there are more than " + std::to_string(Demonstrations::kMostCuts) + " cuts; say from where to where");
+    return failure(ErrorCode::invalid_input, "there are more than " + std::to_string(Demonstrations::kMostCuts) +
+                                                 " cuts; say from where to where");
   for (const Tool& tool : genesis->tools) tools.emplace(tool.hash(), tool);
 
   Recording out;
@@ -235,7 +238,8 @@ Demonstrations::~Demonstrations() { end_all(); }
 
 Result<Shown> Demonstrations::begin(Rooms& rooms, OpenRoom& in, AuthorId by, const WhatToShow& what) {
   if (!(what.speed > 0 && what.speed <= kMostSpeed))
-    return failure(ErrorCode::invalid_input, "the speed is not more than 0 and at most " + std::to_string(static_cast<int>(kMostSpeed)));
+    return failure(ErrorCode::invalid_input,
+                   "the speed is not more than 0 and at most " + std::to_string(static_cast<int>(kMostSpeed)));
   Result<Recording> recording = read_recording(rooms, in, what);
   if (!recording) return tl::unexpected(recording.error());
   if (recording->cuts.empty()) return failure(ErrorCode::not_found, "there is no cut to show");
@@ -252,7 +256,8 @@ Result<Shown> Demonstrations::begin(Rooms& rooms, OpenRoom& in, AuthorId by, con
   });
   if (over_) return failure(ErrorCode::unavailable, "the room is closed");
   if (going_on_.size() >= kMost)
-    return failure(ErrorCode::unavailable, "the room shows " + std::to_string(kMost) + " demonstrations already; end one first");
+    return failure(ErrorCode::unavailable,
+                   "the room shows " + std::to_string(kMost) + " demonstrations already; end one first");
   const Result<AuthorId> author = host.join(MemberKind::surgeon, "demonstrator", {}, Role::collaborator);
   if (!author) return tl::unexpected(author.error());
   const Shown shown{*author, recording->cuts.size()};

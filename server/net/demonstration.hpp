@@ -1,5 +1,5 @@
-// Cuts of a journal that happen again in a live room: made by a tool of its own, judged like anybody's, seen and heard, so that
-// hands can be guided along it.
+// Cuts of a journal that happen again in a live room: made by a tool of its own, judged like anybody's, seen and heard,
+// so that hands can be guided along it.
 #pragma once
 #include <cstddef>
 #include <memory>
@@ -17,10 +17,10 @@ class OpenRoom;
 class Rooms;
 
 struct WhatToShow {
-  std::string room;     // whose journal; empty: the room's own
-  AuthorId of;          // whose cuts; null: everyone's
-  RoomSeq from, to;     // both included; null: from its beginning, to its end
-  double speed = 1.0;   // times as fast as it happened
+  std::string room;    // whose journal; empty: the room's own
+  AuthorId of;         // whose cuts; null: everyone's
+  RoomSeq from, to;    // both included; null: from its beginning, to its end
+  double speed = 1.0;  // times as fast as it happened
 };
 
 struct Shown {
@@ -39,9 +39,9 @@ class Demonstrations {
   Demonstrations(const Demonstrations&) = delete;
   Demonstrations& operator=(const Demonstrations&) = delete;
 
-  // Reads the journal first, which takes a while. Cuts that were taken back by `to` are not shown. Errors: invalid_input (the
-  // speed; another case; more than kMostCuts), not_found (no such room, no cut there), unavailable (that room is not kept,
-  // kMost go on), and those of reading.
+  // Reads the journal first, which takes a while. Cuts that were taken back by `to` are not shown. Errors:
+  // invalid_input (the speed; another case; more than kMostCuts), not_found (no such room, no cut there), unavailable
+  // (that room is not kept, kMost go on), and those of reading.
   [[nodiscard]] Result<Shown> begin(Rooms& rooms, OpenRoom& in, AuthorId by, const WhatToShow& what);
   // Error not_found: no demonstration of that author goes on.
   [[nodiscard]] Result<void> end(AuthorId demonstrator);

@@ -9,7 +9,8 @@
 
 namespace osteon {
 
-PeopleBoard::PeopleBoard(const Room& room, const std::map<std::uint32_t, std::string>& names) : room_seq_(room.room_seq()) {
+PeopleBoard::PeopleBoard(const Room& room, const std::map<std::uint32_t, std::string>& names)
+    : room_seq_(room.room_seq()) {
   revision_ = room.authors() + 1;  // whoever is here from now on was here later than any of them
   for (std::uint64_t author = 1; author <= room.authors(); ++author) {
     const AuthorId id{author};
@@ -187,7 +188,8 @@ Bytes PeopleBoard::news(PeopleCursor& cursor, AuthorId reader, const PeopleRight
   }
   out.set_room_seq(room_seq_.value);
   out.set_complete(!cursor.begun);
-  const bool nothing = cursor.begun && out.people().empty() && out.annotations().empty() && out.wiped().empty() && out.words().empty();
+  const bool nothing =
+      cursor.begun && out.people().empty() && out.annotations().empty() && out.wiped().empty() && out.words().empty();
   cursor = {revision_, words_said_, std::move(drawn), true};
   return nothing ? nullptr : serialised(out);
 }

@@ -1,5 +1,5 @@
-// Who is in a room, what was decided about whom, what is drawn and what was said lately: what WatchPeople tells, and each
-// reader as far as their role goes.
+// Who is in a room, what was decided about whom, what is drawn and what was said lately: what WatchPeople tells, and
+// each reader as far as their role goes.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -68,8 +68,8 @@ class PeopleBoard {
   // [tick] Readers hear at most every kApart that there is something new.
   void publish(RoomSeq room_seq, Clock::time_point now);
 
-  // A whole WatchPeopleResponse of what the reader lacks; null: nothing. The newest of each person and annotation, and of
-  // words those that are still here.
+  // A whole WatchPeopleResponse of what the reader lacks; null: nothing. The newest of each person and annotation, and
+  // of words those that are still here.
   [[nodiscard]] Bytes news(PeopleCursor& cursor, AuthorId reader, const PeopleRights& rights) const;
 
  private:

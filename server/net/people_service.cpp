@@ -45,9 +45,10 @@ class PeopleStream final : public OutStream<WriteReactor>, public PeopleSink {
   PeopleCursor cursor_;
 };
 
-using PeopleBase = v1::PeopleService::WithRawCallbackMethod_WatchPeople<v1::PeopleService::WithCallbackMethod_Supervise<
-    v1::PeopleService::WithCallbackMethod_Annotate<v1::PeopleService::WithCallbackMethod_Say<v1::PeopleService::WithCallbackMethod_Demonstrate<
-        v1::PeopleService::WithCallbackMethod_EndDemonstration<v1::PeopleService::Service>>>>>>;
+using PeopleBase = v1::PeopleService::WithRawCallbackMethod_WatchPeople<
+    v1::PeopleService::WithCallbackMethod_Supervise<v1::PeopleService::WithCallbackMethod_Annotate<
+        v1::PeopleService::WithCallbackMethod_Say<v1::PeopleService::WithCallbackMethod_Demonstrate<
+            v1::PeopleService::WithCallbackMethod_EndDemonstration<v1::PeopleService::Service>>>>>>;
 
 class PeopleServiceImpl final : public PeopleBase {
  public:
@@ -92,8 +93,10 @@ class PeopleServiceImpl final : public PeopleBase {
     for (const AuthorId subject : subjects)
       room->host().queue_event([by, subject, word = *word](Room& r) { return r.supervise(by, subject, word); },
                                [answer, reactor, response](const Result<RoomEvent>& decided) {
-                                 if (decided) response->set_room_seq(decided->room_seq.value);
-                                 else if (!answer->failed) answer->failed = decided.error();
+                                 if (decided)
+                                   response->set_room_seq(decided->room_seq.value);
+                                 else if (!answer->failed)
+                                   answer->failed = decided.error();
                                  if (--answer->left > 0) return;
                                  reactor->Finish(answer->failed ? status_of(*answer->failed) : Status::OK);
                                });
@@ -113,10 +116,12 @@ class PeopleServiceImpl final : public PeopleBase {
     if (request->has_drawn()) {
       const Result<Annotation> drawn = wire::from_wire(request->drawn());
       if (!drawn) return refuse(reactor, invalid(drawn.error().message));
-      return change(*room, reactor, [by, drawn = *drawn](Room& r) { return r.annotate(by, drawn); }, fill);
+      return change(
+          *room, reactor, [by, drawn = *drawn](Room& r) { return r.annotate(by, drawn); }, fill);
     }
     if (request->wipe_off() != 0)
-      return change(*room, reactor, [by, id = request->wipe_off()](Room& r) { return r.wipe_off(by, id); }, fill);
+      return change(
+          *room, reactor, [by, id = request->wipe_off()](Room& r) { return r.wipe_off(by, id); }, fill);
     // All of the caller's: one event each, answered with the last.
     wipe_next(room, by, reactor, response);
     return reactor;
@@ -129,7 +134,9 @@ class PeopleServiceImpl final : public PeopleBase {
     if (!room) return reactor;
     return change(
         *room, reactor,
-        [by = AuthorId{request->author()}, to = AuthorId{request->to()}, words = request->words()](Room& r) { return r.say(by, to, words); },
+        [by = AuthorId{request->author()}, to = AuthorId{request->to()}, words = request->words()](Room& r) {
+          return r.say(by, to, words);
+        },
         [response](const RoomEvent& event) { response->set_room_seq(event.room_seq.value); });
   }
 
@@ -140,10 +147,12 @@ class PeopleServiceImpl final : public PeopleBase {
     if (!room) return reactor;
     // A journal is read, which takes a while.
     rooms_.files.run([this, room, reactor, request, response] {
-      const Result<Shown> shown = room->demonstrations().begin(
-          rooms_, *room, AuthorId{request->author()},
-          {.room = request->room(), .of = AuthorId{request->of_author()}, .from = RoomSeq{request->from_room_seq()},
-           .to = RoomSeq{request->to_room_seq()}, .speed = request->speed()});
+      const Result<Shown> shown = room->demonstrations().begin(rooms_, *room, AuthorId{request->author()},
+                                                               {.room = request->room(),
+                                                                .of = AuthorId{request->of_author()},
+                                                                .from = RoomSeq{request->from_room_seq()},
+                                                                .to = RoomSeq{request->to_room_seq()},
+                                                                .speed = request->speed()});
       if (!shown) return reactor->Finish(status_of(shown.error()));
       response->set_demonstrator(shown->demonstrator.value);
       response->set_cuts(static_cast<std::uint32_t>(shown->cuts));
@@ -152,7 +161,8 @@ class PeopleServiceImpl final : public PeopleBase {
     return reactor;
   }
 
-  grpc::ServerUnaryReactor* EndDemonstration(grpc::CallbackServerContext* context, const v1::EndDemonstrationRequest* request,
+  grpc::ServerUnaryReactor* EndDemonstration(grpc::CallbackServerContext* context,
+                                             const v1::EndDemonstrationRequest* request,
                                              v1::EndDemonstrationResponse*) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     const std::shared_ptr<OpenRoom> room = called(*context, reactor, request->author());
@@ -170,7 +180,8 @@ class PeopleServiceImpl final : public PeopleBase {
     return reactor;
   }
   // The room that is called by one who has joined it; null once `reactor` was told why not.
-  std::shared_ptr<OpenRoom> called(const grpc::CallbackServerContext& context, grpc::ServerUnaryReactor* reactor, std::uint64_t author) {
+  std::shared_ptr<OpenRoom> called(const grpc::CallbackServerContext& context, grpc::ServerUnaryReactor* reactor,
+                                   std::uint64_t author) {
     Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, context, AuthorId{author});
     if (!room) {
       reactor->Finish(status_of(room.error()));

@@ -13,7 +13,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr std::chrono::milliseconds kUntilSaid{5000};   // until what was decided is seen in the list of people
+constexpr std::chrono::milliseconds kUntilSaid{5000};  // until what was decided is seen in the list of people
 constexpr double kHeardPatience_s = 30.0;
 
 tl::unexpected<Error> bad(std::string why) { return failure(ErrorCode::invalid_input, std::move(why)); }
@@ -118,7 +118,8 @@ const std::vector<Console::Command>& Console::commands() {
       {"free", &Console::free, "free NAME|all", "it may cut again"},
       {"take", &Console::take, "take NAME [WORDS]", "its tool is yours"},
       {"give-back", &Console::give_back, "give-back NAME", "and its own again"},
-      {"guide", &Console::guide, "guide NAME along NAME [share 0..1]", "pulls the hand along another's tool, as firmly as said"},
+      {"guide", &Console::guide, "guide NAME along NAME [share 0..1]",
+       "pulls the hand along another's tool, as firmly as said"},
       {"unguide", &Console::unguide, "unguide NAME", "lets it go"},
       {"limit", &Console::limit, "limit force NAME N|none | zone NAME X Y Z R|none | tools NAME TOOL,TOOL|none",
        "newtons that it feels and cuts with; a ball in which it may cut; tools that it may cut with"},
@@ -126,7 +127,8 @@ const std::vector<Console::Command>& Console::commands() {
        "the last N seconds; what came after a mark, by its number or label; everything; the newest N events"},
       {"redo", &Console::redo, "redo [N]", "what the newest N undos took back"},
       {"mark", &Console::mark, "mark LABEL", "gives this moment a name"},
-      {"point", &Console::point, "point X Y Z [WORDS]", "an arrow to there, in millimetres of the bone's frame; replaces your last"},
+      {"point", &Console::point, "point X Y Z [WORDS]",
+       "an arrow to there, in millimetres of the bone's frame; replaces your last"},
       {"draw", &Console::line, "draw X Y Z X Y Z ...", "a line"},
       {"label", &Console::label, "label X Y Z WORDS", "words at a point"},
       {"wipe", &Console::wipe, "wipe ID|all", "a drawing, or all of yours"},
@@ -136,7 +138,8 @@ const std::vector<Console::Command>& Console::commands() {
       {"view", &Console::view, "view NAME", "from where they look at what, in millimetres of the bone's frame"},
       {"demonstrate", &Console::demonstrate, "demonstrate [ROOM] [of NAME] [from A] [to B] [speed S]",
        "what was cut there happens again here, by events A to B"},
-      {"end-demonstration", &Console::end_demonstration, "end-demonstration ID", "by the number that `demonstrate` said"},
+      {"end-demonstration", &Console::end_demonstration, "end-demonstration ID",
+       "by the number that `demonstrate` said"},
       {"wait", &Console::wait, "wait heard NAME [SECONDS]", "until they have heard what was decided about them"},
       {"status", &Console::status, "status", "the room's newest event, the hash of its bone, its marks"},
       {"quit", &Console::quit, "quit", "as does the end of the input"},
@@ -146,9 +149,11 @@ const std::vector<Console::Command>& Console::commands() {
 
 const char* Console::help() {
   static const std::string kHelp = [] {
-    std::string out = "Commands of --console, one a line, each answered by `ok ...` or `error ...` on standard output.\n"
-                      "NAME: a name, in quotes where it has spaces, or #3 for author 3.\n";
-    for (const Command& command : commands()) out += "  " + std::string(command.form) + "\n      " + command.what + "\n";
+    std::string out =
+        "Commands of --console, one a line, each answered by `ok ...` or `error ...` on standard output.\n"
+        "NAME: a name, in quotes where it has spaces, or #3 for author 3.\n";
+    for (const Command& command : commands())
+      out += "  " + std::string(command.form) + "\n      " + command.what + "\n";
     return out;
   }();
   return kHelp.c_str();
@@ -158,7 +163,8 @@ std::optional<std::string> Console::answer(std::string_view line) {
   const Result<Words> words = words_of_line(line);
   if (!words) return "error " + words.error().message;
   if (words->empty() || words->front().starts_with('#')) return std::nullopt;
-  const auto command = std::ranges::find(commands(), words->front(), [](const Command& one) { return std::string_view(one.name); });
+  const auto command =
+      std::ranges::find(commands(), words->front(), [](const Command& one) { return std::string_view(one.name); });
   if (command == commands().end()) {
     std::string known;
     for (const Command& one : commands()) known += (known.empty() ? "" : ", ") + std::string(one.name);
@@ -174,12 +180,14 @@ Result<PersonSeen> Console::find(const std::string& name) const {
   std::vector<PersonSeen> all = room_.people();
   if (name.starts_with('#')) {
     const auto author = number<std::uint64_t>(std::string_view(name).substr(1));
-    const auto found = std::ranges::find_if(all, [&](const PersonSeen& one) { return author && one.author.value == *author; });
+    const auto found =
+        std::ranges::find_if(all, [&](const PersonSeen& one) { return author && one.author.value == *author; });
     if (found == all.end()) return failure(ErrorCode::not_found, "there is no author " + name);
     return *found;
   }
   std::erase_if(all, [&](const PersonSeen& one) { return one.name != name; });
-  if (all.empty()) return failure(ErrorCode::not_found, "there is nobody called " + quoted(name) + "; `people` says who there is");
+  if (all.empty())
+    return failure(ErrorCode::not_found, "there is nobody called " + quoted(name) + "; `people` says who there is");
   // Somebody's hand rather than their viewer, and who is here rather than who was.
   for (const auto& better : {&PersonSeen::hand, &PersonSeen::here})
     if (std::ranges::any_of(all, better)) std::erase_if(all, [&](const PersonSeen& one) { return !(one.*better); });
@@ -211,7 +219,8 @@ std::string Console::text_of(const PersonSeen& person) const {
   const Supervision& word = person.supervision;
   if (word.stopped) out += " frozen";
   if (word.taken_by) out += " taken by #" + std::to_string(word.taken_by.value);
-  if (word.guide) out += " guided along #" + std::to_string(word.guide.value) + " share " + osteon::text_of(1e-3 * word.guide_share);
+  if (word.guide)
+    out += " guided along #" + std::to_string(word.guide.value) + " share " + osteon::text_of(1e-3 * word.guide_share);
   if (word.force_limit > 0) out += " force " + osteon::text_of(word.force_limit_n());
   if (word.zone) {
     out += " zone";
@@ -254,13 +263,16 @@ Console::Answer Console::supervise(const std::string& name, const std::function<
   }
   // In one go, where the same is to hold for all; else one by one, so that each keeps what else holds for them.
   std::vector<PersonSeen> hands = room_.people();
-  std::erase_if(hands, [&](const PersonSeen& one) { return !one.hand || one.role == Role::instructor || one.author == room_.self(); });
+  std::erase_if(hands, [&](const PersonSeen& one) {
+    return !one.hand || one.role == Role::instructor || one.author == room_.self();
+  });
   const auto changed = [&](const PersonSeen& one) {
     Supervision word = one.supervision;
     change(word);
     return word;
   };
-  const bool same = std::ranges::all_of(hands, [&](const PersonSeen& one) { return changed(one) == changed(hands.front()); });
+  const bool same =
+      std::ranges::all_of(hands, [&](const PersonSeen& one) { return changed(one) == changed(hands.front()); });
   if (hands.empty() || same) {
     const Result<RoomSeq> place = room_.supervise({}, hands.empty() ? Supervision{} : changed(hands.front()));
     if (!place) return tl::unexpected(place.error());
@@ -335,7 +347,8 @@ Console::Answer Console::limit(const Words& words) {
   if (what == "force") {
     const auto newtons = none ? std::optional(0.0) : number<double>(words[3]);
     if (words.size() != 4 || !newtons || *newtons < 0) return bad("");
-    if (*newtons > 0.01 * kMostForceLimit) return bad("the most that can be said is " + osteon::text_of(0.01 * kMostForceLimit) + " N");
+    if (*newtons > 0.01 * kMostForceLimit)
+      return bad("the most that can be said is " + osteon::text_of(0.01 * kMostForceLimit) + " N");
     // Not even nothing is no limit.
     const int hundredths = none ? 0 : std::max(1, static_cast<int>(std::lround(100 * *newtons)));
     return supervise(name, [&](Supervision& word) { word.force_limit = hundredths; });
@@ -407,7 +420,9 @@ Console::Answer Console::undo(const Words& words) {
 }
 
 Console::Answer Console::redo(const Words& words) {
-  const auto count = words.size() == 1 ? std::optional(1u) : words.size() == 2 ? number<std::uint32_t>(words[1]) : std::nullopt;
+  const auto count = words.size() == 1   ? std::optional(1u)
+                     : words.size() == 2 ? number<std::uint32_t>(words[1])
+                                         : std::nullopt;
   if (!count || *count == 0) return bad("");
   const auto redone = room_.redo(*count);
   if (!redone) return tl::unexpected(redone.error());
@@ -432,7 +447,8 @@ Console::Answer Console::draw(AnnotationKind kind, const Words& words, std::size
   const Result<std::uint32_t> which = room_.draw(drawn);
   if (!which) return tl::unexpected(which.error());
   const auto seen = [&] {
-    return std::ranges::any_of(room_.annotations(), [&](const Annotation& one) { return one.id == *which && one.points == drawn.points; });
+    return std::ranges::any_of(room_.annotations(),
+                               [&](const Annotation& one) { return one.id == *which && one.points == drawn.points; });
   };
   (void)room_.wait(seen, kUntilSaid);
   return "drawing " + std::to_string(*which);
@@ -451,7 +467,9 @@ Console::Answer Console::label(const Words& words) {
 }
 
 Console::Answer Console::wipe(const Words& words) {
-  const auto which = words.size() != 2 ? std::nullopt : words[1] == "all" ? std::optional(0u) : number<std::uint32_t>(words[1]);
+  const auto which = words.size() != 2   ? std::nullopt
+                     : words[1] == "all" ? std::optional(0u)
+                                         : number<std::uint32_t>(words[1]);
   if (!which || (*which == 0 && words[1] != "all")) return bad("");
   if (const Result<void> gone = room_.wipe_off(*which); !gone) return tl::unexpected(gone.error());
   const auto seen = [&] {
@@ -468,8 +486,11 @@ Console::Answer Console::drawn(const Words& words) {
   const std::vector<Annotation> all = room_.annotations();
   std::string out = std::to_string(all.size()) + " drawings";
   for (const Annotation& one : all) {
-    const char* kind = one.kind == AnnotationKind::pointer ? "pointer" : one.kind == AnnotationKind::line ? "line" : "label";
-    out += (&one == &all.front() ? ": " : "; ") + std::to_string(one.id) + " " + kind + " of " + name_of(one.author) + " from";
+    const char* kind = one.kind == AnnotationKind::pointer ? "pointer"
+                       : one.kind == AnnotationKind::line  ? "line"
+                                                           : "label";
+    out += (&one == &all.front() ? ": " : "; ") + std::to_string(one.id) + " " + kind + " of " + name_of(one.author) +
+           " from";
     for (const std::int32_t steps : one.points.front()) out += " " + osteon::text_of(steps * kQuantum_mm);
     if (!one.words.empty()) out += " " + quoted(one.words);
   }
@@ -485,7 +506,8 @@ Console::Answer Console::say(const Words& words) {
   } else if (words.size() > 2) {
     const Result<PersonSeen> person = find(words[1]);
     // Words to all may begin with any word; a number or a name that several have is meant as one.
-    if (!person && (person.error().code != ErrorCode::not_found || words[1].starts_with('#'))) return tl::unexpected(person.error());
+    if (!person && (person.error().code != ErrorCode::not_found || words[1].starts_with('#')))
+      return tl::unexpected(person.error());
     if (person) {
       to = person->author;
       first = 2;
@@ -493,7 +515,9 @@ Console::Answer Console::say(const Words& words) {
   }
   const Result<RoomSeq> place = room_.say(to, joined(words, first));
   if (!place) return tl::unexpected(place.error());
-  (void)room_.wait([&] { return std::ranges::any_of(room_.words(), [&](const WordsSeen& one) { return one.place >= *place; }); }, kUntilSaid);
+  (void)room_.wait(
+      [&] { return std::ranges::any_of(room_.words(), [&](const WordsSeen& one) { return one.place >= *place; }); },
+      kUntilSaid);
   return at(*place) + " to " + (to ? name_of(to) : "all");
 }
 
@@ -501,8 +525,8 @@ Console::Answer Console::said(const Words& words) {
   if (words.size() != 1) return bad("");
   std::string out;
   for (const WordsSeen& one : room_.words())
-    out += (out.empty() ? "" : "; ") + at(one.place) + " " + name_of(one.from) + " to " + (one.to ? name_of(one.to) : "all") + " " +
-           quoted(one.words);
+    out += (out.empty() ? "" : "; ") + at(one.place) + " " + name_of(one.from) + " to " +
+           (one.to ? name_of(one.to) : "all") + " " + quoted(one.words);
   return out;
 }
 
@@ -524,7 +548,8 @@ Console::Answer Console::demonstrate(const Words& words) {
   WhatToDemonstrate what;
   if (const auto name = take_pair(rest, "of")) {
     const Result<PersonSeen> person = find(*name);
-    const auto author = name->starts_with('#') ? number<std::uint64_t>(std::string_view(*name).substr(1)) : std::nullopt;
+    const auto author =
+        name->starts_with('#') ? number<std::uint64_t>(std::string_view(*name).substr(1)) : std::nullopt;
     // In another room somebody else may have the number.
     if (!person && !author) return tl::unexpected(person.error());
     what.of = author ? AuthorId{*author} : person->author;
@@ -552,13 +577,16 @@ Console::Answer Console::end_demonstration(const Words& words) {
   const std::string_view word = words[1];
   const auto which = number<std::uint64_t>(word.starts_with('#') ? word.substr(1) : word);
   if (!which) return bad("");
-  if (const Result<void> ended = room_.end_demonstration(AuthorId{*which}); !ended) return tl::unexpected(ended.error());
+  if (const Result<void> ended = room_.end_demonstration(AuthorId{*which}); !ended)
+    return tl::unexpected(ended.error());
   return std::string();
 }
 
 Console::Answer Console::wait(const Words& words) {
   const auto patience_s = words.size() == 4 ? number<double>(words[3]) : std::optional(kHeardPatience_s);
-  if (words.size() < 3 || words.size() > 4 || words[1] != "heard" || !patience_s || *patience_s < 0 || *patience_s > 1e6) return bad("");
+  if (words.size() < 3 || words.size() > 4 || words[1] != "heard" || !patience_s || *patience_s < 0 ||
+      *patience_s > 1e6)
+    return bad("");
   const auto heard = [&] {
     const Result<PersonSeen> person = find(words[2]);
     return !person || !person->pending();
@@ -566,7 +594,9 @@ Console::Answer Console::wait(const Words& words) {
   const bool in_time = room_.wait(heard, std::chrono::milliseconds(std::llround(1000 * *patience_s)));
   const Result<PersonSeen> person = find(words[2]);
   if (!person) return tl::unexpected(person.error());
-  if (!in_time) return failure(ErrorCode::unavailable, name_of(person->author) + " has not heard of event " + std::to_string(person->decided.value) + " yet");
+  if (!in_time)
+    return failure(ErrorCode::unavailable, name_of(person->author) + " has not heard of event " +
+                                               std::to_string(person->decided.value) + " yet");
   return at(person->heard);
 }
 
@@ -574,9 +604,9 @@ Console::Answer Console::status(const Words& words) {
   if (words.size() != 1) return bad("");
   const Result<RoomSeen> seen = room_.status();
   if (!seen) return tl::unexpected(seen.error());
-  std::string out = "room " + quoted(seen->name) + " " + at(seen->room_seq) + " hash " + to_hex(seen->field_hash) + " removed " +
-                    osteon::text_of(seen->removed_mm3) + " mm3 rejected " + std::to_string(seen->rejected) + " bodies " +
-                    std::to_string(seen->bodies.size());
+  std::string out = "room " + quoted(seen->name) + " " + at(seen->room_seq) + " hash " + to_hex(seen->field_hash) +
+                    " removed " + osteon::text_of(seen->removed_mm3) + " mm3 rejected " +
+                    std::to_string(seen->rejected) + " bodies " + std::to_string(seen->bodies.size());
   for (const auto& [place, label] : seen->marks) out += " mark " + std::to_string(place.value) + " " + quoted(label);
   return out;
 }

@@ -1,5 +1,5 @@
-// The instructor's console: a command a line, a line of answer each, so that a person or a script can oversee a room without a
-// window.
+// The instructor's console: a command a line, a line of answer each, so that a person or a script can oversee a room
+// without a window.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -23,8 +23,8 @@ class Console {
   // The room must outlive it.
   explicit Console(RoomDesk& room) : room_(room) {}
 
-  // What there is to say to a line, "ok ..." or "error ...", without its end; nothing for an empty line and for one that begins
-  // with #. May wait for the room.
+  // What there is to say to a line, "ok ..." or "error ...", without its end; nothing for an empty line and for one
+  // that begins with #. May wait for the room.
   [[nodiscard]] std::optional<std::string> answer(std::string_view line);
   // It was told to quit.
   [[nodiscard]] bool over() const { return over_; }

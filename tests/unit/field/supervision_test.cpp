@@ -33,7 +33,8 @@ TEST(ZoneLimit, IsABall) {
 
 // As far apart as numbers go, squares do not wrap round.
 TEST(ZoneLimit, HoldsAtTheEndsOfTheNumbers) {
-  constexpr std::int32_t kLow = std::numeric_limits<std::int32_t>::min(), kHigh = std::numeric_limits<std::int32_t>::max();
+  constexpr std::int32_t kLow = std::numeric_limits<std::int32_t>::min(),
+                         kHigh = std::numeric_limits<std::int32_t>::max();
   const ZoneLimit far{{kLow, kLow, kLow}, 1 << 30};
   EXPECT_FALSE(far.contains({kHigh, kHigh, kHigh}));
   EXPECT_FALSE(far.contains({0, 0, 0}));
@@ -69,8 +70,14 @@ TEST(Supervision, NumbersBeyondItsLimitsAreNamed) {
   std::vector<Digest> most;
   for (std::uint8_t n = 0; n < kMostLimitedTools; ++n) most.push_back(digest(n));
   EXPECT_TRUE(check({}));
-  EXPECT_TRUE(check({.stopped = true, .taken_by = {2}, .guide = {3}, .guide_share = 1000, .force_limit = 10'000,
-                     .zone = ZoneLimit{{1, 2, 3}, 1 << 30}, .tools = most, .words = std::string(256, 'x')}));
+  EXPECT_TRUE(check({.stopped = true,
+                     .taken_by = {2},
+                     .guide = {3},
+                     .guide_share = 1000,
+                     .force_limit = 10'000,
+                     .zone = ZoneLimit{{1, 2, 3}, 1 << 30},
+                     .tools = most,
+                     .words = std::string(256, 'x')}));
   named({.guide_share = -1}, "guide_share");
   named({.guide_share = 1001}, "guide_share");
   named({.force_limit = -1}, "force_limit");

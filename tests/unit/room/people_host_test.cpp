@@ -1,5 +1,5 @@
-// What a host tells of its people: to whom a word goes, what holds for a hand that comes, how far it has heard, and what readers
-// are told who may not hear everything.
+// What a host tells of its people: to whom a word goes, what holds for a hand that comes, how far it has heard, and
+// what readers are told who may not hear everything.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -187,7 +187,9 @@ TEST(PeopleHost, WhoComesIsToldFirstWhatHolds) {
   const auto second = comes();
   ASSERT_TRUE(second->held_);
   EXPECT_TRUE(second->held_->supervision.may_cut());
-  EXPECT_EQ(std::ranges::count_if(lesson.sessions[lesson.trainee]->before_, [](const auto& row) { return row.has_supervised(); }), 0)
+  EXPECT_EQ(std::ranges::count_if(lesson.sessions[lesson.trainee]->before_,
+                                  [](const auto& row) { return row.has_supervised(); }),
+            0)
       << "of whom nobody has decided anything";
 }
 
@@ -249,7 +251,9 @@ TEST(PeopleHost, DrawingsComeAndGoAndWordsAreBounded) {
   Lesson lesson;
   PeopleCursor cursor;
   (void)lesson.news(cursor, lesson.instructor);
-  const auto draw = [&](std::int32_t x) { return lesson.ask([&](Room& room) { return room.annotate(lesson.instructor, {.points = {{x, 2, 3}}}); }); };
+  const auto draw = [&](std::int32_t x) {
+    return lesson.ask([&](Room& room) { return room.annotate(lesson.instructor, {.points = {{x, 2, 3}}}); });
+  };
   ASSERT_TRUE(draw(1));
   ASSERT_TRUE(draw(7));
   v1::WatchPeopleResponse news = lesson.news(cursor, lesson.instructor);
@@ -265,7 +269,8 @@ TEST(PeopleHost, DrawingsComeAndGoAndWordsAreBounded) {
   news = lesson.news(cursor, lesson.instructor);
   EXPECT_EQ(news.annotations_size() + news.wiped_size(), 0);
 
-  for (int i = 0; i < 100; ++i) ASSERT_TRUE(lesson.ask([&](Room& room) { return room.say(lesson.instructor, {}, std::to_string(i)); }));
+  for (int i = 0; i < 100; ++i)
+    ASSERT_TRUE(lesson.ask([&](Room& room) { return room.say(lesson.instructor, {}, std::to_string(i)); }));
   news = lesson.news(cursor, lesson.instructor);
   ASSERT_EQ(news.words_size(), static_cast<int>(PeopleBoard::kMostWords));
   EXPECT_EQ(news.words(news.words_size() - 1).words(), "99") << "the newest";
@@ -344,7 +349,9 @@ TEST(PeopleHost, HandsAreToldOfOthersTools) {
   const auto one = std::make_shared<HeardSession>(host.join(MemberKind::surgeon).value());
   ASSERT_TRUE(host.open_session(one));
   host.offer_state(state(77, 5));
-  const auto told = [&] { return std::ranges::any_of(one->partners(), [](const CuttingState& s) { return s.state_seq == 5; }); };
+  const auto told = [&] {
+    return std::ranges::any_of(one->partners(), [](const CuttingState& s) { return s.state_seq == 5; });
+  };
   for (int i = 0; i < 2000 && !told(); ++i) std::this_thread::sleep_for(5ms);
   EXPECT_TRUE(told());
   host.stop();

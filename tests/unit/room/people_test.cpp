@@ -1,5 +1,5 @@
-// What people decide about each other in a room, draw and say: who may, what it does to cuts, and that its rows make the
-// same room again.
+// What people decide about each other in a room, draw and say: who may, what it does to cuts, and that its rows make
+// the same room again.
 #include "server/room/people.hpp"
 
 #include <gtest/gtest.h>
@@ -100,7 +100,8 @@ TEST(Supervise, ACutThatLeavesItsZoneIsRejected) {
   double way = 0;
   for (std::size_t i = 0; i < 3; ++i) way += std::pow(to[i] - from[i], 2);
   way = std::sqrt(way);
-  ASSERT_TRUE(all.room.supervise(all.instructor, all.trainee, {.zone = ZoneLimit{from, static_cast<std::int32_t>(way) - 1}}));
+  ASSERT_TRUE(
+      all.room.supervise(all.instructor, all.trainee, {.zone = ZoneLimit{from, static_cast<std::int32_t>(way) - 1}}));
   EXPECT_EQ(all.cut(all.trainee).rejection, Rejection::zone) << "its end is outside";
   const auto second = all.cuts.at(all.trainee)[1].path;
   ASSERT_TRUE(all.room.supervise(all.instructor, all.trainee, {.zone = ZoneLimit{second.front().position, 1 << 20}}));
@@ -114,7 +115,9 @@ TEST(Supervise, OnlyAnInstructorDoesAndOnlyAboutAHand) {
   EXPECT_EQ(all.refused(all.room.supervise(AuthorId{99}, all.other, {})), ErrorCode::invalid_input);
   EXPECT_EQ(all.refused(all.room.supervise(all.instructor, all.observer, {.stopped = true})), ErrorCode::not_found);
   EXPECT_EQ(all.refused(all.room.supervise(all.instructor, AuthorId{99}, {})), ErrorCode::not_found);
-  const auto bad = [&](Supervision supervision) { return all.refused(all.room.supervise(all.instructor, all.trainee, supervision)); };
+  const auto bad = [&](Supervision supervision) {
+    return all.refused(all.room.supervise(all.instructor, all.trainee, supervision));
+  };
   EXPECT_EQ(bad({.taken_by = AuthorId{99}}), ErrorCode::invalid_input) << "who has not joined";
   EXPECT_EQ(bad({.guide = all.trainee}), ErrorCode::invalid_input) << "along itself";
   EXPECT_EQ(bad({.tools = {Digest{{1}}}}), ErrorCode::invalid_input) << "a tool that nobody knows";
@@ -205,11 +208,14 @@ TEST(Annotations, AreBounded) {
   EXPECT_EQ(bad(line(kMostAnnotationPoints + 1)), ErrorCode::invalid_input);
   EXPECT_EQ(bad({.points = {}}), ErrorCode::invalid_input);
   EXPECT_EQ(bad({.points = {{1, 2, 3}, {1, 2, 3}}}), ErrorCode::invalid_input);
-  EXPECT_EQ(bad({.kind = AnnotationKind::label, .points = {{1, 2, 3}}}), ErrorCode::invalid_input) << "a label without words";
-  EXPECT_EQ(bad({.points = {{1, 2, 3}}, .words = std::string(kMostAnnotationWords + 1, 'x')}), ErrorCode::invalid_input);
+  EXPECT_EQ(bad({.kind = AnnotationKind::label, .points = {{1, 2, 3}}}), ErrorCode::invalid_input)
+      << "a label without words";
+  EXPECT_EQ(bad({.points = {{1, 2, 3}}, .words = std::string(kMostAnnotationWords + 1, 'x')}),
+            ErrorCode::invalid_input);
   EXPECT_EQ(bad({.points = {{1, 2, 3}}, .colour = 0x1000000}), ErrorCode::invalid_input);
   EXPECT_EQ(bad({.kind = static_cast<AnnotationKind>(9), .points = {{1, 2, 3}}}), ErrorCode::invalid_input);
-  for (std::size_t i = 0; i < kMostAnnotations; ++i) ASSERT_TRUE(all.room.annotate(all.trainee, line(kMostAnnotationPoints)));
+  for (std::size_t i = 0; i < kMostAnnotations; ++i)
+    ASSERT_TRUE(all.room.annotate(all.trainee, line(kMostAnnotationPoints)));
   EXPECT_EQ(bad(line(2)), ErrorCode::invalid_input);
   ASSERT_TRUE(all.room.wipe_off(all.trainee, 17));
   EXPECT_TRUE(all.room.annotate(all.instructor, line(2)));
@@ -222,7 +228,8 @@ TEST(Words, HaveAPlaceAndALength) {
   EXPECT_EQ(said->kind, EventKind::words);
   EXPECT_EQ(std::get<WordsRow>(said->people).words, "slower");
   EXPECT_TRUE(all.room.say(all.trainee, {}, std::string(kMostWordsBytes, 'x')));
-  EXPECT_EQ(all.refused(all.room.say(all.trainee, {}, std::string(kMostWordsBytes + 1, 'x'))), ErrorCode::invalid_input);
+  EXPECT_EQ(all.refused(all.room.say(all.trainee, {}, std::string(kMostWordsBytes + 1, 'x'))),
+            ErrorCode::invalid_input);
   EXPECT_EQ(all.refused(all.room.say(all.trainee, {}, "")), ErrorCode::invalid_input);
   EXPECT_EQ(all.refused(all.room.say(all.trainee, AuthorId{99}, "who?")), ErrorCode::not_found);
   EXPECT_EQ(all.refused(all.room.say(AuthorId{99}, {}, "me")), ErrorCode::invalid_input);
@@ -247,7 +254,8 @@ TEST(PeopleRows, ReplayedMakeTheSameRoom) {
       all.room.set_time(all.room.time() + 8ms);
       switch (random() % 8) {
         case 0: {
-          Supervision word{.stopped = random() % 3 == 0, .force_limit = static_cast<int>(random() % 900), .words = "words"};
+          Supervision word{
+              .stopped = random() % 3 == 0, .force_limit = static_cast<int>(random() % 900), .words = "words"};
           if (random() % 3 == 0) word.taken_by = all.instructor;
           if (random() % 3 == 0) word.guide = all.instructor, word.guide_share = 500;
           if (random() % 3 == 0) word.zone = ZoneLimit{{-1, 2, 3}, 1 << 13};
@@ -255,11 +263,21 @@ TEST(PeopleRows, ReplayedMakeTheSameRoom) {
           (void)all.room.supervise(all.instructor, subject, word);
           break;
         }
-        case 1: (void)all.room.annotate(by, random() % 2 ? line(2 + random() % 5) : Annotation{.points = {{-7, 8, 9}}, .words = "here", .colour = 1}); break;
-        case 2: (void)all.room.wipe_off(by, static_cast<std::uint32_t>(1 + random() % 6)); break;
-        case 3: (void)all.room.say(by, random() % 2 ? subject : AuthorId{}, "so"); break;
-        case 4: (void)all.room.undo_last(by, 1, {}); break;
-        default: (void)all.cut(by);
+        case 1:
+          (void)all.room.annotate(by, random() % 2 ? line(2 + random() % 5)
+                                                   : Annotation{.points = {{-7, 8, 9}}, .words = "here", .colour = 1});
+          break;
+        case 2:
+          (void)all.room.wipe_off(by, static_cast<std::uint32_t>(1 + random() % 6));
+          break;
+        case 3:
+          (void)all.room.say(by, random() % 2 ? subject : AuthorId{}, "so");
+          break;
+        case 4:
+          (void)all.room.undo_last(by, 1, {});
+          break;
+        default:
+          (void)all.cut(by);
       }
       for (const RoomRow& row : all.room.take_rows()) {
         kinds.insert(row.what.index());
@@ -282,7 +300,9 @@ TEST(PeopleRows, EveryOneOfThemIsInTheHash) {
   Class plain, all;
   EXPECT_EQ(plain.room.room_hash(), all.room.room_hash());
   std::set<std::string> hashes{to_hex(all.room.room_hash())};
-  const auto changed = [&](const char* what) { EXPECT_TRUE(hashes.insert(to_hex(all.room.room_hash())).second) << what; };
+  const auto changed = [&](const char* what) {
+    EXPECT_TRUE(hashes.insert(to_hex(all.room.room_hash())).second) << what;
+  };
   const auto decide = [&](const char* what, const Supervision& word) {
     // At the same place of the order each time: beside the others, not after them.
     all = Class();
