@@ -9,6 +9,8 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
+#include <span>
 #include <thread>
 #include <variant>
 
@@ -63,11 +65,15 @@ struct SceneSet {
   RoomSeq place;
   std::vector<SceneItem> items;
 };
+struct ToolNamed {
+  std::string name;  // that somebody else holds
+};
 struct Interrupted {
   std::string why;  // the line to the room is down, and is being made again
 };
 using FromRoom =
-    std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, SceneSet, HandSupervised, WordsSaid, Noted, Interrupted>;
+    std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, SceneSet, HandSupervised, WordsSaid, ToolNamed, Noted,
+                 Interrupted>;
 
 // Others' tools, as they were heard of last.
 struct Partners {
@@ -77,8 +83,21 @@ struct Partners {
     std::uint64_t state_seq = 0;
     Pose pose_bone_tool, pose_bone_device;
     std::int64_t heard_ns = 0;
+    std::size_t tool = 0;  // name, hashed
   };
   std::array<Partner, kMost> of;
+};
+
+// The solids of tools that others hold, by their names' hashes; these stay as long as the client.
+struct PartnerSolids {
+  static constexpr std::size_t kMost = 32;
+  std::array<std::pair<std::size_t, const SolidLattice*>, kMost> of{};
+  std::size_t count = 0;
+  [[nodiscard]] const SolidLattice* find(std::size_t tool) const noexcept {
+    for (std::size_t i = 0; i < count; ++i)
+      if (of[i].first == tool) return of[i].second;
+    return nullptr;
+  }
 };
 
 GuideSeen guide_among(const Partners& partners, AuthorId guide) {
@@ -116,6 +135,7 @@ class Client {
     for (auto& time : tick_times_) time.store(0, std::memory_order_relaxed);
     for (const ToolModel& model : session_.plan().tools) tool_names_.push_back(model.tool.name);
     if (tool_names_.empty()) tool_names_.emplace_back("none");
+    session_.loop().feel_partners();
     outcome_.limits = session_.device().limits();
     outcome_.loop = session_.loop().params();
     outcome_.removed_mm3.resize(session_.plan().steps.size());
@@ -212,7 +232,11 @@ class Client {
     };
     events.stop_flag = [this](std::uint64_t lease_epoch, bool frozen) { stop_flag_ = packed(StopFlag{lease_epoch, frozen}); };
     events.said = [pass](const WordsSaid& said) { pass(said); };
-    events.partner = [this](const CuttingState& state) { hear_partner(state); };
+    events.partner = [this, pass](const CuttingState& state) {
+      hear_partner(state);
+      if (!state.tool_name.empty() && named_tools_.size() < PartnerSolids::kMost && named_tools_.insert(state.tool_name).second)
+        pass(ToolNamed{state.tool_name});
+    };
     events.interrupted = [pass](const Error& why) { pass(Interrupted{why.message}); };
     events.lost = [this](const Error& why) { give_up(why); };
     room_.open(std::move(events));
@@ -229,7 +253,8 @@ class Client {
       }
       if (partner.heard_ns < place->heard_ns) place = &partner;
     }
-    *place = {state.author, state.state_seq, state.pose_bone_tool, state.pose_bone_device, ns(Clock::now())};
+    *place = {state.author, state.state_seq, state.pose_bone_tool, state.pose_bone_device, ns(Clock::now()),
+              std::hash<std::string>{}(state.tool_name)};
     partners_.store(heard_partners_);
   }
 
@@ -240,6 +265,16 @@ class Client {
     loop.oversee(unpacked(stop_flag_.load(std::memory_order_relaxed)));
     partners_.refresh();
     loop.see_guide(guide_among(partners_.value(), loop.overseer().now().guide));
+    partner_solids_.refresh();
+    const std::int64_t now_ns = ns(Clock::now());
+    const double line_s = line_lag_s_.load(std::memory_order_relaxed);
+    std::size_t count = 0;
+    for (const Partners::Partner& partner : partners_.value().of)
+      if (partner.author)
+        felt_partners_[count++] = {partner.author.value, partner.pose_bone_tool,
+                                   line_s + 1e-9 * static_cast<double>(now_ns - partner.heard_ns),
+                                   partner_solids_.value().find(partner.tool)};
+    loop.see_partners(std::span(felt_partners_).first(count));
   }
 
   // Spindle and force run down and the client ends with this.
@@ -449,6 +484,18 @@ class Client {
     log::info("words", {{"room_seq", said.place.value}, {"from", said.from.value}, {"words", said.words}});
     outcome_.words.push_back({ns(Clock::now()), said.place.value, said.from.value, said.words});
   }
+  // Others' tools are felt by what they are made of, as far as the room's tools say it.
+  void take(const ToolNamed& named) {
+    for (const ToolBox::Entry* entry : room_.tools()->entries()) {
+      if (entry->tool.name != named.name) continue;
+      std::shared_ptr<const SolidLattice>& solid = solids_[entry->hash];
+      if (!solid) solid = std::make_shared<const SolidLattice>(entry->tool);
+      if (known_solids_.count == PartnerSolids::kMost) return;
+      known_solids_.of[known_solids_.count++] = {std::hash<std::string>{}(named.name), solid.get()};
+      partner_solids_.store(known_solids_);
+      return;
+    }
+  }
   void take(const Noted& noted) { replica_.note(noted.place); }
   void take(const SceneSet& scene) {
     replica_.note(scene.place);
@@ -549,6 +596,10 @@ class Client {
       if (realtime_refused_.exchange(false))
         log::warn("the haptic loop has no real-time priority", {{"remedy", "see osteon-haptic check"}});
       if (any && link_ok_) room_.send(state_of(row));
+      if (Clock::now() >= lag_asked_ + 200ms) {
+        lag_asked_ = Clock::now();
+        line_lag_s_ = 1e-3 * room_.fast_path().round_trip_ms;
+      }
       set_items();
       if (over) break;
       if (options_.status && any && Clock::now() >= next_status) {
@@ -655,7 +706,11 @@ class Client {
   LatestValue<Oversight> oversights_;             // what an instructor has decided, session → haptic
   std::atomic<std::uint64_t> stop_flag_{0};       // the newest datagram's word on it, likewise
   LatestValue<Partners> partners_;                // others' tools, session → haptic
-  Partners heard_partners_;                       // of the session's
+  Partners heard_partners_;                       // of the session's, as the next
+  std::set<std::string> named_tools_;
+  LatestValue<PartnerSolids> partner_solids_;     // replica → haptic
+  PartnerSolids known_solids_;                    // replica thread
+  std::atomic<double> line_lag_s_{0};             // how old a partner's state is when it comes: both lines taken to be alike
   EventQueue<TickRow, 2048> rows_; // haptic → reporter
   LatestValue<TickStats> live_;    // haptic → reporter, once a second
   TickStats told_;                 // reporter: of the last line
@@ -676,9 +731,11 @@ class Client {
 
   // Haptic thread.
   TickRow row_;
+  std::array<PartnerTool, Partners::kMost> felt_partners_;
   const Site* site_ = nullptr;
   bool taken_up_ = false;
   // Reporter thread.
+  Clock::time_point lag_asked_{};
   bool was_forbidden_ = false, was_led_ = false;
   double force_before_n_ = 0;
   std::vector<OversightNote> loop_notes_;

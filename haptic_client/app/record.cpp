@@ -23,7 +23,7 @@ std::string law_name(const ToolModel& model) { return std::string(model.law->nam
 std::vector<std::string> event_names() {
   constexpr std::array kNames{"uncovered", "force limited", "slew limited", "cuts waiting", "missed ticks",
                               "heel contact", "guided", "stalled", "breakthrough", "pushed away",
-                              "energy limited", "ramping", "room held", "forbidden", "hand guided"};
+                              "energy limited", "ramping", "room held", "forbidden", "hand guided", "partner touched"};
   static_assert(kNames.size() == kLoopEvents);
   return {kNames.begin(), kNames.end()};
 }

@@ -1,6 +1,7 @@
 #include "haptic_client/control/haptic_loop.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "common/mechanics/drilling.hpp"
@@ -43,6 +44,8 @@ void HapticLoop::take_up(int tool, const Pose& pose_bone_tool, const WorkspaceMa
   ledger_.reset();
   motor_.reset();
   guide_pull_.reset();
+  partner_contact_.reset();
+  partner_n_.setZero();
   if (!effects_.empty()) effects_[static_cast<std::size_t>(tool)].take_up();
   shown_ = {};
   motor_nmm_.setZero();
@@ -266,8 +269,10 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   report.motor_device_n = mapping_.to_device(motor_n);
   // What the contact leaves of the growth that nobody's hand causes is the pull's.
   const double grown_n = growth(shown_.force_n, before_n).norm() - by_hand_n;
-  lead(input, std::max(0.0, limit_n - shown_.force_n.norm() - motor_n.norm()), std::clamp(slow - grown_n, 0.0, slow), report);
-  report.force_device_n = report.coupling_device_n + report.motor_device_n + report.guide_device_n;
+  const double room_n = std::max(0.0, limit_n - shown_.force_n.norm() - motor_n.norm());
+  const double left_n = meet(input, room_n, std::clamp(slow - grown_n, 0.0, slow), report);
+  lead(input, room_n - partner_n_.norm(), left_n, report);
+  report.force_device_n = report.coupling_device_n + report.motor_device_n + report.guide_device_n + report.partner_device_n;
 
   // So too the moment of the cut, never a force: no more than the force shown would be at the arm of a turn, and no faster
   // than force grows that the hand did not cause.
@@ -278,6 +283,35 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   motor_nmm_ = clamped(clamped(motor_nmm, motor_nmm_.norm() + turn_arm_mm_ * slow), most_nmm);
   report.motor_device_nmm = mapping_.to_device(motor_nmm_);
   report.torque_device_nmm = report.coupling_device_nmm + report.motor_device_nmm;
+}
+
+void HapticLoop::feel_partners() {
+  touch_points_.clear();
+  for (const ToolModel& model : tools_) touch_points_.emplace_back(model.tool);
+}
+
+double HapticLoop::meet(const LoopInput& input, double room_n, double slew_n, LoopReport& report) noexcept {
+  const bool safe = placed_ && input.device_ok && input.periods <= 3 && !input.clutch && input.room != RoomLink::over;
+  if (touch_points_.empty() || !safe) {
+    partner_contact_.reset();
+    partner_n_.setZero();
+    return slew_n;
+  }
+  // Whoever leads this hand, or holds its tool, is where it is.
+  std::array<PartnerTool, PartnerContact::kMost> others;
+  std::size_t count = 0;
+  const Oversight& oversight = overseer_.now();
+  for (const PartnerTool& partner : partners_)
+    if (count < others.size() && partner.author != oversight.guide.value && partner.author != oversight.taken_by.value)
+      others[count++] = partner;
+  const PartnerForce felt = partner_contact_.step(touch_points_[static_cast<std::size_t>(tool_)], report.pose_bone_proxy,
+                                                  std::span(others).first(count), params_.dt_s);
+  if (felt.author != 0) report.events |= kPartnerTouched;
+  const Vec3 wanted_n = clamped(params_.force_scale * felt.force_n, room_n), step_n = growth(wanted_n, partner_n_);
+  const Vec3 less_n = step_n - clamped(step_n, slew_n);
+  partner_n_ = wanted_n - less_n;
+  report.partner_device_n = mapping_.to_device(partner_n_);
+  return slew_n - (step_n - less_n).norm();
 }
 
 void HapticLoop::lead(const LoopInput& input, double room_n, double slew_n, LoopReport& report) noexcept {

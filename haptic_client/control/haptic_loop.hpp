@@ -18,6 +18,7 @@
 #include "haptic_client/control/guiding.hpp"
 #include "haptic_client/control/motor_port.hpp"
 #include "haptic_client/control/oversight.hpp"
+#include "haptic_client/control/partner_contact.hpp"
 #include "haptic_client/control/proxy.hpp"
 #include "haptic_client/control/workspace_mapping.hpp"
 
@@ -78,9 +79,10 @@ enum LoopEvent : std::uint32_t {
   kRoomHeld = 4096,      // the room takes no cuts: the spindle stands
   kForbidden = 8192,     // an instructor does not let this tool cut here now: the spindle stands
   kHandGuided = 16384,   // another's hand leads this one
+  kPartnerTouched = 32768,  // another's tool pushes this one
 };
 // Bits up to the last of them.
-inline constexpr std::size_t kLoopEvents = std::bit_width(std::uint32_t{kHandGuided});
+inline constexpr std::size_t kLoopEvents = std::bit_width(std::uint32_t{kPartnerTouched});
 
 struct LoopReport {
   Vec3 force_device_n = Vec3::Zero();    // to write to the device, device frame
@@ -90,7 +92,8 @@ struct LoopReport {
   double pushed_back_mj = 0;             // that a cut's force would have given the tool in a tick that turning undid; not shown
   Vec3 coupling_device_n = Vec3::Zero(); // what of force_device_n is the coupling's: passive
   Vec3 motor_device_n = Vec3::Zero();    // of the motor: active, within s · mu · normal force
-  Vec3 guide_device_n = Vec3::Zero();    // the rest, of a hand that leads this one: what that one's motion pays for
+  Vec3 guide_device_n = Vec3::Zero();    // of a hand that leads this one: what that one's motion pays for
+  Vec3 partner_device_n = Vec3::Zero();  // the rest, of others' tools that touch this one
   Vec3 torque_physical_nmm = Vec3::Zero();  // of the bone on the tool about its tip, bone frame; not scaled
   Vec3 torque_device_nmm = Vec3::Zero();    // to write to a device that shows torque, device frame: the sum of these
   Vec3 coupling_device_nmm = Vec3::Zero();  // of the turn's spring: passive, in the ledger
@@ -121,6 +124,10 @@ class HapticLoop {
   void oversee(const Oversight& oversight) noexcept { overseer_.set(oversight); }
   void oversee(const StopFlag& flag) noexcept { overseer_.set(flag); }
   void see_guide(const GuideSeen& seen) noexcept { guide_seen_ = seen; }  // of whom the oversight names
+  // Others' tools are felt from now on. Before the first tick, off the haptic thread: it makes points of every tool.
+  void feel_partners();
+  // [haptic] Where they are; to be there through the next tick. Who leads this hand or holds its tool is not felt.
+  void see_partners(std::span<const PartnerTool> partners) noexcept { partners_ = partners; }
   // [haptic] `patch`: the newest there is; `guides`: those that stand on the bone.
   LoopReport tick(const LoopInput& input, const Patch& patch, std::span<const PlacedGuide> guides = {}) noexcept;
 
@@ -148,6 +155,8 @@ class HapticLoop {
             const Vec3& cut_nmm, LoopReport& report) noexcept;
   // The pull of another's hand, in what limit and slew leave.
   void lead(const LoopInput& input, double room_n, double slew_n, LoopReport& report) noexcept;
+  // What others' tools do to this one, likewise; what is left of the slew.
+  double meet(const LoopInput& input, double room_n, double slew_n, LoopReport& report) noexcept;
   // Growth of force on the device in this tick that no hand caused.
   [[nodiscard]] double slow_n(const LoopInput& input) const noexcept;
   [[nodiscard]] static Vec3 growth(const Vec3& wanted, const Vec3& now) noexcept;
@@ -178,6 +187,10 @@ class HapticLoop {
   Overseer overseer_;
   GuidePull guide_pull_;
   GuideSeen guide_seen_;
+  std::vector<TouchPoints> touch_points_; // of each tool; none: partners are not felt
+  PartnerContact partner_contact_;
+  std::span<const PartnerTool> partners_;
+  Vec3 partner_n_ = Vec3::Zero();         // shown in the last tick, bone frame
   Wrench shown_;                          // of the coupling, rendered in the last tick, bone frame
   Vec3 motor_nmm_ = Vec3::Zero();         // of the motor, likewise
   double turn_arm_mm_ = 0;                // of a turn that does work at the handle; zero where no torque is shown

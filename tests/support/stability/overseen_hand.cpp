@@ -36,6 +36,7 @@ OverseenHand::OverseenHand(const OverseenRun& run)
   params.ramp_s = 1e-9;
   params.slew_n_per_ms = run.slew_n_per_ms;
   loop_ = std::make_unique<HapticLoop>(params, std::vector<ToolModel>{ToolModel(*find_tool(run.tool), bone_.pitch_mm())});
+  loop_->feel_partners();
   const Pose start{{0, 0, -3}, rotation_};
   WorkspaceMapping mapping;
   mapping.align(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized())), run.weak ? 0.5 : 1.0, Vec3::Zero(),
@@ -73,6 +74,7 @@ LoopReport OverseenHand::tick() {
   {
     const AllocationCounter heap;
     loop_->see_guide(guide);
+    loop_->see_partners(partners);
     last_ = loop_->tick(input, patch_);
     crossed_.allocations += heap.count();
   }
@@ -97,9 +99,10 @@ void OverseenHand::see(const LoopReport& report, const Vec3& handle_mm) {
   const double by_hand_n = k * (2.0 * moved_mm.norm() + moved_before_mm_);
   const double coupling_n = std::max(0.0, growth(report.coupling_device_n, coupling_n_).norm() - by_hand_n);
   const double guide_n = growth(report.guide_device_n, guide_n_).norm();
+  const double partner_n = growth(report.partner_device_n, partner_n_).norm();
   // Against what is meant to be the limit, whatever the loop was told.
   constexpr double kSlew_n = 0.5;
-  crossed_.step_over_slew = std::max(crossed_.step_over_slew, (coupling_n + guide_n) / kSlew_n);
+  crossed_.step_over_slew = std::max(crossed_.step_over_slew, (coupling_n + guide_n + partner_n) / kSlew_n);
   crossed_.fall_n = std::max(crossed_.fall_n, force_n_.norm() - report.force_device_n.norm());
 
   const double cut_mj = params.force_scale / loop_->mapping().scale() * report.cutting_work_mj;
@@ -115,6 +118,7 @@ void OverseenHand::see(const LoopReport& report, const Vec3& handle_mm) {
 
   coupling_n_ = report.coupling_device_n;
   guide_n_ = report.guide_device_n;
+  partner_n_ = report.partner_device_n;
   force_n_ = report.force_device_n;
   handle_mm_ = handle_mm;
   moved_before_mm_ = moved_mm.norm();

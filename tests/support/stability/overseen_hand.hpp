@@ -23,7 +23,7 @@ struct OverseenRun {
 
 // Of what crossed the handle.
 struct Crossed {
-  double step_over_slew = 0;  // largest growth of coupling and pull in a tick that the hand's motion does not explain
+  double step_over_slew = 0;  // largest growth of coupling, pull and others' tools in a tick that the hand's motion does not explain
   double worst_mj = 0;        // most that one contact has given the hand and the cut beyond what it got
   double led_mj = 0;          // the same of the pull, beyond what its far end's motion has paid
   double fall_n = 0;          // largest fall of the whole force in a tick
@@ -45,6 +45,7 @@ class OverseenHand {
   HandCommand command;
   bool pedal = false;
   haptic::GuideSeen guide;
+  std::vector<haptic::PartnerTool> partners;
 
   [[nodiscard]] const Crossed& crossed() const { return crossed_; }
   [[nodiscard]] const std::vector<Cut>& cuts() const { return cuts_; }  // that the loop has closed
@@ -80,7 +81,7 @@ class OverseenHand {
   Eigen::Quaterniond rotation_;
 
   Crossed crossed_;
-  Vec3 handle_mm_, coupling_n_ = Vec3::Zero(), guide_n_ = Vec3::Zero(), force_n_ = Vec3::Zero();
+  Vec3 handle_mm_, coupling_n_ = Vec3::Zero(), guide_n_ = Vec3::Zero(), partner_n_ = Vec3::Zero(), force_n_ = Vec3::Zero();
   double moved_before_mm_ = 0, episode_mj_ = 0;
   bool seen_ = false;
 };

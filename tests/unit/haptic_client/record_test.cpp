@@ -349,6 +349,7 @@ TEST(Recording, NamesItsEvents) {
   EXPECT_EQ(named(kRoomHeld), "room held");
   EXPECT_EQ(named(kForbidden), "forbidden");
   EXPECT_EQ(named(kHandGuided), "hand guided");
+  EXPECT_EQ(named(kPartnerTouched), "partner touched");
   EXPECT_EQ(names.size(), kLoopEvents);
 }
 

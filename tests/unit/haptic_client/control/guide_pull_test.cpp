@@ -233,6 +233,38 @@ TEST_P(LedAtTheBone, PullAndContactTogetherStayWithinTheLimits) {
   EXPECT_LE(crossed.led_mj, kBudget_mj);
   EXPECT_EQ(crossed.allocations, 0);
 }
+// Another's bur beside the own one pushes it aside, within the same limit together with all else; who leads the hand, or has its
+// tool, is where it is and pushes nothing.
+TEST(PartnersTool, PushesTheHandUnlessItLeadsIt) {
+  for (const bool weak : {false, true}) {
+    OverseenHand hand({.weak = weak});
+    const SolidLattice solid(*find_tool("burr-round-5"));
+    const double s = hand.loop().params().force_scale;
+    hand.pedal = true;
+    double most_n = 0.0;
+    for (int i = 0; i < 9000; ++i) {
+      hand.command.target_mm = Vec3(4.0 * std::sin(1.5e-3 * i), 0, std::min(1.5, -3.0 + 6e-3 * i));
+      // Some two millimetres within it, to and fro; it jumps there as states do.
+      const Vec3 beside_mm(3.5 + 2.0 * std::sin(0.7e-3 * (i - i % 16)), 0, hand.command.target_mm.z());
+      hand.partners = {{2, {beside_mm, Eigen::Quaterniond::Identity()}, 0.03, &solid}};
+      Supervision led;
+      led.guide = AuthorId{2};
+      led.guide_share = 300;
+      if (i == 6000) hand.decide(led);
+      const LoopReport now = hand.tick();
+      most_n = std::max(most_n, now.partner_device_n.norm());
+      if (i > 6001) { ASSERT_EQ(now.partner_device_n.norm(), 0.0) << i; }
+    }
+    std::printf("  %s: %.2f N of the partner's tool, step over slew %.3f\n", weak ? "weak" : "strong", most_n,
+                hand.crossed().step_over_slew);
+    EXPECT_GT(most_n, 0.5 * s);
+    EXPECT_LE(most_n, 6.0 * s + 1e-9);
+    EXPECT_LE(hand.crossed().step_over_slew, 1.0 + 1e-6);
+    EXPECT_LE(hand.crossed().worst_mj, kBudget_mj);
+    EXPECT_EQ(hand.crossed().allocations, 0);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Lines, LedAtTheBone, ::testing::Combine(::testing::Values(0, 50, 150), ::testing::Bool()));
 
 }  // namespace

@@ -243,6 +243,27 @@ INSTANTIATE_TEST_SUITE_P(Tools, Overseen,
                                            Case("burr-round-5", 150, false), Case("drill-3.2", 0, true),
                                            Case("drill-3.2", 50, false), Case("drill-3.2", 150, true)));
 
+// What is found to be within the limit is so because the loop keeps to it: one that lets force grow ten times as fast is seen.
+TEST(OverseenHand, SeesAStepThatIsTooLarge) {
+  double most = 0.0;
+  for (const char* tool : {"burr-round-5", "drill-3.2"}) {
+    Pressed pressed({.tool = tool, .delay_ms = 50, .slew_n_per_ms = 5.0});
+    Supervision stopped;
+    stopped.stopped = true;
+    for (int round = 0; round < 4; ++round) {
+      pressed.work(2500);
+      pressed.hand.decide(stopped);
+      pressed.work(100);
+      pressed.hand.undo(10 + 60 * round);
+      pressed.work(650);
+      pressed.hand.decide({});
+      pressed.lift();
+    }
+    most = std::max(most, pressed.hand.crossed().step_over_slew);
+  }
+  EXPECT_GT(most, 1.5);
+}
+
 // A bur that is led to and fro across the edge of where it may cut: no path leaves that, and beyond it the bone is whole.
 TEST(Zone, NothingIsCutBeyondItsEdge) {
   OverseenHand hand({});
