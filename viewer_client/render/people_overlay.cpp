@@ -32,7 +32,7 @@ namespace osteon {
 namespace {
 
 // Of the screen, in pixels.
-constexpr double kArrow = 74.0, kTube = 2.4, kDot = 5.0, kBeside = 14.0, kAlongTool = 80.0;
+constexpr double kArrow = 92.0, kTube = 2.8, kDot = 5.5, kBeside = 14.0, kAlongTool = 110.0;
 constexpr int kLabelText = 16, kNameText = 15, kSaidText = 19, kHoldingText = 22, kHintText = 16;
 // Characters of the font are about half as wide as high.
 constexpr double kCharacter = 0.52;
@@ -281,7 +281,7 @@ std::array<double, 2> PeopleOverlay::Impl::on_screen(const Vec3& point_mm) {
   return {bone.GetDisplayPoint()[0], bone.GetDisplayPoint()[1]};
 }
 
-// To the right of the point, lower where another text is there already.
+// To the right of the point; where another text is there already, nearer to the picture's middle row.
 void PeopleOverlay::Impl::put_beside(vtkTextActor* text, const Vec3& point_mm) {
   const auto [x, y] = on_screen(point_mm);
   const int* size = window.GetSize();
@@ -295,11 +295,12 @@ void PeopleOverlay::Impl::put_beside(vtkTextActor* text, const Vec3& point_mm) {
   // To the left where the window ends on the right.
   int left = static_cast<int>(std::lround(x + kBeside)), bottom = static_cast<int>(std::lround(y)) - height / 2;
   if (left + width > size[0]) left = static_cast<int>(std::lround(x - kBeside)) - width;
+  const bool upwards = y < 0.5 * size[1];
   for (bool free = false; !free;) {
     free = true;
     for (const auto& [l, r, b, t] : taken) {
       if (left > r || left + width < l || bottom > t || bottom + height < b) continue;
-      bottom = b - height - 4;
+      bottom = upwards ? t + 4 : b - height - 4;
       free = false;
       break;
     }
@@ -331,7 +332,7 @@ void PeopleOverlay::Impl::place(Drawn& one) {
     const Vec3 normal = one.normal.value_or(-sight);
     const Vec3 upwards = Vec3::UnitZ() - normal.z() * normal;
     const Vec3 aside = upwards.norm() > 0.1 ? upwards.normalized() : normal.unitOrthogonal();
-    const Vec3 outwards = (normal + 0.8 * aside).normalized();
+    const Vec3 outwards = (normal + 1.2 * aside).normalized();
     // VTK's inverted arrow runs from its tip at the origin along +x.
     const Eigen::Matrix3d turn = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitX(), outwards).toRotationMatrix();
     for (int row = 0; row < 3; ++row) {
@@ -352,6 +353,14 @@ void PeopleOverlay::Impl::place(Drawn& one) {
 
 void PeopleOverlay::place() {
   impl_->taken.clear();
+  for (vtkTextActor* text : {impl_->said.Get(), impl_->holding.Get(), impl_->hint.Get()}) {
+    if (text->GetVisibility() == 0) continue;
+    double box[4];
+    text->GetBoundingBox(impl_->above, box);
+    const int* at = text->GetPositionCoordinate()->GetComputedViewportValue(impl_->above);
+    const auto edge = [&](int which) { return at[which / 2] + static_cast<int>(box[which]); };
+    impl_->taken.push_back({edge(0), edge(1), edge(2), edge(3)});
+  }
   for (auto& [id, one] : impl_->drawn) impl_->place(one);
   if (impl_->stroke) impl_->place(*impl_->stroke);
   bool named = false;
