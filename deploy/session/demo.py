@@ -12,8 +12,9 @@ import plans
 import plots
 import record
 import report
+import together
 from processes import Failure
-from session import ROOT, Session, save
+from session import ROOT, Session, case_info, save
 
 EXAMPLE = "usr/share/doc/invesalius-examples/examples/Cranium.inv3"
 
@@ -83,6 +84,10 @@ def run_on_some_side(programs, case, directions, out):
     return None
 
 
+def case_title(programs, case):
+    return case_info(programs, case).get("title") or case.name
+
+
 def end_politely(*_):
     raise KeyboardInterrupt
 
@@ -92,6 +97,7 @@ def main():
     parser.add_argument("--case", type=Path)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--build", type=Path, required=True)
+    parser.add_argument("--together", action="store_true")
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, end_politely)
     programs = options.build / "bin"
@@ -105,6 +111,9 @@ def main():
             shutil.rmtree(out)
         out.mkdir(parents=True)
         (out / ".osteon-session").touch()
+        if options.together:
+            sides = plans.ANY_SIDE[1:3] if options.case else [plans.LEFT_PARIETAL, plans.RIGHT_PARIETAL]
+            return together.run(programs, case, sides, out, say, DEVICE, case_title(programs, case))
         directions = plans.ANY_SIDE if options.case else [plans.LEFT_PARIETAL]
         numbers = run_on_some_side(programs, case, directions, out)
         say("Writing the report")

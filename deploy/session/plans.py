@@ -2,6 +2,7 @@
 
 # Towards the left parietal bone of a skull in the patient's frame: x left, y back, z up.
 LEFT_PARIETAL = [0.75, 0.25, 0.65]
+RIGHT_PARIETAL = [-0.75, 0.25, 0.65]
 # Where the bone is not known: from above, then from each side, until one meets bone.
 ANY_SIDE = [[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1]]
 
