@@ -22,6 +22,7 @@
 #include "common/runtime/periodic.hpp"
 #include "common/runtime/watchdog.hpp"
 #include "haptic_client/control/guiding.hpp"
+#include "haptic_client/control/mounted_bone.hpp"
 #include "haptic_client/control/patch_builder.hpp"
 #include "haptic_client/control/replica.hpp"
 #include "haptic_client/control/room_watch.hpp"
@@ -119,6 +120,12 @@ std::string words_of(const Supervision& now) {
   return words;
 }
 
+// Where the bone stands on its mount; lines to the room are counted from 1.
+struct ToldPlace {
+  std::uint64_t line = 0;
+  BoneSeen seen;
+};
+
 // Where the tool is, for the replica's thread.
 struct ToolPlace {
   Pose pose_bone_tool;
@@ -131,7 +138,7 @@ class Client {
  public:
   Client(RoomSession& room, Session& session, const ClientOptions& options, const StopSignal& stop)
       : room_(room), options_(options), stop_(stop), session_(session),
-        replica_(room.bone(), BodyId{}, room.tools()), lease_epoch_(room.room().lease_epoch) {
+        mounted_(mount_about(room.bone().bounds().centre_mm())), replica_(room.bone(), BodyId{}, room.tools()), lease_epoch_(room.room().lease_epoch) {
     for (auto& time : tick_times_) time.store(0, std::memory_order_relaxed);
     for (const ToolModel& model : session_.plan().tools) tool_names_.push_back(model.tool.name);
     if (tool_names_.empty()) tool_names_.emplace_back("none");
@@ -157,6 +164,9 @@ class Client {
     all_over_ = true;
     reporter.join();
     outcome_.fast_path = room_.fast_path();
+    const ShownBone& shown = mounted_.shown();
+    outcome_.mount = {mounted_.there(), mounted_.most_mm(), mounted_.most_rad(), shown.put_in_mj(), shown.released_mj(),
+                      shown.given_mj(), shown.granted_mj(), shown.low_pass_s()};
     room_.close();
     {
       const std::lock_guard lock(mutex_);
@@ -237,7 +247,11 @@ class Client {
       if (!state.tool_name.empty() && named_tools_.size() < PartnerSolids::kMost && named_tools_.insert(state.tool_name).second)
         pass(ToolNamed{state.tool_name});
     };
-    events.interrupted = [pass](const Error& why) { pass(Interrupted{why.message}); };
+    events.bone = [this](const BoneSeen& seen) { places_of_bone_.store(ToldPlace{line_, seen}); };
+    events.interrupted = [this, pass](const Error& why) {
+      ++line_;
+      pass(Interrupted{why.message});
+    };
     events.lost = [this](const Error& why) { give_up(why); };
     room_.open(std::move(events));
   }
@@ -277,6 +291,13 @@ class Client {
     loop.see_partners(std::span(felt_partners_).first(count));
   }
 
+  // [haptic] The bone on its mount, under what the last tick did to it.
+  void move_bone() {
+    if (places_of_bone_.refresh()) mounted_.see(places_of_bone_.value().line, places_of_bone_.value().seen);
+    mounted_.step(session_.loop(), last_);
+    if (const std::optional<BonePush> push = mounted_.push()) pushes_.store(*push);
+  }
+
   // Spindle and force run down and the client ends with this.
   void give_up(const Error& why) {
     const std::lock_guard lock(mutex_);
@@ -312,7 +333,9 @@ class Client {
       guides_.refresh();
       oversee();
       const RoomLink room = over ? RoomLink::over : follows ? RoomLink::follows : RoomLink::held;
+      move_bone();
       const SessionTick now = session_.tick(patches_.value(), room, periods, &guides_.value());
+      last_ = now.report;
       items_left_.store(session_.left().size(), std::memory_order_release);
 
       const std::int64_t woke_ns = ns(timer.woke());
@@ -596,6 +619,7 @@ class Client {
       if (realtime_refused_.exchange(false))
         log::warn("the haptic loop has no real-time priority", {{"remedy", "see osteon-haptic check"}});
       if (any && link_ok_) room_.send(state_of(row));
+      if (pushes_.refresh() && link_ok_) room_.send(pushes_.value());
       if (Clock::now() >= lag_asked_ + 200ms) {
         lag_asked_ = Clock::now();
         line_lag_s_ = 1e-3 * room_.fast_path().round_trip_ms;
@@ -692,6 +716,7 @@ class Client {
   const ClientOptions& options_;
   const StopSignal& stop_;
   Session& session_;           // haptic thread; its queue of cuts is emptied by the replica's thread
+  MountedBone mounted_;        // haptic thread
   Replica replica_;            // replica thread, until it is joined
   PatchBuilder builder_;       // replica thread
   SessionLog log_;             // reporter thread
@@ -704,6 +729,9 @@ class Client {
   LatestValue<std::vector<PlacedGuide>> guides_;  // all that stands in the room's scene, replica → haptic
   std::map<Digest, std::shared_ptr<const SolidLattice>> solids_;  // of its definitions; replica thread
   LatestValue<Oversight> oversights_;             // what an instructor has decided, session → haptic
+  LatestValue<ToldPlace> places_of_bone_;         // session → haptic
+  std::atomic<std::uint64_t> line_{1};            // which one this is
+  LatestValue<BonePush> pushes_;                  // haptic → reporter
   std::atomic<std::uint64_t> stop_flag_{0};       // the newest datagram's word on it, likewise
   LatestValue<Partners> partners_;                // others' tools, session → haptic
   Partners heard_partners_;                       // of the session's, as the next
@@ -731,6 +759,7 @@ class Client {
 
   // Haptic thread.
   TickRow row_;
+  LoopReport last_;
   std::array<PartnerTool, Partners::kMost> felt_partners_;
   const Site* site_ = nullptr;
   bool taken_up_ = false;

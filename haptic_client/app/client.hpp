@@ -57,6 +57,12 @@ struct ClientOutcome {
   std::uint64_t cuts_stopped = 0, cuts_taken = 0, cuts_elsewhere = 0;  // refused as stopped; as somebody else's tool; as of place or tool
   double overseen_step_n = 0;             // largest growth of the force shown in a tick, while anything was decided about the hand
   double guide_mm = 0, guide_most_mm = 0; // from the hand that leads this one: when it did last, and at most
+  struct MountReport {
+    bool there = false;                    // the room's bone stands on one, as far as the hand was told
+    double most_mm = 0, most_rad = 0;      // that the bone was away from where it rests, as the hand felt it
+    double put_in_mj = 0, released_mj = 0, given_mj = 0, granted_mj = 0;  // see ShownBone
+    double low_pass_s = 0;
+  } mount;
   FastPathHealth fast_path;
   std::uint64_t interruptions = 0;        // of the line to the room, after which it stood again
   double patch_p50_us = 0, patch_p99_us = 0;

@@ -31,7 +31,8 @@ HapticLoop::HapticLoop(const LoopParams& params, std::vector<ToolModel> tools)
   for (const ToolModel& model : tools_) effects_.emplace_back(model.tool, model.wear);
 }
 
-void HapticLoop::take_up(int tool, const Pose& pose_bone_tool, const WorkspaceMapping& mapping) noexcept {
+void HapticLoop::take_up(int tool, const Pose& pose_rest_tool, const WorkspaceMapping& mapping) noexcept {
+  const Pose pose_bone_tool = from_rest(pose_rest_tool);
   tool_ = tool;
   mapping_ = mapping;
   coupling_n_per_mm_ = std::min(params_.stiffness_n_per_mm, params_.device_n_per_mm / (params_.force_scale * mapping.scale()));
@@ -53,6 +54,11 @@ void HapticLoop::take_up(int tool, const Pose& pose_bone_tool, const WorkspaceMa
   placed_ = true;
 }
 
+void HapticLoop::see_bone(const Pose& pose_rest_bone) noexcept {
+  bone_ = pose_rest_bone;
+  moved_ = pose_rest_bone.position_mm != Vec3::Zero() || pose_rest_bone.rotation.vec() != Vec3::Zero();
+}
+
 LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::span<const PlacedGuide> guides) noexcept {
   LoopReport report;
   report.tool = tool_;
@@ -67,9 +73,9 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   const bool works = follows && may_work;
 
   // While the clutch is held the tool stays; letting go ties the handle to the tool where it now is, without force.
-  if (clutched_ && !input.clutch) mapping_.anchor(input.pose_device_tool.position_mm, proxy_.pose().position_mm);
+  if (clutched_ && !input.clutch) mapping_.anchor(input.pose_device_tool.position_mm, bone_.point(proxy_.pose().position_mm));
   clutched_ = input.clutch;
-  Pose pose_bone_device = mapping_.pose_bone_tool(input.pose_device_tool);
+  Pose pose_bone_device = from_rest(mapping_.pose_bone_tool(input.pose_device_tool));
   if (input.clutch) {
     pose_bone_device = proxy_.pose();
     coupling_.reset(pose_bone_device.position_mm, pose_bone_device.position_mm);
@@ -186,6 +192,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
     cut_nmm = step.contact_torque_nmm + paid_n_per_mm * Proxy::kTurnArm_mm * Proxy::kTurnArm_mm * step.turn_rad;
   show(input, model, coupling, moment, cut_nmm, report);
   device_ = pose_bone_device;
+  bone_before_ = bone_;
   return report;
 }
 
@@ -224,7 +231,10 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
 
   // The hand's own movement may raise the force as fast as it moves, spring and damping; everything else only slowly. Of a
   // turn, as much at its arm.
-  const double hand_mm = norm_mm(between(device_, report.pose_bone_device), turn_arm_mm_);
+  Motion hand = between(device_, report.pose_bone_device);
+  // What moves the bone is not the hand: it counts from where the bone rests.
+  if (moved_) hand = between(bone_before_ * device_, bone_ * report.pose_bone_device);
+  const double hand_mm = norm_mm(hand, turn_arm_mm_);
   const double by_hand_n = 2.0 * s * coupling_n_per_mm_ * hand_mm;
   const double slow = slow_n(input);
   const Vec3 before_n = shown_.force_n;
@@ -249,8 +259,8 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   fell_short_ = moment.touching && (fell_short_ || !safe || ramp_ < 1.0 || report.energy.held_back) &&
                 shown_.force_n.norm() < kClearly * s * coupling.spring_n.norm();
   if (report.energy.held_back) report.events |= kEnergyLimited;
-  report.coupling_device_n = mapping_.to_device(shown_.force_n);
-  report.coupling_device_nmm = mapping_.to_device(shown_.torque_nmm);
+  report.coupling_device_n = to_device(shown_.force_n);
+  report.coupling_device_nmm = to_device(shown_.torque_nmm);
 
   // The motor's port, beside the ledger, in what the limit leaves.
   MotorMoment motor;
@@ -266,7 +276,7 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   Vec3 motor_n = s * motor_.step(motor, params_.dt_s);
   if (!params_.motor_effects || !safe) motor_n.setZero();
   motor_n = clamped(motor_n, std::max(0.0, limit_n - shown_.force_n.norm()));
-  report.motor_device_n = mapping_.to_device(motor_n);
+  report.motor_device_n = to_device(motor_n);
   // What the contact leaves of the growth that nobody's hand causes is the pull's.
   const double grown_n = growth(shown_.force_n, before_n).norm() - by_hand_n;
   const double room_n = std::max(0.0, limit_n - shown_.force_n.norm() - motor_n.norm());
@@ -281,7 +291,7 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   Vec3 motor_nmm = Vec3::Zero();
   if (params_.motor_effects && safe) motor_nmm = ramp_ * motor_.open() * moment.energy_scale * cut_nmm;
   motor_nmm_ = clamped(clamped(motor_nmm, motor_nmm_.norm() + turn_arm_mm_ * slow), most_nmm);
-  report.motor_device_nmm = mapping_.to_device(motor_nmm_);
+  report.motor_device_nmm = to_device(motor_nmm_);
   report.torque_device_nmm = report.coupling_device_nmm + report.motor_device_nmm;
 }
 
@@ -310,7 +320,7 @@ double HapticLoop::meet(const LoopInput& input, double room_n, double slew_n, Lo
   const Vec3 wanted_n = clamped(params_.force_scale * felt.force_n, room_n), step_n = growth(wanted_n, partner_n_);
   const Vec3 less_n = step_n - clamped(step_n, slew_n);
   partner_n_ = wanted_n - less_n;
-  report.partner_device_n = mapping_.to_device(partner_n_);
+  report.partner_device_n = to_device(partner_n_);
   return slew_n - (step_n - less_n).norm();
 }
 
@@ -322,7 +332,7 @@ void HapticLoop::lead(const LoopInput& input, double room_n, double slew_n, Loop
   const Vec3& guide_mm = guide_pull_.smoothed_mm();
   GuideMoment moment;
   moment.handle_mm = input.pose_device_tool.position_mm;
-  moment.guide_mm = mapping_.pose_device_tool({guide_mm, Eigen::Quaterniond::Identity()}).position_mm;
+  moment.guide_mm = mapping_.pose_device_tool({bone_.point(guide_mm), Eigen::Quaterniond::Identity()}).position_mm;
   moment.share = input.room == RoomLink::over ? 0.0 : oversight.guide_share;
   moment.room_n = room_n;
   moment.slew_n = slew_n;

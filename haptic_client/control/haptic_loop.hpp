@@ -118,12 +118,15 @@ class HapticLoop {
   // `tools`: every tool of the session, ready; a tool is named by its place there.
   HapticLoop(const LoopParams& params, std::vector<ToolModel> tools);
 
-  // [haptic] Takes up a tool in free air, with the handle at a place of the device.
-  void take_up(int tool, const Pose& pose_bone_tool, const WorkspaceMapping& mapping) noexcept;
+  // [haptic] Takes up a tool in free air, with the handle at a place of the device; by the bone as it rests.
+  void take_up(int tool, const Pose& pose_rest_tool, const WorkspaceMapping& mapping) noexcept;
   // [haptic] What holds from the next tick on, until told otherwise.
   void oversee(const Oversight& oversight) noexcept { overseer_.set(oversight); }
   void oversee(const StopFlag& flag) noexcept { overseer_.set(flag); }
   void see_guide(const GuideSeen& seen) noexcept { guide_seen_ = seen; }  // of whom the oversight names
+  // Where the bone is on its mount, seen from where it rests: there by its own frame. As it rests unless this was called. The
+  // mapping is of the place of rest: what follows the bone are contact, forces and poses in reports.
+  void see_bone(const Pose& pose_rest_bone) noexcept;
   // Others' tools are felt from now on. Before the first tick, off the haptic thread: it makes points of every tool.
   void feel_partners();
   // [haptic] Where they are; to be there through the next tick. Who leads this hand or holds its tool is not felt.
@@ -146,6 +149,8 @@ class HapticLoop {
   [[nodiscard]] double coupling_n_per_mm() const noexcept { return coupling_n_per_mm_; }
 
  private:
+  [[nodiscard]] Pose from_rest(const Pose& pose_rest) const noexcept { return moved_ ? bone_.inverse() * pose_rest : pose_rest; }
+  [[nodiscard]] Vec3 to_device(const Vec3& bone) const noexcept { return mapping_.to_device(moved_ ? bone_.direction(bone) : bone); }
   void record(const ToolModel& model, const ProxyStep& step, LoopReport& report) noexcept;
   void wear_and_clog(const ToolModel& model, const ProxyStep& step, const Vec3& spring_n) noexcept;
   [[nodiscard]] double load_nmm(const ProxyStep& step, double pressed_n) noexcept;
@@ -195,6 +200,8 @@ class HapticLoop {
   Vec3 motor_nmm_ = Vec3::Zero();         // of the motor, likewise
   double turn_arm_mm_ = 0;                // of a turn that does work at the handle; zero where no torque is shown
   Pose device_;                           // device in the last tick, bone frame
+  Pose bone_, bone_before_;               // seen from where it rests, now and in the last tick
+  bool moved_ = false;                    // it is not as it rests
   bool device_was_ok_ = true;
   bool fell_short_ = false;               // less was shown in the last tick than the coupling's spring, and not for its growth
   double ramp_ = 0;                       // 0 … 1

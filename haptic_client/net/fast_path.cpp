@@ -70,6 +70,17 @@ bool FastPath::send(const CuttingState& state) {
   return link_.alive(now_of_links());
 }
 
+bool FastPath::send(const BonePush& push) {
+  bool goes = false;
+  {
+    const std::lock_guard lock(mutex_);
+    link_.set_push(push);
+    goes = link_.alive(now_of_links());
+  }
+  port_->wake();
+  return goes;
+}
+
 void FastPath::heard(std::uint64_t index) {
   const std::lock_guard lock(mutex_);
   link_.heard(index);
@@ -116,6 +127,7 @@ void FastPath::run() {
     Time wait = kLongestWait;
     bool died = false, frozen = false, came = false;
     std::uint64_t epoch = 0;
+    std::optional<BoneSeen> bone;
     {
       const std::lock_guard lock(mutex_);
       if (end_) return;
@@ -127,6 +139,7 @@ void FastPath::run() {
       }
       frozen = link_.frozen();
       epoch = link_.lease_epoch();
+      bone = link_.take_bone();
       if (came && events_.partner) take_partners(now_of_links(), partners);
       while (std::optional<wire::IndexedRow> row = link_.take_row()) rows.push_back(std::move(*row));
       const Time now = now_of_links();
@@ -139,6 +152,7 @@ void FastPath::run() {
     if ((frozen != was_frozen || epoch != was_epoch) && events_.stop_flag) events_.stop_flag(epoch, frozen);
     was_frozen = frozen;
     was_epoch = epoch;
+    if (bone && events_.bone) events_.bone(*bone);
     for (wire::IndexedRow& row : rows) events_.row(std::move(row));
     rows.clear();
     for (const CuttingState& partner : partners) events_.partner(partner);

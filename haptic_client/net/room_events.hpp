@@ -11,6 +11,7 @@
 #include "common/field/field_hash.hpp"
 #include "common/field/supervision.hpp"
 #include "common/mechanics/cutting_state.hpp"
+#include "common/mechanics/passivity.hpp"
 #include "common/tools/scene_item.hpp"
 
 namespace osteon {
@@ -66,6 +67,9 @@ struct RoomEvents {
   // that is older than the newest row (by its lease's epoch) nothing holds. Called from another thread, at any time until
   // close(): it may not wait.
   std::function<void(std::uint64_t lease_epoch, bool frozen)> stop_flag;
+  // Where the bone stands on its mount, of a room that has one: newest, outside the order, from another thread, one at a time.
+  // Numbers begin anew after `interrupted`. It may not wait.
+  std::function<void(const BoneSeen& seen)> bone{};
   std::function<void(RoomSeq place)> noted;  // a tool was added, somebody came, a mark was set
   std::function<void(const Error& why)> interrupted;
   std::function<void(const Error& why)> lost;  // for good: the room is over, or knows this client no more

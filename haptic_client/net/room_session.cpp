@@ -17,6 +17,7 @@
 
 #include "common/core/check.hpp"
 #include "common/link/backoff.hpp"
+#include "common/wire/bone_motion.hpp"
 #include "common/wire/convert.hpp"
 #include "haptic_client/net/cuts_underway.hpp"
 #include "haptic_client/net/fast_path.hpp"
@@ -32,6 +33,7 @@ namespace fs = std::filesystem;
 
 constexpr auto kCloseTime = 1s;
 constexpr std::chrono::milliseconds kLongestRedial = 10s;  // of a wait that a server asks for
+constexpr auto kPushesApart = 33ms;  // over the stream
 constexpr auto kTellHeard = 250ms;  // between two words on how far this client has come
 constexpr auto kCaseSilence = 60s;  // a whole case takes no longer on one machine
 
@@ -216,6 +218,8 @@ struct RoomSession::Impl {
   std::condition_variable wake;
   Line* line = nullptr;                       // the open one
   CutsUnderway underway{kMaxWaitingCuts};
+  std::optional<BonePush> push;               // for the stream
+  std::chrono::steady_clock::time_point next_push{};
   std::optional<std::chrono::milliseconds> redial;  // the server stops in good order: when to come again
   bool closing = false, over = false;
 };
@@ -229,17 +233,23 @@ void RoomSession::Impl::write(Line& open) {
   bool written = open.stream->Write(request);
   std::optional<Cut> cut;
   std::optional<CuttingState> state;
+  std::optional<BonePush> push_now;
   std::uint64_t told = 0;
   auto tell_at = std::chrono::steady_clock::now();
   while (written) {
     {
       std::unique_lock lock(mutex);
-      wake.wait_until(lock, tell_at, [&] { return underway.something_to_send() || closing || over || line != &open || redial; });
+      wake.wait_until(lock, tell_at, [&] { return underway.something_to_send() || push || closing || over || line != &open || redial; });
       // A server that is about to stop decides what it has been sent and no more: the rest goes when the session goes on.
       if (over || line != &open || redial) break;
       cut = underway.take_cut();
       state = cut ? std::nullopt : underway.take_state();
+      push_now = std::exchange(push, std::nullopt);
       if (!cut && !state && closing) break;
+    }
+    if (push_now) {
+      *request.mutable_push() = wire::to_wire(*push_now);
+      if (written = open.stream->Write(request); !written) break;
     }
     const std::shared_ptr<FastPath> path = fast_path();
     // Datagrams say themselves what has come.
@@ -308,6 +318,7 @@ void RoomSession::Impl::open_fast_path(std::uint64_t decided) {
              const std::lock_guard lock(read_mutex);
              reader->take(partner);
            },
+       .bone = events.bone,
        .stop_flag = events.stop_flag});
   if (!opened) return;
   for (const auto& [number, tool] : numbered_tools) (*opened)->know_tool(number, tool);
@@ -484,6 +495,12 @@ Result<std::uint32_t> RoomSession::set_item(const SceneItem& item) {
 void RoomSession::open(RoomEvents events) {
   OSTEON_CHECK(!impl_->stub);
   Impl& impl = *impl_;
+  // By datagram and by stream: one at a time.
+  if (events.bone)
+    events.bone = [this_one = std::make_shared<std::mutex>(), tell = std::move(events.bone)](const BoneSeen& seen) {
+      const std::lock_guard lock(*this_one);
+      tell(seen);
+    };
   impl.reader.emplace(
       impl.room.author, impl.tools, events,
       [&impl](std::uint64_t author_seq) {
@@ -511,6 +528,16 @@ bool RoomSession::send(const Cut& cut) {
 void RoomSession::send(const CuttingState& state) {
   const std::lock_guard lock(impl_->mutex);
   impl_->underway.push(state);
+  impl_->wake.notify_all();
+}
+
+void RoomSession::send(const BonePush& push) {
+  if (const std::shared_ptr<FastPath> path = impl_->fast_path(); path && path->send(push)) return;
+  const auto now = std::chrono::steady_clock::now();
+  const std::lock_guard lock(impl_->mutex);
+  if (now < impl_->next_push || !impl_->underway.may_go()) return;
+  impl_->next_push = now + kPushesApart;
+  impl_->push = push;
   impl_->wake.notify_all();
 }
 

@@ -68,6 +68,8 @@ class RoomSession {
   [[nodiscard]] bool send(const Cut& cut);
   // Newest wins: a state that is still waiting is replaced. Cuts that are waiting go first.
   void send(const CuttingState& state);
+  // Newest wins; of a room without a mount nothing comes of it. Where datagrams do not get through, 30 a second go.
+  void send(const BonePush& push);
   [[nodiscard]] FastPathHealth fast_path() const;
   // Ends the stream after what is waiting was sent, at most a second, and joins the thread. Again: does nothing.
   void close();

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/field/rejection.hpp"
+#include "common/wire/bone_motion.hpp"
 #include "common/wire/convert.hpp"
 
 namespace osteon {
@@ -184,6 +185,12 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       const Result<CuttingState> partner = wire::from_wire(response.partner());
       if (!partner) return tl::unexpected(partner.error());
       take(*partner);
+      return {};
+    }
+    case v1::SessionResponse::kBone: {
+      const Result<BoneSeen> seen = wire::from_wire(response.bone());
+      if (!seen) return tl::unexpected(seen.error());
+      if (events_.bone) events_.bone(*seen);
       return {};
     }
     case v1::SessionResponse::kLink:

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "common/field/rejection.hpp"
+#include "common/wire/bone_motion.hpp"
 #include "common/wire/convert.hpp"
 #include "haptic_client/net/cuts_underway.hpp"
 #include "tests/support/scenes/bones.hpp"
@@ -56,7 +57,7 @@ TEST(CutsUnderway, AreBounded) {
 
 struct Heard {
   std::vector<std::string> events;
-  std::vector<std::uint64_t> decided, partners;
+  std::vector<std::uint64_t> decided, partners, places;
   int free = 0;  // times that a stream began with nothing decided about this hand
   SessionReader reader{AuthorId{7}, builtin_tool_box(),
                        {.complete = [this](const RoomAtJoin& room) { events.push_back("complete " + std::to_string(room.contained.value)); },
@@ -79,7 +80,8 @@ struct Heard {
                         },
                         .partner = [this](const CuttingState& state) {
                           partners.push_back(100 * state.author.value + state.state_seq);
-                        }},
+                        },
+                        .bone = [this](const BoneSeen& seen) { places.push_back(seen.seen_seq); }},
                        [this](std::uint64_t seq) { decided.push_back(seq); }, [this](std::uint64_t seq) { decided.push_back(seq); }};
 };
 
@@ -192,6 +194,20 @@ TEST(SessionReader, TakesTheNewestOfAPartnersTool) {
   ASSERT_TRUE(heard.reader.take(streamed(3, 1)));
   heard.reader.take(state(7, 50));  // its own
   EXPECT_EQ(heard.partners, (std::vector<std::uint64_t>{208, 209, 301}));
+}
+
+TEST(SessionReader, PassesOnWhereTheBoneStandsOnItsMount) {
+  Heard heard;
+  heard.reader.begin();
+  v1::SessionResponse place;
+  *place.mutable_bone() = wire::to_wire(BoneSeen{4, {Vec3(1, 2, 3), Vec3::Zero()}, 0, 0, 0});
+  ASSERT_TRUE(heard.reader.take(place));
+  EXPECT_EQ(heard.places, (std::vector<std::uint64_t>{4}));
+  place.mutable_bone()->clear_turn();
+  const Result<void> refused = heard.reader.take(place);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("bone.turn"), std::string::npos) << refused.error().message;
+  EXPECT_EQ(heard.places.size(), 1u);
 }
 
 TEST(SessionReader, BeginsAnewWithEachStream) {
