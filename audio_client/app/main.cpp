@@ -36,7 +36,7 @@ constexpr auto kStale = 2s;
 constexpr auto kRunDown = 2s;
 
 struct Options {
-  std::string server, room;
+  std::string server, room, name = "audio";
   wire::DoorArguments door;
   std::string output = "pulse";
   std::filesystem::path wav_file, state_log_file, summary_file;
@@ -135,7 +135,7 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   if (!output) return tl::unexpected(output.error());
 
   Result<wire::JoinedRoom> room =
-      wire::join_room(options.server, wire::ClientKind::audio, "audio",
+      wire::join_room(options.server, wire::ClientKind::audio, options.name,
                       std::chrono::milliseconds(static_cast<std::int64_t>(1000 * options.patience_s)),
                       [&] { return stop.requested(); }, options.room, *door);
   // A stop is what was asked for, also before the server answered.
@@ -210,6 +210,7 @@ int main(int argc, char** argv) {
   CLI::App app("Makes the tools of a room heard: the drill's sound follows speed, load and bone density.", kProgram);
   app.add_option("--server", options.server, "HOST:PORT of osteon-server")->required();
   app.add_option("--room", options.room, "Name of the room; not needed where the server has one");
+  app.add_option("--name", options.name, "Who you are, shown to others")->capture_default_str();
   wire::add_door_options(app, options.door);
   app.add_option("--output", options.output, "pulse: PulseAudio's default sink; none: at the same pace to nowhere")
       ->capture_default_str();

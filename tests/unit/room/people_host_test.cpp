@@ -6,11 +6,14 @@
 #include <future>
 #include <map>
 #include <mutex>
+#include <thread>
 
 #include "common/wire/convert.hpp"
 #include "osteon/v1/people.pb.h"
 #include "server/net/people_board.hpp"
 #include "server/net/room_host.hpp"
+#include "server/net/room_keeper.hpp"
+#include "tests/support/temp_dir.hpp"
 #include "tests/unit/room/cuts.hpp"
 
 namespace osteon {
@@ -342,6 +345,50 @@ TEST(PartnerOutbox, HoldsNothingOfWhatGoesAnotherWayOrOfWhoIsGone) {
   std::size_t told = 0;
   while (outbox.take({})) ++told;
   EXPECT_EQ(told, PartnerOutbox::kMost);
+}
+
+// Who somebody was, what was decided about them and what they drew is there again when the room is.
+TEST(PeopleHost, NamesAndDecisionsOutliveTheProcess) {
+  const test::TempDir folder;
+  const auto open = [&] {
+    return RoomKeeper::open(folder / "room.journal", test::test_block(), RoomKeeper::Options{}).value();
+  };
+  AuthorId trainee;
+  RoomSeq place;
+  {
+    KeptRoom kept = open();
+    RoomHost host(std::move(kept.room), {.tick = 1ms, .mesh = 1s, .pieces = 0ns}, {}, Detail::automatic,
+                  kept.keeper.get());
+    const AuthorId instructor = host.join(MemberKind::watcher, "Ada", {}, Role::instructor).value();
+    trainee = host.join(MemberKind::surgeon, "Ben", {}, Role::trainee).value();
+    std::promise<RoomSeq> decided;
+    host.queue_event([&](Room& room) { return room.supervise(instructor, trainee, {.stopped = true}); },
+                     [](const Result<RoomEvent>&) {});
+    host.queue_event(
+        [&](Room& room) {
+          return room.annotate(instructor, {.points = {{1, 2, 3}}, .words = "here"});
+        },
+        [&](const Result<RoomEvent>& event) { decided.set_value(event.value().room_seq); });
+    place = decided.get_future().get();
+    host.stop();
+    ASSERT_TRUE(kept.keeper->close());
+  }
+  KeptRoom kept = open();
+  RoomHost host(std::move(kept.room), {.tick = 1ms, .mesh = 1s, .pieces = 0ns}, {}, Detail::automatic,
+                kept.keeper.get());
+  PeopleCursor cursor;
+  v1::WatchPeopleResponse news;
+  ASSERT_TRUE(news.ParseFromString(*host.people().news(cursor, {}, {})));
+  const v1::Person* ben = Lesson::person(news, trainee);
+  ASSERT_NE(ben, nullptr);
+  EXPECT_EQ(ben->name(), "Ben");
+  EXPECT_EQ(ben->role(), v1::ROLE_TRAINEE);
+  EXPECT_TRUE(ben->hand() && !ben->here());
+  EXPECT_TRUE(ben->supervision().stopped());
+  EXPECT_EQ(ben->decided_room_seq(), place.value - 1);
+  ASSERT_EQ(news.annotations_size(), 1);
+  EXPECT_EQ(news.annotations(0).words(), "here");
+  host.stop();
 }
 
 TEST(PeopleHost, HandsAreToldOfOthersTools) {
