@@ -85,7 +85,8 @@ Result<BoneSeen> from_wire(const v1::BoneSeen& seen) {
   if (turn->norm() > std::numbers::pi) return bad("bone.turn", "is more than half a turn");
   const Result<double> energy = energy_mj(seen.energy(), "bone.energy");
   if (!energy) return tl::unexpected(energy.error());
-  if (seen.lag_ms() > kMostLag_ms) return bad("bone.lag_ms", "is " + std::to_string(seen.lag_ms()) + " and must be at most 60000");
+  if (seen.lag_ms() > kMostLag_ms)
+    return bad("bone.lag_ms", "is " + std::to_string(seen.lag_ms()) + " and must be at most 60000");
   return BoneSeen{seen.seen_seq(), {*place, *turn}, *energy, seen.push_seq(), 1e-3 * seen.lag_ms()};
 }
 

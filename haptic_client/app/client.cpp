@@ -138,7 +138,8 @@ class Client {
  public:
   Client(RoomSession& room, Session& session, const ClientOptions& options, const StopSignal& stop)
       : room_(room), options_(options), stop_(stop), session_(session),
-        mounted_(mount_about(room.bone().bounds().centre_mm())), replica_(room.bone(), BodyId{}, room.tools()), lease_epoch_(room.room().lease_epoch) {
+        mounted_(mount_about(room.bone().bounds().centre_mm())), replica_(room.bone(), BodyId{}, room.tools()),
+        lease_epoch_(room.room().lease_epoch) {
     for (auto& time : tick_times_) time.store(0, std::memory_order_relaxed);
     for (const ToolModel& model : session_.plan().tools) tool_names_.push_back(model.tool.name);
     if (tool_names_.empty()) tool_names_.emplace_back("none");

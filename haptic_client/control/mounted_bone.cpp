@@ -10,7 +10,8 @@ constexpr double kPush_s = 8e-3, kIdle_s = 96e-3;
 
 }  // namespace
 
-Load load_on_bone(const HapticLoop& loop, const LoopReport& report, const Pose& pose_rest_bone, const Vec3& centre_now_mm) noexcept {
+Load load_on_bone(const HapticLoop& loop, const LoopReport& report, const Pose& pose_rest_bone,
+                  const Vec3& centre_now_mm) noexcept {
   const double s = loop.params().force_scale;
   const WorkspaceMapping& mapping = loop.mapping();
   const Vec3 force_n = mapping.to_bone(report.coupling_device_n) / -s;

@@ -14,7 +14,8 @@ namespace {
 using namespace std::chrono_literals;
 using nlohmann::json;
 
-Process start_hand(const Stage& stage, const std::string& name, const json& step, const std::string& address, std::vector<std::string> more) {
+Process start_hand(const Stage& stage, const std::string& name, const json& step, const std::string& address,
+                   std::vector<std::string> more) {
   std::ofstream(stage / (name + "-plan.json")) << json{{"steps", json::array({step})}};
   std::vector<std::string> arguments{"--server", address, "--plan", stage / (name + "-plan.json"), "--summary",
                                      stage / (name + ".json"), "--cache", stage / (name + "-cache")};

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <memory>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "haptic_client/control/patch_builder.hpp"
@@ -62,14 +63,15 @@ class Line {
 // A hand of 5.5 N/mm at a device at a loop, with a burr that does not turn, over the bone or under it.
 struct User {
   User(const LineQuality& line, bool from_above, unsigned seed)
-      : rotation(from_above ? Eigen::Quaterniond(Eigen::AngleAxisd(std::acos(-1.0), Vec3::UnitX())) : Eigen::Quaterniond::Identity()),
+      : rotation(Eigen::AngleAxisd(from_above ? std::acos(-1.0) : 0.0, Vec3::UnitX())),
         into(0, 0, from_above ? -1.0 : 1.0),
         face_mm(from_above ? Vec3(0, 0, 0) : Vec3(0, 0, -kThickness_mm)),
         replica(block(), BodyId{}),
         mounted(mount_about(kMiddle_mm)), up(line, seed), down(line, seed + 1) {
     LoopParams params = loop_params(device.limits(), 1.0);
     params.ramp_s = 1e-9;
-    loop = std::make_unique<HapticLoop>(params, std::vector<ToolModel>{ToolModel(*find_tool("burr-round-5"), block().pitch_mm())});
+    std::vector<ToolModel> tools{ToolModel(*find_tool("burr-round-5"), block().pitch_mm())};
+    loop = std::make_unique<HapticLoop>(params, std::move(tools));
     const Pose start{face_mm - kAway_mm * into, rotation};
     WorkspaceMapping mapping;
     mapping.align(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized())), 1.0, Vec3::Zero(), start.position_mm);

@@ -77,7 +77,8 @@ TEST(MountInARoom, APushMovesTheBoneOfAll) {
     room.tick();
   }
   const double expected_mm = 10.0 / MountParams{}.stiffness_n_per_mm;
-  for (const auto& session : room.sessions) EXPECT_NEAR(session->seen_.back().shift.place_mm.x(), expected_mm, 1e-3 * expected_mm);
+  for (const auto& session : room.sessions)
+    EXPECT_NEAR(session->seen_.back().shift.place_mm.x(), expected_mm, 1e-3 * expected_mm);
   EXPECT_EQ(room.sessions[0]->seen_.back().push_seq, room.pushes);
   EXPECT_EQ(room.sessions[1]->seen_.back().push_seq, 0u);
   EXPECT_GE(room.sessions[1]->seen_.size() - before, 249u) << "at every tick while it moves";
