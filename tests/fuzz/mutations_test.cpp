@@ -1,4 +1,5 @@
-// Every target on seeded mutations of its valid inputs; OSTEON_FUZZ_RUNS in the environment asks for more of them.
+// Every target on seeded mutations of its valid inputs; OSTEON_FUZZ_RUNS in the environment asks for more of them, in all of a
+// target's seeds together, and OSTEON_FUZZ_TARGET for one target alone.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -25,11 +26,15 @@ Bytes mutated(Bytes bytes, std::mt19937& random) {
 }
 
 TEST(Fuzz, TargetsStandMutatedInputs) {
-  const char* asked = std::getenv("OSTEON_FUZZ_RUNS");
+  const char *asked = std::getenv("OSTEON_FUZZ_RUNS"), *only = std::getenv("OSTEON_FUZZ_TARGET");
+  bool any = false;
   for (const Target& target : targets()) {
+    if (only && target.name != only) continue;
+    any = true;
     SCOPED_TRACE(target.name);
     std::mt19937 random(1);
-    const long runs = asked ? std::atol(asked) : target.mutations;
+    const auto seeds = static_cast<long>(target.seeds.size());
+    const long runs = asked ? (std::atol(asked) + seeds - 1) / seeds : target.mutations;
     for (const Bytes& seed : target.seeds) {
       target.run(seed);
       for (long i = 0; i < runs; ++i) {
@@ -44,6 +49,7 @@ TEST(Fuzz, TargetsStandMutatedInputs) {
       }
     }
   }
+  EXPECT_TRUE(any) << "there is no such target";
 }
 
 TEST(Fuzz, TargetsStandNoiseAndNothing) {

@@ -119,6 +119,7 @@ class Sum {
     ++seeds_;
     fast_path_ += one.fast_path ? 1 : 0;
     cuts_ += one.cuts, rows_ += one.rows, committed_ += one.committed, rejected_ += one.rejected;
+    decisions_ += one.decisions, forbidden_ += one.forbidden;
     undone_ += one.undone, splits_ += one.splits, acknowledged_ += one.acknowledged, crashes_ += one.crashes;
     disk_failures_ += one.disk_failures, breaks_ += one.breaks, resumed_ += one.resumed, programs_ += one.programs;
     datagrams_.sent += one.datagrams.sent, datagrams_.opened += one.datagrams.opened, datagrams_.forged += one.datagrams.forged;
@@ -138,6 +139,7 @@ class Sum {
   [[nodiscard]] nlohmann::ordered_json json() const {
     return {{"seeds", seeds_}, {"failures", failures_}, {"broken_invariants", broken_}, {"fast_path_seeds", fast_path_},
             {"cuts", cuts_}, {"rows", rows_}, {"commits", committed_}, {"rejections", rejected_}, {"undos", undone_},
+            {"decisions", decisions_}, {"forbidden", forbidden_},
             {"splits", splits_}, {"acknowledged", acknowledged_}, {"crashes", crashes_}, {"disk_failures", disk_failures_},
             {"breaks", breaks_}, {"resumed", resumed_}, {"programs", programs_},
             {"datagrams", {{"sent", datagrams_.sent}, {"opened", datagrams_.opened}, {"forged", datagrams_.forged},
@@ -149,7 +151,7 @@ class Sum {
   }
 
  private:
-  std::uint64_t seeds_ = 0, failures_ = 0, fast_path_ = 0, cuts_ = 0, rows_ = 0, committed_ = 0, rejected_ = 0, undone_ = 0,
+  std::uint64_t seeds_ = 0, failures_ = 0, fast_path_ = 0, cuts_ = 0, rows_ = 0, committed_ = 0, rejected_ = 0, undone_ = 0, decisions_ = 0, forbidden_ = 0,
                 splits_ = 0, acknowledged_ = 0, crashes_ = 0, disk_failures_ = 0, breaks_ = 0, resumed_ = 0, programs_ = 0;
   osteon::test::DatagramCounts datagrams_;
   double virtual_s_ = 0;

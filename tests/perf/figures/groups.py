@@ -18,7 +18,8 @@ import rooms
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "deploy/session"))
 
-import plans  # noqa: E402  (found through the path above)
+import doors  # noqa: E402  (they, too, use what is found through the path above)
+import plans  # noqa: E402
 import record  # noqa: E402
 from processes import Failure  # noqa: E402
 from session import Session  # noqa: E402
@@ -234,5 +235,5 @@ def novice(run):
 
 
 # In the order in which they run: agreement is counted after every session.
-GROUPS = {**kernels.GROUPS, **devices.GROUPS, **feel.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, "expert": expert,
+GROUPS = {**kernels.GROUPS, **devices.GROUPS, **doors.GROUPS, **feel.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, "expert": expert,
           "novice": novice, "rig": rig}

@@ -396,16 +396,34 @@ FIGURES = [
     Figure("felt_stage_close", "ms", "from a motion until its cut closes, at most, by construction", "felt_stages",
            baseline="at 40 +- 10 ms and 30 % loss", full=True),
     # An instructor's word.
-    Figure("freeze_p99", "ms", "from the answer to an instructor who stops a hand until its loop cuts no more, less the time "
-           "of the way, 99th percentile of the worst of 0, 50 and 150 ms one way; two ticks of the server are 16.7 ms", "override",
-           ("<=", 16.7), baseline="median", full=True),
-    Figure("freeze_p99_loss", "ms", "the same with 30 % of the datagrams lost", "override", baseline="median", full=True),
+    Figure("freeze_p99", "of_budget", "from the answer to an instructor who stops a hand until its loop cuts no more, less the "
+           "time of the way, 99th percentile of the worst of 0, 50 and 150 ms one way, as a part of two ticks of the server, "
+           "16.7 ms", "override", ("<=", 1.0), baseline="median", full=True),
+    Figure("freeze_p99_loss", "of_budget", "the same with 30 % of the datagrams lost", "override", baseline="median", full=True),
     Figure("freeze_missing", "count", "words that stopped no hand before the next, on all these lines", "override", ("==", 0),
            full=True),
     Figure("override_force_step", "ratio", "largest growth of force in a tick that the hand did not cause, of hands that are "
            "stopped, taken over, given back, limited, led and undone under, over the slew limit", "override", ("<=", 1.0), full=True),
     Figure("override_energy", "ratio", "most that one contact, or the pull of a leading hand, gave such a hand beyond what it "
            "got, as a part of 0.01 mJ", "override", ("<=", 1.0), full=True),
+    # Closed doors.
+    Figure("knocks", "count", "strangers at the door while a hand works: silent, in plain HTTP/2, noise, TLS without a "
+           "certificate", "knocking", (">=", 100_000), full=True),
+    Figure("knocks_let_in", "count", "of them not hung up on", "knocking", ("==", 0), full=True),
+    Figure("knocks_memory", "mb", "what the server's memory grew by meanwhile", "knocking", ("<=", 64.0),
+           baseline="its memory before", full=True),
+    Figure("knocks_logged", "count", "lines that its log says of them", "knocking", ("<=", 20), full=True),
+    Figure("knocks_commit", "ms", "from a cut of the hand until it is confirmed, median, meanwhile", "knocking",
+           baseline="before they came", full=True),
+    Figure("knocks_differences", "count", "hands with another bone than the server's at the end", "knocking", ("==", 0), full=True),
+    *[Figure(f"fuzzed_{target}", "count", f"changed {what} that {take} took or refused, and nothing else", "door_fuzz",
+             (">=", 10_000_000), full=True)
+      for target, what, take in (("ticket", "tickets", "the door"), ("upload", "archives", "the intake"),
+                                 ("supervision", "decisions", "the wire"), ("annotation", "drawings", "the wire"))],
+    Figure("simulated_decisions", "count", "decisions of instructors about hands in the simulated rooms", "simulated",
+           (">=", 10_000), full=True),
+    Figure("simulated_forbidden", "count", "cuts that were refused for them; one that was taken would be a failure", "simulated",
+           full=True),
     # What one tool costs its line and its room's disk.
     Figure("uplink_cutting", "kbit_per_s", "a tool's uplink while it cuts: sealed datagrams and the stream's bytes and "
            "acknowledgements, headers included", "uplink", ("<=", 300.0), full=True),

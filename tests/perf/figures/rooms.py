@@ -10,6 +10,7 @@ CONVERGED_S = 2.0
 FELT_LOOPBACK_MS, FELT_BAD_MS = 25.0, 150.0
 FELT_STAGES = ("uplink", "wait_for_tick", "decide", "commit", "downlink", "replica_and_patch")
 OBSERVERS_MS, OBSERVERS_HZ = 40.0, 30.0
+TWO_TICKS_MS = 2000.0 / 120
 
 
 def simulate(run, *arguments, may_fail=False):
@@ -28,6 +29,8 @@ def simulated(run):
         "simulated_failures": (out["failures"], None),
         "simulated_acknowledged": (out["acknowledged"], None),
         "simulated_crashes": (out["crashes"], None),
+        "simulated_decisions": (out["decisions"], None),
+        "simulated_forbidden": (out["forbidden"], None),
         "simulated_cpu": (cpu["p50"] / PROTOCOL_SEED_MS, None),
     }
 
@@ -209,13 +212,14 @@ def override(run):
     run.tables.append(("What hands feel of it", [(name, value) for name, value in touch.items()]))
     whole = [line for line in out["lines"] if line["loss"] == 0]
     lossy = [line for line in out["lines"] if line["loss"] > 0]
+
     def worst(lines, what):
         return max(line["after_answer"][what] for line in lines)
 
     missing = sum(line["asked"] - line["stopped"] for line in out["lines"])
     return {
-        "freeze_p99": (worst(whole, "p99"), worst(whole, "p50")),
-        "freeze_p99_loss": (worst(lossy, "p99"), worst(lossy, "p50")),
+        "freeze_p99": (worst(whole, "p99") / TWO_TICKS_MS, worst(whole, "p50") / TWO_TICKS_MS),
+        "freeze_p99_loss": (worst(lossy, "p99") / TWO_TICKS_MS, worst(lossy, "p50") / TWO_TICKS_MS),
         "freeze_missing": (missing, None),
         "override_force_step": (touch["step_over_slew"], None),
         "override_energy": (max(touch["contact_mj"], touch["led_mj"]) / touch["budget_mj"], None),
