@@ -52,27 +52,27 @@ struct WordsSaid {
 // made again, all of that anew: the scene, every leaf, `complete`, and cuts that were sent and not decided are sent again.
 // `lost` comes at most once and last, and never after close(). Tools go to tools() before anything that names them.
 struct RoomEvents {
-  std::function<void(const FieldLeaf& leaf)> leaf;
-  std::function<void(const RoomAtJoin& room)> complete;
-  std::function<void(RoomSeq place, const Cut& cut)> committed;  // of anyone, the caller's own included
+  std::function<void(const FieldLeaf& leaf)> leaf{};
+  std::function<void(const RoomAtJoin& room)> complete{};
+  std::function<void(RoomSeq place, const Cut& cut)> committed{};  // of anyone, the caller's own included
   // The caller's; what he cut on top of it falls too, and `lease_epoch` is that of his lease from now on.
-  std::function<void(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason)> rejected;
-  std::function<void(BonePart&& part)> change;
-  std::function<void(RoomSeq place, const std::vector<SceneItem>& items)> scene;  // all that stand from now on
+  std::function<void(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason)> rejected{};
+  std::function<void(BonePart&& part)> change{};
+  std::function<void(RoomSeq place, const std::vector<SceneItem>& items)> scene{};  // all that stand from now on
   // Once with each `complete`, just before or after it, and whenever something is decided.
-  std::function<void(const HandSupervised& decided)> supervised;
-  std::function<void(const WordsSaid& said)> said;
-  std::function<void(const CuttingState& partner)> partner;  // newest state of another's tool; outside the order
+  std::function<void(const HandSupervised& decided)> supervised{};
+  std::function<void(const WordsSaid& said)> said{};
+  std::function<void(const CuttingState& partner)> partner{};  // newest state of another's tool; outside the order
   // The newest datagram's word on whether the caller's hand is stopped, where it has changed; its row may come later. Of one
   // that is older than the newest row (by its lease's epoch) nothing holds. Called from another thread, at any time until
   // close(): it may not wait.
-  std::function<void(std::uint64_t lease_epoch, bool frozen)> stop_flag;
+  std::function<void(std::uint64_t lease_epoch, bool frozen)> stop_flag{};
   // Where the bone stands on its mount, of a room that has one: newest, outside the order, from another thread, one at a time.
   // Numbers begin anew after `interrupted`. It may not wait.
   std::function<void(const BoneSeen& seen)> bone{};
-  std::function<void(RoomSeq place)> noted;  // a tool was added, somebody came, a mark was set
-  std::function<void(const Error& why)> interrupted;
-  std::function<void(const Error& why)> lost;  // for good: the room is over, or knows this client no more
+  std::function<void(RoomSeq place)> noted{};  // a tool was added, somebody came, a mark was set
+  std::function<void(const Error& why)> interrupted{};
+  std::function<void(const Error& why)> lost{};  // for good: the room is over, or knows this client no more
 };
 
 }  // namespace osteon

@@ -213,6 +213,7 @@ struct RoomSession::Impl {
   std::shared_ptr<FastPath> fast;             // of the present stream; held by those who use it just now
 
   std::atomic<std::uint64_t> heard{0};        // place of the newest event that was passed on
+  std::atomic<bool> heard_leaves{false};      // no datagram says that these have come
 
   mutable std::mutex mutex;
   std::condition_variable wake;
@@ -252,10 +253,11 @@ void RoomSession::Impl::write(Line& open) {
       if (written = open.stream->Write(request); !written) break;
     }
     const std::shared_ptr<FastPath> path = fast_path();
-    // Datagrams say themselves what has come.
+    // Datagrams say themselves which rows have come.
     if (const auto now = std::chrono::steady_clock::now(); now >= tell_at) {
       tell_at = now + kTellHeard;
-      if (const std::uint64_t place = heard; place != told && !(path && path->health().alive)) {
+      const bool leaves = heard_leaves.exchange(false);
+      if (const std::uint64_t place = heard; place != told && (leaves || !(path && path->health().alive))) {
         request.mutable_heard()->set_room_seq(told = place);
         if (written = open.stream->Write(request); !written) break;
       }
@@ -364,8 +366,10 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
       // that are not all there.
       const std::lock_guard lock(read_mutex);
       follow(response);
+      const bool complete = response.has_complete();
       Result<void> taken = reader->take(std::move(response));
       heard = reader->place().value;
+      if (complete) heard_leaves = true;
       return taken;
     }();
     if (!delivered) {

@@ -32,7 +32,7 @@ struct RoomSessionOptions {
   std::chrono::milliseconds patience{5000};
   std::filesystem::path cache = default_case_cache();  // one folder per case, named by its hash
   // Sealed datagrams beside the stream: to the port that the server says, to this HOST:PORT instead, or "off".
-  std::string fast_path;
+  std::string fast_path{};
 };
 
 // How the fast path fares.

@@ -45,6 +45,12 @@ TEST_F(RoomServerTest, EveryHolderHasTheServersHashHoweverLateItJoins) {
   EXPECT_EQ(status.rejected(), 0u);
 }
 
+// Nobody who has come back stays pending until the next event.
+TEST_F(RoomServerTest, AHandSaysThatTheLeavesHaveCome) {
+  const auto hand = surgeon();
+  EXPECT_TRUE(wait_until([&] { return host().people().heard_of(AuthorId{1}) == host().room_seq(); }, kPatience));
+}
+
 TEST_F(RoomServerTest, ACutBeyondTheLimitsIsRejectedToItsAuthorAndTheRoomGoesOn) {
   const auto one = surgeon(), other = surgeon();
   auto cuts = strokes(one->author(), 2, 3);
