@@ -264,7 +264,7 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, co
     sink->begin(impl_->room.room_seq(), std::move(before), serialised(complete));
     for (const ToolBox::Entry* entry : tools) sink->know_tool(impl_->number_of(entry->hash), entry->hash);
     if (held.place)
-      sink->hold({.kind = wire::SessionRowKind::supervised, .lease_epoch = lease_epoch, .supervision = held.supervision});
+      sink->hold({.room_seq = {}, .kind = wire::SessionRowKind::supervised, .lease_epoch = lease_epoch, .supervision = held.supervision});
     if (impl_->redial) sink->answer(impl_->redial);
     if (impl_->ended) impl_->may_return ? sink->replaced(*impl_->ended) : sink->end(*impl_->ended);
   }

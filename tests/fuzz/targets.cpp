@@ -13,6 +13,7 @@
 #include "common/wire/client_link.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/server_link.hpp"
+#include "tests/fuzz/calls_target.hpp"
 #include "tests/fuzz/datagram_target.hpp"
 #include "tests/fuzz/journal_target.hpp"
 #include "tests/fuzz/ticket_target.hpp"
@@ -216,6 +217,7 @@ std::vector<Target> targets() {
           journal_file_target(),
           {"supervision", parse_and_convert<v1::Supervision>, {bytes_of(wire::to_wire(a_supervision()).SerializeAsString())}},
           {"annotation", parse_and_convert<v1::Annotation>, {bytes_of(wire::to_wire(an_annotation()).SerializeAsString())}},
+          calls_target(),
           upload_target()};
 }
 

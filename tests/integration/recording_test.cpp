@@ -144,7 +144,7 @@ TEST_F(RecordedRoom, OnAFullDiskTheSessionGoesOn) {
   ASSERT_EQ(first.wait(60s), 0) << first.err();
   // Files may not grow beyond 400 kB; the signal that comes with it is ignored, as where a disk is full.
   const std::string command = "trap '' XFSZ; ulimit -f 800; exec \"$@\"";
-  std::vector<std::string> all{"-c", command, "sh", program("osteon-haptic")};
+  std::vector<std::string> all{"-c", command, "sh", program("osteon-haptic"), "--plain"};
   const std::vector<std::string> given = arguments(stage, "full", 0.0);
   all.insert(all.end(), given.begin(), given.end());
   Process haptic("/bin/sh", all);

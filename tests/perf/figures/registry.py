@@ -419,7 +419,8 @@ FIGURES = [
     *[Figure(f"fuzzed_{target}", "count", f"changed {what} that {take} took or refused, and nothing else", "door_fuzz",
              (">=", 10_000_000), full=True)
       for target, what, take in (("ticket", "tickets", "the door"), ("upload", "archives", "the intake"),
-                                 ("supervision", "decisions", "the wire"), ("annotation", "drawings", "the wire"))],
+                                 ("supervision", "decisions", "the wire"), ("annotation", "drawings", "the wire"),
+                                 ("calls", "requests of all calls together", "a server with a room"))],
     Figure("simulated_decisions", "count", "decisions of instructors about hands in the simulated rooms", "simulated",
            (">=", 10_000), full=True),
     Figure("simulated_forbidden", "count", "cuts that were refused for them; one that was taken would be a failure", "simulated",
