@@ -16,6 +16,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <thread>
 
 #include "common/volume/case.hpp"
 
@@ -61,10 +62,16 @@ class Child {
   int end() {
     if (id_ == 0) return status_;
     ::kill(id_, SIGKILL);
-    return join();
+    while (::waitpid(id_, &status_, 0) < 0 && errno == EINTR) {
+    }
+    id_ = 0;
+    return status_;
   }
-  int join() {
-    while (id_ != 0 && ::waitpid(id_, &status_, 0) < 0 && errno == EINTR) {
+  // Of one that has said everything: it is given a moment to end.
+  int join(Clock::time_point until) {
+    while (id_ != 0 && ::waitpid(id_, &status_, WNOHANG) == 0) {
+      if (Clock::now() > until) return end();
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
     id_ = 0;
     return status_;
@@ -79,13 +86,13 @@ class Child {
   int status_ = 0;
 };
 
-// All that the child says; nothing where it says too much or takes too long.
-std::optional<std::string> listen(int descriptor, Clock::time_point until) {
+// All that the child says; nothing where it says too much, takes too long or is not wanted any more.
+std::optional<std::string> listen(int descriptor, Clock::time_point until, const std::function<bool()>& stop) {
   std::string said;
   std::array<char, 4096> piece{};
   while (said.size() <= kMostSaid) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - Clock::now());
-    if (left.count() <= 0) return {};
+    if (left.count() <= 0 || (stop && stop())) return {};
     pollfd ready{descriptor, POLLIN, 0};
     if (::poll(&ready, 1, static_cast<int>(std::min<std::int64_t>(left.count(), 1000))) <= 0) continue;
     const ssize_t n = ::read(descriptor, piece.data(), piece.size());
@@ -103,7 +110,8 @@ void limit_self(__rlimit_resource resource, std::uint64_t most) {
 
 }  // namespace
 
-Result<CheckedCase> check_case(const fs::path& program, const fs::path& from, const fs::path& to, const IntakeQuota& quota) {
+Result<CheckedCase> check_case(const fs::path& program, const fs::path& from, const fs::path& to, const IntakeQuota& quota,
+                               const std::function<bool()>& stop) {
   int ends[2];
   if (::pipe2(ends, O_CLOEXEC) != 0) return cannot_start(errno);
   Descriptor in(ends[0]), out(ends[1]);
@@ -125,12 +133,13 @@ Result<CheckedCase> check_case(const fs::path& program, const fs::path& from, co
   child.limit(RLIMIT_FSIZE, quota.unpacked_bytes);
   child.limit(RLIMIT_CPU, static_cast<std::uint64_t>(2 * quota.time.count()));
 
-  const std::optional<std::string> said = listen(in.number(), Clock::now() + quota.time);
+  const std::optional<std::string> said = listen(in.number(), Clock::now() + quota.time, stop);
   if (!said) {
     (void)child.end();
+    if (stop && stop()) return failure(ErrorCode::cancelled, "the case is not looked through, since it is not wanted any more");
     return failure(ErrorCode::exhausted, "the case takes longer to read than the " + std::to_string(quota.time.count()) + " s that it may");
   }
-  const int status = child.join();
+  const int status = child.join(Clock::now() + std::chrono::seconds(5));
   const nlohmann::json answer = nlohmann::json::parse(*said, nullptr, false);
   if (answer.is_object() && answer.contains("error") && answer["error"].is_string())
     return failure(ErrorCode::invalid_input, "the case is not sound: " + answer["error"].get<std::string>());

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 
 #include "common/core/digest.hpp"
@@ -19,9 +20,10 @@ struct CheckedCase {
 
 // Any thread. Starts `program` as "PROGRAM check-case FROM TO" and waits for what it says. Errors: what is wrong with the case
 // in its words; invalid_input (it died, as over a damaged file), exhausted (memory, time or disk beyond the quota), internal
-// (cannot be started).
+// (cannot be started), cancelled (`stop` returned true).
 [[nodiscard]] Result<CheckedCase> check_case(const std::filesystem::path& program, const std::filesystem::path& from,
-                                             const std::filesystem::path& to, const IntakeQuota& quota);
+                                             const std::filesystem::path& to, const IntakeQuota& quota,
+                                             const std::function<bool()>& stop = {});
 
 // [main of that program] Gives up what it does not need, reads the case in `from`, writes it to `to`, prints one line for the
 // process that waits, and returns the exit code.

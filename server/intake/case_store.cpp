@@ -112,7 +112,7 @@ Result<std::unique_ptr<Upload>> CaseStore::begin() {
   return std::unique_ptr<Upload>(new Upload(place, quota_, open_));
 }
 
-Result<StoredCase> CaseStore::keep(std::unique_ptr<Upload> upload) {
+Result<StoredCase> CaseStore::keep(std::unique_ptr<Upload> upload, const std::function<bool()>& stop) {
   upload->file_->out.close();
   if (!upload->file_->out) return disk(upload->folder(), "the disk takes no more");
   const fs::path sent = upload->folder() / "sent", sound = upload->folder() / "sound";
@@ -125,7 +125,7 @@ Result<StoredCase> CaseStore::keep(std::unique_ptr<Upload> upload) {
   });
   if (!unpacked) return tl::unexpected(unpacked.error());
   if (Result<void> closed = files.close(); !closed) return tl::unexpected(closed.error());
-  const Result<CheckedCase> checked = check_case(program_, sent, sound, quota_);
+  const Result<CheckedCase> checked = check_case(program_, sent, sound, quota_, stop);
   if (!checked) return tl::unexpected(checked.error());
 
   const std::lock_guard lock(keeping_);

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -56,8 +57,8 @@ class CaseStore {
   // Error exhausted: so many are under way already, or the store is full.
   [[nodiscard]] Result<std::unique_ptr<Upload>> begin();
   // Takes it apart, looks it through and keeps it; takes long. Errors: those of unpack_case() and check_case(), exhausted (the
-  // store is full), internal (disk).
-  [[nodiscard]] Result<StoredCase> keep(std::unique_ptr<Upload> upload);
+  // store is full), internal (disk), cancelled (`stop` returned true).
+  [[nodiscard]] Result<StoredCase> keep(std::unique_ptr<Upload> upload, const std::function<bool()>& stop = {});
   // Folders of the cases that are kept, in the order of their hashes.
   [[nodiscard]] std::vector<std::filesystem::path> folders() const;
 

@@ -1,6 +1,7 @@
 // Cases that are uploaded.
 #include <grpcpp/grpcpp.h>
 
+#include <atomic>
 #include <memory>
 #include <string>
 #include <system_error>
@@ -60,12 +61,15 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
     upload_.reset();
     Finish(status_of(added.error()));
   }
-  void OnCancel() override {}
+  void OnCancel() override { cancelled_ = true; }
   void OnDone() override { delete this; }
 
  private:
   Status keep() {
-    const Result<StoredCase> stored = rooms_.store()->keep(std::move(upload_));
+    // A sender who is gone, or a server that stops: nobody waits for it.
+    const auto stop = [this] { return cancelled_ || rooms_.ending(); };
+    if (stop()) return {StatusCode::CANCELLED, "the upload was given up"};
+    const Result<StoredCase> stored = rooms_.store()->keep(std::move(upload_), stop);
     if (!stored) {
       log::warn("upload refused", {{"reason", stored.error().message}});
       return status_of(stored.error());
@@ -84,6 +88,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
   v1::UploadCaseResponse* const response_;
   v1::UploadCaseRequest request_;
   std::unique_ptr<Upload> upload_;
+  std::atomic<bool> cancelled_{false};
 };
 
 class CaseServiceImpl final : public v1::CaseService::CallbackService {

@@ -177,13 +177,17 @@ void RoomHost::Impl::end_sessions(const std::string& why, bool to_return) {
   sessions.each([&](SessionSink& sink) { to_return ? sink.replaced(why) : sink.end(why); });
 }
 
-Result<void> RoomHost::resume(AuthorId author, const Digest& secret, const std::optional<JournalHead>& kept) {
+Result<void> RoomHost::resume(AuthorId author, const Digest& secret, const std::optional<JournalHead>& kept, std::optional<Role> role) {
   if (impl_->player) return tl::unexpected(only_to_be_watched());
   {
     const std::shared_lock lock(impl_->room_mutex);
     if (!impl_->room.proves(author, secret))
       return failure(ErrorCode::invalid_input, "author " + std::to_string(author.value) +
                                                    " of an earlier connection is not known here by that secret; join anew");
+    // What an author may take back goes by the role of the join.
+    if (role && impl_->room.people().role(author) != *role)
+      return failure(ErrorCode::denied, "your role here is another than when author " + std::to_string(author.value) +
+                                            " joined; join anew");
   }
   if (!kept || !impl_->keeper) return {};
   return impl_->keeper->check_witness(*kept);

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -85,19 +86,24 @@ class PeopleServiceImpl final : public PeopleBase {
       if (subjects.empty()) return refuse(reactor, {StatusCode::NOT_FOUND, "nobody else has a hand in this room"});
     }
     // One event each, in one tick; answered with the last.
+    // A room that closes meanwhile answers the rest on this thread.
     struct Answer {
+      std::mutex mutex;
       std::size_t left = 0;
       std::optional<Error> failed;
     };
-    const auto answer = std::make_shared<Answer>(Answer{subjects.size(), {}});  // by the events that are queued
+    const auto answer = std::make_shared<Answer>();  // by the events that are queued
+    answer->left = subjects.size();
     for (const AuthorId subject : subjects)
       room->host().queue_event([by, subject, word = *word](Room& r) { return r.supervise(by, subject, word); },
                                [answer, reactor, response](const Result<RoomEvent>& decided) {
+                                 std::unique_lock lock(answer->mutex);
                                  if (decided)
                                    response->set_room_seq(decided->room_seq.value);
                                  else if (!answer->failed)
                                    answer->failed = decided.error();
                                  if (--answer->left > 0) return;
+                                 lock.unlock();
                                  reactor->Finish(answer->failed ? status_of(*answer->failed) : Status::OK);
                                });
     return reactor;
@@ -145,6 +151,12 @@ class PeopleServiceImpl final : public PeopleBase {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     const std::shared_ptr<OpenRoom> room = called(*context, reactor, request->author());
     if (!room) return reactor;
+    // What was cut in another room is that room's.
+    const Result<Caller> caller = caller_of(rooms_, *context);
+    if (!caller) return refuse(reactor, status_of(caller.error()));
+    if (!rooms_.is_for(*caller, request->room().empty() ? room->name : request->room()))
+      return refuse(reactor, {StatusCode::PERMISSION_DENIED, "the ticket is for room " + caller->ticket_room + " and not for " + request->room() +
+                                                                 "; ask for one for that room"});
     // A journal is read, which takes a while.
     rooms_.files.run([this, room, reactor, request, response] {
       const Result<Shown> shown = room->demonstrations().begin(rooms_, *room, AuthorId{request->author()},

@@ -126,8 +126,9 @@ class RoomHost {
   [[nodiscard]] Result<AuthorId> join(MemberKind kind, const std::string& name = {}, const Digest& secret = {},
                                       Role role = Role::none);
   // Whether an earlier connection may go on. `kept`: what it was told is safe, if anything. Errors: invalid_input (not the
-  // secret of which the author has the digest), unavailable (the room has lost what was said to be safe).
-  [[nodiscard]] Result<void> resume(AuthorId author, const Digest& secret, const std::optional<JournalHead>& kept);
+  // secret of which the author has the digest), unavailable (the room has lost what was said to be safe), denied (`role` is given, and he joined with another).
+  [[nodiscard]] Result<void> resume(AuthorId author, const Digest& secret, const std::optional<JournalHead>& kept,
+                                    std::optional<Role> role = {});
   [[nodiscard]] BoneStatus bone_status();
   // [thread for slow requests] All bodies' leaves, those that were taken away too, at one place of the order.
   struct Leaves {

@@ -11,6 +11,7 @@
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
 #include "common/wire/version.hpp"
+#include "server/net/gate.hpp"
 #include "server/net/journal_rows.hpp"
 #include "server/net/room_files.hpp"
 
@@ -242,6 +243,10 @@ std::vector<const ServedCase*> Rooms::cases() const {
   for (const ServedCase& one : cases_) all.push_back(&one);
   std::ranges::sort(all, {}, [](const ServedCase* one) { return one->bone.hash(); });
   return all;
+}
+
+bool Rooms::is_for(const Caller& caller, const std::string& room) const {
+  return gate == nullptr || caller.ticket_room == kAnyRoom || caller.ticket_room == room;
 }
 
 void Rooms::add_case(ServedCase served) {

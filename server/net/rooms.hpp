@@ -30,6 +30,8 @@
 
 namespace osteon {
 
+struct Caller;
+
 class Gate;
 
 struct RoomSummary {
@@ -155,12 +157,15 @@ class Rooms {
   void begin_drain(std::chrono::milliseconds again, const std::string& why);
   [[nodiscard]] std::optional<std::string> draining() const;  // why nobody is let in
   void begin_end();  // gives up what takes long, and does no upkeep any more
+  [[nodiscard]] bool ending() const { return ending_; }
   [[nodiscard]] std::map<std::string, RoomSummary> close_all();  // those that are open stay so in the folder's list
 
   // For calls that take long.
   JobThread jobs;   // whatever changes the rooms
   JobThread files;  // what only reads a case's files
   RefusalCounts refusals;  // of all doors
+  // Whether a caller's ticket is for that room; over plain text everybody's is for every room.
+  [[nodiscard]] bool is_for(const Caller& caller, const std::string& room) const;
   Gate* gate = nullptr;    // before every call; null: plain text, and everybody may do anything. It outlives the rooms' calls
 
  private:

@@ -45,7 +45,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     }
     rooms_.files.run([this, reactor, response, caller = *caller] {
       for (const RoomListing& listing : rooms_.list())
-        if (is_for(caller, listing.name)) *response->add_rooms() = to_wire(listing);
+        if (rooms_.is_for(caller, listing.name)) *response->add_rooms() = to_wire(listing);
       reactor->Finish(Status::OK);
     });
     return reactor;
@@ -124,14 +124,10 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
   }
 
  private:
-  // Over plain text everybody's ticket is for every room.
-  [[nodiscard]] bool is_for(const Caller& caller, const std::string& room) const {
-    return !rooms_.gate || caller.ticket_room == kAnyRoom || caller.ticket_room == room;
-  }
   Reactor* slowly(Context* context, const std::string& room, std::function<Status()> work) {
     Reactor* reactor = context->DefaultReactor();
     const Result<Caller> caller = caller_of(rooms_, *context);
-    if (!caller || !is_for(*caller, room)) {
+    if (!caller || !rooms_.is_for(*caller, room)) {
       reactor->Finish(caller ? Status(StatusCode::PERMISSION_DENIED, "the ticket is for room " + caller->ticket_room + " and not for " + room +
                                                                          "; ask for one for that room")
                              : status_of(caller.error()));

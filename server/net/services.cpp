@@ -137,7 +137,7 @@ class RoomServiceImpl final : public RoomBase {
       RoomHost& host = room->host();
       const Case& bone = host.bone();
       const Result<AuthorId> author =
-          request->resume_author() != 0 ? come_back(host, *request) : come(host, *request, *response, caller);
+          request->resume_author() != 0 ? come_back(host, *request, rooms_.gate ? std::optional(caller.role) : std::nullopt) : come(host, *request, *response, caller);
       if (!author) {
         rooms_.refusals.count("room");
         log::warn("join refused", {{"room", room->name}, {"reason", author.error().message}});
@@ -381,7 +381,8 @@ class RoomServiceImpl final : public RoomBase {
     // Others see who it is by the certificate, where there is one.
     return host.join(kind, caller.user.empty() ? request.name() : caller.user, digest_of_secret(response.secret()), caller.role);
   }
-  static Result<AuthorId> come_back(RoomHost& host, const v1::JoinRequest& request) {
+  // `role`: what the caller may be now; nothing: whatever it was.
+  static Result<AuthorId> come_back(RoomHost& host, const v1::JoinRequest& request, std::optional<Role> role) {
     std::optional<JournalHead> kept;
     if (request.kept_room_seq() != 0) {
       const Result<Digest> chain = wire::digest_from_wire(request.kept_chain());
@@ -389,7 +390,7 @@ class RoomServiceImpl final : public RoomBase {
       kept = JournalHead{RoomSeq{request.kept_room_seq()}, *chain};
     }
     const AuthorId author{request.resume_author()};
-    if (Result<void> may = host.resume(author, digest_of_secret(request.secret()), kept); !may) return tl::unexpected(may.error());
+    if (Result<void> may = host.resume(author, digest_of_secret(request.secret()), kept, role); !may) return tl::unexpected(may.error());
     return author;
   }
   // What the name of the call does not say.

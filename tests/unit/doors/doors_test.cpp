@@ -21,6 +21,7 @@
 #include <thread>
 
 #include "common/wire/room_client.hpp"
+#include "osteon/v1/people.grpc.pb.h"
 #include "osteon/v1/rooms.grpc.pb.h"
 #include "server/net/room_server.hpp"
 #include "server/net/rooms_client.hpp"
@@ -310,6 +311,18 @@ TEST_F(Doors, KeepRoomsApart) {
   EXPECT_EQ(other.error().code, ErrorCode::denied) << other.error().message;
   EXPECT_FALSE(rooms->branch("theatre", "copy", RoomSeq{0}));
   EXPECT_FALSE(rooms->create("third", ""));
+  // Nor does she show in it what was cut in another.
+  const auto ina = join(people_.door("ina", Role::instructor, "ward"), wire::ClientKind::viewer, "");
+  ASSERT_TRUE(ina.has_value()) << ina.error().message;
+  v1::DemonstrateRequest shown;
+  shown.set_author(ina->author.value);
+  shown.set_room("theatre");
+  shown.set_speed(1);
+  v1::DemonstrateResponse response;
+  grpc::ClientContext context;
+  const grpc::Status status = v1::PeopleService::NewStub(ina->channel)->Demonstrate(&context, shown, &response);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::PERMISSION_DENIED) << status.error_message();
+  EXPECT_THAT(status.error_message(), HasSubstr("theatre"));
   auto all = RoomsClient::reach(address(), 5s, {}, people_.door("otto", Role::operator_, "*"));
   EXPECT_EQ(all->list()->size(), 2u);
   EXPECT_TRUE(all->create("third", ""));

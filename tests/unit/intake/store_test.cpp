@@ -129,6 +129,7 @@ TEST_F(StoreTest, AReaderThatDiesOrHangsOrWantsTooMuchIsOneSentence) {
   EXPECT_EQ(with("echo '{\"hash\":\"00\",\"title\":\"x\"}'").code, ErrorCode::invalid_input);
   EXPECT_EQ(with("exec sleep 60", {.time = std::chrono::seconds(1)}).code, ErrorCode::exhausted);
   EXPECT_EQ(with("exec yes").code, ErrorCode::exhausted);
+  EXPECT_EQ(with("exec 1>&-; exec sleep 60").code, ErrorCode::invalid_input);  // says nothing more, and stays
   EXPECT_EQ(left_over(), 0U);
   // The real one, with less memory than a case takes.
   auto poor = make_store({.memory_bytes = 8 << 20});
@@ -137,6 +138,19 @@ TEST_F(StoreTest, AReaderThatDiesOrHangsOrWantsTooMuchIsOneSentence) {
   const auto out = keep(*none, archive);
   ASSERT_FALSE(out);
   EXPECT_EQ(out.error().code, ErrorCode::internal);
+}
+
+TEST_F(StoreTest, WhatIsNotWantedAnyMoreIsGivenUp) {
+  const fs::path program = temp_ / "reader";
+  std::ofstream(program) << "#!/bin/sh\nexec sleep 60\n";
+  fs::permissions(program, fs::perms::owner_all);
+  auto store = make_store({}, program);
+  auto upload = store->begin();
+  ASSERT_TRUE(upload && (*upload)->add(content_of(temp_ / "case.zip")));
+  const auto out = store->keep(std::move(*upload), [] { return true; });
+  ASSERT_FALSE(out);
+  EXPECT_EQ(out.error().code, ErrorCode::cancelled);
+  EXPECT_EQ(left_over(), 0U);
 }
 
 TEST_F(StoreTest, WhatAnEarlierProcessLeftHalfDoneGoes) {

@@ -134,6 +134,20 @@ struct Lesson {
   std::map<AuthorId, std::shared_ptr<HeardSession>> sessions;
 };
 
+// What somebody may take back goes by the role of the join, so that who comes back with another has to join anew.
+TEST(PeopleHost, AnAuthorOfAnotherRoleDoesNotComeBack) {
+  Lesson lesson;
+  const Digest secret{{7}};
+  AuthorId author;
+  lesson.host.join(MemberKind::surgeon, "Eve", secret, Role::instructor, [&](const Result<AuthorId>& given) { author = given.value(); });
+  lesson.tick();
+  EXPECT_TRUE(lesson.host.resume(author, secret, {}, Role::instructor));
+  EXPECT_TRUE(lesson.host.resume(author, secret, {}));  // over plain text nobody has a role
+  const Result<void> demoted = lesson.host.resume(author, secret, {}, Role::trainee);
+  ASSERT_FALSE(demoted);
+  EXPECT_EQ(demoted.error().code, ErrorCode::denied);
+}
+
 TEST(PeopleHost, AWordGoesToItsHandAndLeavesNoGapForOthers) {
   Lesson lesson;
   const auto frozen = lesson.supervise(lesson.trainee, {.stopped = true, .words = "stop"});
