@@ -75,8 +75,8 @@ class Journal {
   [[nodiscard]] JournalSlice read_slice(const JournalHead& after, RoomSeq last, std::size_t most_rows);
 
   // What somebody was told was safe, a client's last acknowledged row, say. Error unavailable: the journal is behind it, and
-  // from now on closed to rows, unless it was recovered with losses (see recovered_to). Error invalid_input: the witness
-  // knows another history.
+  // from now on closed to rows, unless it was recovered with losses (see recovered_to); or it is closed to rows, and its file
+  // does not show what the witness knows. Error invalid_input: the witness knows another history.
   [[nodiscard]] Result<void> check_witness(const JournalHead& witness);
   // Where it was cut off when it was recovered from a damaged one: what a witness knows beyond is lost for good.
   [[nodiscard]] std::optional<RoomSeq> recovered_to() const;

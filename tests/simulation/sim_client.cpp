@@ -68,7 +68,8 @@ void SimClient::heal() {
   plan_.quality = {.delay = 1ms};
   up_stopped_ = down_stopped_ = 0;
   set_ways();
-  if (stream_ && stream_->delayed_until() != Time::max()) held_back_until_ = stream_->delayed_until();
+  held_back_until_ = requests_there_;
+  if (stream_ && stream_->delayed_until() != Time::max()) held_back_until_ = std::max(held_back_until_, stream_->delayed_until());
 }
 
 template <class Call>
@@ -89,6 +90,7 @@ void SimClient::ask(std::function<void(std::function<void(const Result<Answer>&)
   time_.post_in(patience, [finish] { finish(failure(ErrorCode::unavailable, "no answer")); });
   const std::optional<Time> there = path_.arrival();
   if (!there) return;
+  requests_there_ = std::max(requests_there_, *there);
   time_.post(*there, [this, finish, request = std::move(request)] {
     const auto back = [this, finish](const Result<Answer>& answer) {
       if (const std::optional<Time> here = path_.arrival()) time_.post(*here, [finish, answer] { finish(answer); });
@@ -439,7 +441,7 @@ bool SimClient::settled() const {
 }
 
 bool SimClient::connected() const {
-  return room_ && stream_ && stream_->open() && bone_is_here_ && !interrupted_ && time_.now() >= held_back_until_;
+  return time_.now() >= held_back_until_ && (gone_ || (room_ && stream_ && stream_->open() && bone_is_here_ && !interrupted_));
 }
 
 std::string SimClient::standing() const {

@@ -67,7 +67,7 @@ class SimClient {
 
   [[nodiscard]] bool here() const { return !gone_; }
   [[nodiscard]] bool settled() const;
-  // It is on the line, and what the network has held back until now has come.
+  // It is on the line or gone, and what the network has held back until now has come, its requests as well.
   [[nodiscard]] bool connected() const;
   [[nodiscard]] std::string standing() const;        // for messages
   [[nodiscard]] AuthorId author() const { return room_ ? room_->author : AuthorId{}; }
@@ -167,7 +167,7 @@ class SimClient {
   std::map<std::uint64_t, wire::SessionRow> said_;   // by datagrams: rows of the present stream by index
   bool by_datagram_ = false;                         // what is being heard
   std::uint64_t state_seq_ = 0;
-  Time held_back_until_{};
+  Time requests_there_{}, held_back_until_{};
   std::optional<Backoff> backoff_;
   std::shared_ptr<ToolBox> tools_;                   // shared with the replica's fields
   std::optional<haptic::Replica> replica_;

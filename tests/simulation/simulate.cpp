@@ -58,7 +58,7 @@ class Simulation {
     end_trouble();
     const Time began = time_.now();
     Time quiet = began;
-    while (!settled() && time_.now() - began < kSettling) {
+    while (!(settled() && connected()) && time_.now() - began < kSettling) {
       time_.run_until(time_.now() + 20ms);
       if (!connected()) quiet = time_.now();
     }
@@ -259,8 +259,7 @@ class Simulation {
   }
 
   bool connected() {
-    return server_.up() &&
-           std::ranges::all_of(clients_, [](const auto& client) { return !client->here() || client->connected(); });
+    return server_.up() && std::ranges::all_of(clients_, [](const auto& client) { return client->connected(); });
   }
 
   bool settled() {
