@@ -245,9 +245,9 @@ SimServer::SimServer(VirtualTime& time, Ledger& ledger, Datagrams& datagrams, st
       disk_(seed, condition.sector_bytes) {}
 
 SimServer::~SimServer() {
-  sessions_.clear();
   links_.reset();
   host_.reset();
+  sessions_.clear();
   keeper_.reset();
 }
 
@@ -346,10 +346,10 @@ Digest SimServer::live() {
 Digest SimServer::reopened(bool with_checkpoint) {
   if (!host_) return {};
   for (const auto& session : sessions_) session->die();
-  sessions_.clear();
   links_.reset();
   ++life_;
   host_->stop();
+  sessions_.clear();  // which the host's thread that shows tools has told of until now
   if (with_checkpoint) checkpoint();
   host_.reset();
   if (with_checkpoint) {
