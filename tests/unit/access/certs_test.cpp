@@ -1,0 +1,107 @@
+// deploy/certs beside a server that runs as a user of its own: whatever it renews or revokes, the server can still read.
+#include <gtest/gtest.h>
+#include <grp.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <string>
+
+#include "common/access/access_list.hpp"
+#include "tests/support/doors/people.hpp"
+
+namespace osteon {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Rights {
+  uid_t owner = 0;
+  gid_t group = 0;
+  mode_t mode = 0;
+  bool operator==(const Rights&) const = default;
+};
+
+Rights rights_of(const fs::path& file) {
+  struct stat about {};
+  EXPECT_EQ(::stat(file.c_str(), &about), 0) << file;
+  return {about.st_uid, about.st_gid, about.st_mode};
+}
+
+// Where this test may be anybody, somebody else; otherwise itself.
+const uid_t kServer = ::geteuid() == 0 ? 64123 : ::geteuid();
+const gid_t kServersGroup = ::geteuid() == 0 ? 64124 : ::getegid();
+
+// How many entries the list has as the server's user reads it; -1: it cannot.
+int entries_for_the_server(const fs::path& file) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    if (::geteuid() == 0 && (::setgroups(0, nullptr) != 0 || ::setgid(kServersGroup) != 0 || ::setuid(kServer) != 0)) ::_exit(255);
+    AccessFile list(file);
+    ::_exit(list.refresh() ? static_cast<int>(list.list().size()) : 255);
+  }
+  int status = 0;
+  EXPECT_EQ(::waitpid(child, &status, 0), child);
+  return WIFEXITED(status) && WEXITSTATUS(status) != 255 ? WEXITSTATUS(status) : -1;
+}
+
+class Certs : public ::testing::Test {
+ protected:
+  // As the head of deploy/systemd/osteon-server.service says: the server reads as one of a group.
+  Certs() {
+    fs::permissions(people_.folder(), fs::perms(0711));
+    fs::permissions(people_.server().parent_path(), fs::perms(0711));
+    give(people_.server(), 0750);
+    for (const auto& file : fs::directory_iterator(people_.server())) give(file, 0640);
+  }
+  static void give(const fs::path& path, mode_t mode) {
+    EXPECT_EQ(::chown(path.c_str(), ::geteuid(), kServersGroup), 0) << path;
+    EXPECT_EQ(::chmod(path.c_str(), mode), 0) << path;
+  }
+  test::People people_;
+};
+
+TEST_F(Certs, WhomTheyRevokeTheServerReadsOf) {
+  const fs::path list = people_.server() / "access.txt";
+  const Rights before = rights_of(list);
+  ASSERT_EQ(entries_for_the_server(list), 0);
+  (void)people_.person("ben");
+  people_.certs({"revoke", "ben"});
+  EXPECT_EQ(rights_of(list), before);
+  EXPECT_EQ(entries_for_the_server(list), 1);
+  // Also after a line whose end its writer forgot, and where there is no list yet.
+  std::ofstream(list, std::ios::app) << "revoke user eve";
+  (void)people_.person("dan");
+  people_.certs({"revoke", "dan"});
+  EXPECT_EQ(entries_for_the_server(list), 3);
+  fs::remove(list);
+  (void)people_.person("fay");
+  people_.certs({"revoke", "fay"});
+  EXPECT_EQ(rights_of(list), before);
+  EXPECT_EQ(entries_for_the_server(list), 1);
+}
+
+TEST_F(Certs, WhatTheyRenewStaysReadable) {
+  std::map<std::string, Rights> before;
+  for (const auto& file : fs::directory_iterator(people_.server())) before[file.path().filename()] = rights_of(file);
+  ASSERT_EQ(before.size(), 5u);
+  const auto renewed = fs::last_write_time(people_.server() / "server.pem");
+  people_.certs({"server", "127.0.0.1"});
+  EXPECT_NE(fs::last_write_time(people_.server() / "server.pem"), renewed);
+  for (const auto& [name, rights] : before) EXPECT_EQ(rights_of(people_.server() / name), rights) << name;
+  EXPECT_EQ(std::distance(fs::directory_iterator(people_.server()), fs::directory_iterator{}), 5) << "nothing is left beside";
+}
+
+// Of its own accord it opens nothing to others.
+TEST(CertsMade, AreForTheirOwnerAlone) {
+  const test::People people;
+  for (const char* file : {"server.key", "access.txt"}) EXPECT_EQ(rights_of(people.server() / file).mode & 0077u, 0u) << file;
+  EXPECT_EQ(rights_of(people.ticket_key()).mode & 0077u, 0u);
+}
+
+}  // namespace
+}  // namespace osteon
