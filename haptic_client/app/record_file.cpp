@@ -26,7 +26,8 @@ constexpr const char* kReadme =
     "[x, y, z, qx, qy, qz, qw] of the tool, its tip at the origin and +z along its axis out of the tip. Frame `bone` is the "
     "patient's (DICOM LPS: x to the left, y to the back, z to the head); frame `device` has x to the right, y up, z to the user. "
     "drill_pose is the tool as the bone lets it be (the proxy), device_pose the tool as the hand holds it, handle_pose the "
-    "device's handle. Wrenches are [fx, fy, fz, tx, ty, tz] at the tip: `physical` of the bone on the tool, not scaled; "
+    "device's handle; bone_pose is the bone on its mount, seen from where it rests: frame `bone` goes with it, that of "
+    "burr_change stays. Wrenches are [fx, fy, fz, tx, ty, tz] at the tip: `physical` of the bone on the tool, not scaled; "
     "`wrench` in drill_force_feedback as it was shown by the device, s times as strong (data/force_scale), zero where it shows "
     "none. burr_change has a row for each time that a tool was taken up: which, at which row, and how the device's frame lay in "
     "the bone's from then on. Enumerations carry their names. Bone that was removed is named by metadata/field_hash and kept in "
@@ -298,6 +299,9 @@ void RecordFile::Impl::make_columns() {
   add(column<double, R>("high_frequency_poses/drill_pose/pose", "mm, mm, mm, 1, 1, 1, 1", kBone,
                         "the tool as the bone lets it be: the proxy",
                         [](const R& r) { return numbers(r.report.pose_bone_proxy); }));
+  add(column<double, R>(recording::kBonePose, "mm, mm, mm, 1, 1, 1, 1", "rest",
+                        "the bone on its mount, seen from where it rests",
+                        [](const R& r) { return numbers(r.report.pose_rest_bone); }));
   add(column<float, R>("drill_force_feedback/wrench", "N, N, N, N.mm, N.mm, N.mm", kDevice, "shown by the device to the hand",
                        [forces, torques](const R& r) {
                          return wrench(forces ? r.rendered.force_n : Vec3(Vec3::Zero()),
@@ -449,8 +453,9 @@ bool RecordFile::Impl::make_metadata() {
 
 // The same array under the names that each group of the layout knows it by.
 bool RecordFile::Impl::make_links() {
-  for (const char* group : {"high_frequency_poses/handle_pose", "high_frequency_poses/device_pose",
-                            "high_frequency_poses/drill_pose", "drill_force_feedback", "drill_force_physical"})
+  for (const char* group :
+       {"high_frequency_poses/handle_pose", "high_frequency_poses/device_pose", "high_frequency_poses/drill_pose",
+        "high_frequency_poses/bone_pose", "drill_force_feedback", "drill_force_physical"})
     if (H5Lcreate_hard(file.id(), recording::kTime, file.id(), (std::string(group) + "/time_stamp").c_str(), H5P_DEFAULT,
                        H5P_DEFAULT) < 0)
       return false;

@@ -139,6 +139,7 @@ SessionTick FreeHandSession::tick(const Patch& patch, RoomLink room, int periods
                                   const std::vector<PlacedGuide>* room_guides) noexcept {
   SessionTick result;
   const DeviceReading reading = device_.read();
+  if (const Pose* bone = device_.pose_rest_bone()) loop_.see_bone(*bone);
   const bool usable = reading.usable();
   // Before the device is calibrated there is no place for a tool to be.
   if (!taken_up_ && usable) take_up(reading, result.order);

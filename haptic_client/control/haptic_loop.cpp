@@ -62,6 +62,7 @@ void HapticLoop::see_bone(const Pose& pose_rest_bone) noexcept {
 LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::span<const PlacedGuide> guides) noexcept {
   LoopReport report;
   report.tool = tool_;
+  report.pose_rest_bone = bone_;
   report.state_seq = ++ticks_;
   if (tools_.empty()) return report;  // a plan that only waits
   const ToolModel& model = tools_[static_cast<std::size_t>(tool_)];

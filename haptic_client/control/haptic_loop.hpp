@@ -100,6 +100,7 @@ struct LoopReport {
   Vec3 motor_device_nmm = Vec3::Zero();     // moment of the cut: active, within the coupling's force at the arm of a turn
   Vec3 moved_mm = Vec3::Zero();          // of the proxy in this tick
   Pose pose_bone_proxy, pose_bone_device;
+  Pose pose_rest_bone;                   // the bone on its mount, seen from where it rests
   Vec3 offset_mm = Vec3::Zero();         // of the handle's place, bone frame: slack, and what returned bone would have stretched
   EnergyReport energy;                   // of the coupling, at the handle
   double guide_distance_mm = 0;          // while led: from the handle's place to that of the hand that leads it, bone frame

@@ -22,6 +22,8 @@ SessionTick SimulatedSession::tick(const Patch& patch, RoomLink room, int period
                                    const std::vector<PlacedGuide>* room_guides) noexcept {
   const double dt_s = loop_.params().dt_s;
   SessionTick result;
+  const DeviceReading from_played = played_ ? played_->read() : DeviceReading();
+  if (const Pose* bone = played_ ? played_->pose_rest_bone() : nullptr) loop_.see_bone(*bone);
   result.order = surgeon_.act(last_, dt_s);
   phase_ = result.order.phase;
   if (result.order.phase != SurgeonPhase::done && result.order.phase != SurgeonPhase::wait) {
@@ -47,7 +49,7 @@ SessionTick SimulatedSession::tick(const Patch& patch, RoomLink room, int period
     device_.step(dt_s);
   }
 
-  const DeviceReading reading = played_ ? played_->read() : device_.read();
+  const DeviceReading reading = played_ ? from_played : device_.read();
   LoopInput input;
   input.pose_device_tool = reading.pose_device_tool;
   input.clutch = (reading.buttons & kClutchButton) != 0;

@@ -104,6 +104,9 @@ class HapticDevice {
 
   // [haptic]
   [[nodiscard]] virtual DeviceReading read() noexcept = 0;
+  // [haptic] Of a recording: where the bone stood on its mount at the last reading, seen from where it rests, and so it stands
+  // for whoever plays it. Null: nobody says, and the bone is where the room has it.
+  [[nodiscard]] virtual const Pose* pose_rest_bone() const noexcept { return nullptr; }
   // [haptic] It has given its last reading for good, as a recording does at its end.
   [[nodiscard]] virtual bool over() const noexcept { return false; }
   // [haptic] Never more than the device's limits reaches the motors.

@@ -60,6 +60,8 @@ class Reader {
     return H5Aexists_by_name(file_.id(), group, name, H5P_DEFAULT) > 0;
   }
 
+  [[nodiscard]] bool has_dataset(const char* path) const { return H5Oexists_by_name(file_.id(), path, H5P_DEFAULT) > 0; }
+
   // A list of texts of one length.
   std::vector<std::string> texts(const char* path) {
     const Hdf5Handle dataset = find_dataset(path);
@@ -180,8 +182,15 @@ DeviceLimits limits_of(Reader& reader) {
   return limits;
 }
 
-// The readings tick by tick; a gap in the ticks' numbers is filled by what was read before it.
-std::vector<DeviceReading> readings_of(Reader& reader) {
+// x, y, z, qx, qy, qz, qw.
+Pose pose_of(const double* p) { return {{p[0], p[1], p[2]}, {p[6], p[3], p[4], p[5]}}; }
+bool good(const Pose& pose) {
+  return pose.position_mm.allFinite() && std::abs(pose.rotation.squaredNorm() - 1.0) < 1e-6;
+}
+
+// The readings tick by tick, and the bone's places; a gap in the ticks' numbers is filled by what was read before it.
+void read_rows(Reader& reader, RecordedSession& session) {
+  std::vector<DeviceReading>& readings = session.readings;
   const std::size_t rows = reader.rows();
   const auto poses = reader.values<double>(recording::kHandlePose, H5T_NATIVE_DOUBLE, rows, 7);
   const auto buttons = reader.values<std::uint32_t>(recording::kButtons, H5T_NATIVE_UINT32, rows, 1);
@@ -189,22 +198,25 @@ std::vector<DeviceReading> readings_of(Reader& reader) {
   const auto status = reader.values<std::uint8_t>(recording::kDeviceStatus, H5T_NATIVE_UINT8, rows, 1);
   const auto calibration = reader.values<std::uint8_t>(recording::kCalibration, H5T_NATIVE_UINT8, rows, 1);
   const auto ticks = reader.values<std::uint64_t>(recording::kTick, H5T_NATIVE_UINT64, rows, 1);
-  std::vector<DeviceReading> readings;
-  if (!reader.ok()) return readings;
+  std::vector<double> bone;
+  if (reader.has_dataset(recording::kBonePose)) bone = reader.values<double>(recording::kBonePose, H5T_NATIVE_DOUBLE, rows, 7);
+  if (!reader.ok()) return;
+  bool moves = false;
+  std::vector<Pose>& places = session.pose_rest_bone;
   if (rows == 0) reader.wrong(ErrorCode::invalid_input, reader.name() + " holds no complete row; its session ended too soon");
   constexpr std::uint64_t kMostLost = 60'000;
   for (std::size_t i = 0; i < rows && reader.ok(); ++i) {
-    const double* p = &poses[7 * i];
     DeviceReading reading;
-    reading.pose_device_tool = {{p[0], p[1], p[2]}, {p[6], p[3], p[4], p[5]}};
+    reading.pose_device_tool = pose_of(&poses[7 * i]);
+    const Pose place = bone.empty() ? Pose() : pose_of(&bone[7 * i]);
+    moves |= place.position_mm != Vec3::Zero() || place.rotation.vec() != Vec3::Zero();
     reading.buttons = buttons[i];
     reading.pedal = pedal[i];
     reading.status = static_cast<DeviceStatus>(status[i]);
     reading.calibration = static_cast<Calibration>(calibration[i]);
     reading.sample = i + 1;
-    const bool well = reading.pose_device_tool.position_mm.allFinite() &&
-                      std::abs(reading.pose_device_tool.rotation.squaredNorm() - 1.0) < 1e-6 && pedal[i] >= 0.0 &&
-                      pedal[i] <= 1.0 && status[i] <= static_cast<int>(DeviceStatus::absent) &&
+    const bool well = good(reading.pose_device_tool) && good(place) && pedal[i] >= 0.0 && pedal[i] <= 1.0 &&
+                      status[i] <= static_cast<int>(DeviceStatus::absent) &&
                       calibration[i] <= static_cast<int>(Calibration::pending) &&
                       (i == 0 || (ticks[i] > ticks[i - 1] && ticks[i] - ticks[i - 1] < kMostLost));
     if (!well) {
@@ -212,11 +224,15 @@ std::vector<DeviceReading> readings_of(Reader& reader) {
                    reader.name() + ": row " + std::to_string(i) + " is no reading of a device; the file is damaged");
       break;
     }
-    if (i > 0)
-      for (std::uint64_t lost = ticks[i] - ticks[i - 1]; lost > 1; --lost) readings.push_back(DeviceReading(readings.back()));
+    const std::uint64_t lost = i > 0 ? ticks[i] - ticks[i - 1] - 1 : 0;
+    if (lost > 0) {
+      readings.resize(readings.size() + lost, DeviceReading(readings.back()));
+      places.resize(places.size() + lost, Pose(places.back()));
+    }
     readings.push_back(reading);
+    places.push_back(place);
   }
-  return readings;
+  if (!moves) places = {};
 }
 
 }  // namespace
@@ -245,7 +261,7 @@ Result<RecordedSession> read_recording(const std::filesystem::path& file) {
   session.info.model = "a recording of " + (session.device_model.empty() ? session.device : session.device_model);
   session.info.force_axes = static_cast<int>(reader.number(g, recording::kForceAxes));
   session.info.torque_axes = static_cast<int>(reader.number(g, recording::kTorqueAxes));
-  session.readings = readings_of(reader);
+  read_rows(reader, session);
   if (!reader.ok()) return tl::unexpected(reader.error());
 
   session.start_hash = reader.digits(recording::kStartHash);
@@ -284,6 +300,10 @@ DeviceReading RecordedDevice::read() noexcept {
   last.buttons = 0;
   last.pedal = 0.0;
   return last;
+}
+
+const Pose* RecordedDevice::pose_rest_bone() const noexcept {
+  return session_.pose_rest_bone.empty() || next_ == 0 ? nullptr : &session_.pose_rest_bone[next_ - 1];
 }
 
 Result<void> check_played_on(const RecordedDevice& recorded, std::string_view field_hash) {

@@ -1,6 +1,6 @@
 // A device that does again what another did: plays the handle's poses and buttons of a recording, a row for each tick.
 // Force goes nowhere. On the same bone with the same plan it makes the same cuts, bit for bit where time is virtual; what
-// differs in either is refused by check_played().
+// differs in either is refused by check_played(). A bone that stood on a mount moves again as it did, whatever the room's does.
 #pragma once
 #include <filesystem>
 #include <memory>
@@ -23,6 +23,8 @@ struct RecordedSession {
   DeviceLimits limits;
   DeviceInfo info;
   std::vector<DeviceReading> readings;  // one for each tick from the first row on; a lost row shows the one before
+  // Of each reading: where the bone stood, seen from where it rests. Empty: it never moved, or the recording does not say.
+  std::vector<Pose> pose_rest_bone;
 };
 
 // Whether a recording can be played in a session: only the same bone, tools and plan make sense of its handle. `name`: of
@@ -44,6 +46,7 @@ class RecordedDevice final : public HapticDevice {
   [[nodiscard]] DeviceInfo info() const override { return session_.info; }
   // After the last row the device is absent, as if it had been unplugged there.
   [[nodiscard]] DeviceReading read() noexcept override;
+  [[nodiscard]] const Pose* pose_rest_bone() const noexcept override;
   void write(const DeviceOutput&) noexcept override {}
 
   [[nodiscard]] const RecordedSession& session() const { return session_; }

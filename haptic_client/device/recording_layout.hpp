@@ -19,6 +19,8 @@ inline constexpr int kVersion = 1;
 inline constexpr const char* kTime = "data/time";                    // written last: what it lacks is not complete
 inline constexpr const char* kTick = "data/state_seq";
 inline constexpr const char* kHandlePose = "high_frequency_poses/handle_pose/pose";
+// Of a bone on its mount; recordings of before it was written have none.
+inline constexpr const char* kBonePose = "high_frequency_poses/bone_pose/pose";
 inline constexpr const char* kButtons = "data/buttons";
 inline constexpr const char* kPedal = "data/pedal";
 inline constexpr const char* kDeviceStatus = "data/device_status";

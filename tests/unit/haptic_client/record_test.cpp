@@ -81,6 +81,7 @@ TickRow row(std::uint64_t i) {
   row.take_up = i % 700 == 0;
   row.taken_up_at = pose(random);
   row.mapping.align(pose(random).rotation, 1.5, vector(random, 10), vector(random, 10));
+  row.report.pose_rest_bone = pose(random);
   return row;
 }
 
@@ -100,6 +101,12 @@ osteon::test::RunResult python(const std::string& script, const std::filesystem:
   return osteon::test::run(OSTEON_PYTHON, {"-c", script, file});
 }
 
+void expect_same(const Pose* a, const Pose& b) {
+  ASSERT_NE(a, nullptr);
+  EXPECT_EQ(a->position_mm, b.position_mm);
+  EXPECT_EQ(a->rotation.coeffs(), b.rotation.coeffs());
+}
+
 void expect_same(const DeviceReading& a, const DeviceReading& b) {
   EXPECT_EQ(a.pose_device_tool.position_mm, b.pose_device_tool.position_mm);
   EXPECT_EQ(a.pose_device_tool.rotation.coeffs(), b.pose_device_tool.rotation.coeffs());
@@ -117,6 +124,7 @@ TEST(Recording, GivesTheDeviceBackBitForBit) {
   for (std::uint64_t i = 0; i < 1234; ++i) {
     ASSERT_FALSE(recorded.over());
     expect_same(recorded.read(), row(i).reading);
+    expect_same(recorded.pose_rest_bone(), row(i).report.pose_rest_bone);
   }
   EXPECT_TRUE(recorded.over());
   EXPECT_EQ(recorded.read().status, DeviceStatus::absent);
@@ -216,8 +224,47 @@ TEST(Recording, LostRowsDoNotShiftTheRest) {
   ASSERT_TRUE(session) << session.error().message;
   const int shown[] = {0, 1, 2, 2, 2, 2, 6, 7};
   ASSERT_EQ(session->readings.size(), std::size(shown));
-  for (std::size_t i = 0; i < std::size(shown); ++i)
-    expect_same(session->readings[i], row(static_cast<std::uint64_t>(shown[i])).reading);
+  ASSERT_EQ(session->pose_rest_bone.size(), std::size(shown));
+  for (std::size_t i = 0; i < std::size(shown); ++i) {
+    const TickRow one = row(static_cast<std::uint64_t>(shown[i]));
+    expect_same(session->readings[i], one.reading);
+    expect_same(&session->pose_rest_bone[i], one.report.pose_rest_bone);
+  }
+}
+
+// Of a bone that stood, and in recordings of before there were mounts, nobody says where it was.
+TEST(Recording, OfABoneThatStoodMovesNone) {
+  const TempDir temp;
+  {
+    Result<RecordFile> recording = RecordFile::create(temp / "stood.h5", info_of_a_session());
+    ASSERT_TRUE(recording);
+    TickRow one = row(0);
+    one.report.pose_rest_bone = {};
+    ASSERT_TRUE(recording->append({&one, 1}));
+    ASSERT_TRUE(recording->finish({}));
+  }
+  write_rows(temp / "old.h5", 3);
+  const auto done = python("import sys, h5py\nf = h5py.File(sys.argv[1], 'r+')\n"
+                           "del f['high_frequency_poses/bone_pose']\nf.close()", temp / "old.h5");
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  for (const char* name : {"stood.h5", "old.h5"}) {
+    const auto device = make_recorded_device(temp / name);
+    ASSERT_TRUE(device) << device.error().message;
+    expect_same((*device)->read(), row(0).reading);
+    EXPECT_EQ((*device)->pose_rest_bone(), nullptr) << name;
+  }
+}
+
+// A place that is none is damage, as of the handle.
+TEST(Recording, RefusesAPlaceOfTheBoneThatIsNone) {
+  const TempDir temp;
+  write_rows(temp / "a.h5", 3);
+  const auto done = python("import sys, h5py\nf = h5py.File(sys.argv[1], 'r+')\nf['high_frequency_poses/bone_pose/pose'][1] = 0\n"
+                           "f.close()", temp / "a.h5");
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  const auto session = read_recording(temp / "a.h5");
+  ASSERT_FALSE(session);
+  EXPECT_THAT(session.error().message, testing::HasSubstr("row 1 is no reading of a device"));
 }
 
 // The lines of the README, word for word apart from the file's name.
@@ -250,7 +297,7 @@ TEST(Recording, IsLaidOutAsItSays) {
 import sys, h5py, numpy as np
 f = h5py.File(sys.argv[1], "r")
 assert {"metadata", "data", "high_frequency_poses", "drill_force_feedback", "burr_change"} <= set(f), list(f)
-poses = {"handle_pose": "device", "device_pose": "bone", "drill_pose": "bone"}
+poses = {"handle_pose": "device", "device_pose": "bone", "drill_pose": "bone", "bone_pose": "rest"}
 for name, frame in poses.items():
     pose = f["high_frequency_poses"][name]["pose"]
     assert pose.shape == (1300, 7) and pose.attrs["frame"] == frame and pose.attrs["units"].startswith("mm"), name

@@ -1,6 +1,9 @@
 // What a hand has done is done again by its recording: the same bone to the last bit, whatever the tools and devices.
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <functional>
+
 #include "haptic_client/app/record_file.hpp"
 #include "haptic_client/device/recorded_device.hpp"
 #include "tests/support/temp_dir.hpp"
@@ -62,16 +65,19 @@ struct Session {
 };
 
 // A session with the simulated hand, recorded.
+// `mount`: where the bone stands on one, by the number of the tick.
 Session record(const Case& bone, const std::vector<PlanStep>& plan, const SimulatedDeviceParams& device,
-               const std::filesystem::path& file) {
+               const std::filesystem::path& file, const std::function<Pose(std::uint64_t)>& mount = {}) {
   Bench bench(bone, plan, device);
   Result<RecordFile> recording = RecordFile::create(file, info_of(bench));
   EXPECT_TRUE(recording) << recording.error().message;
   Session session;
+  if (mount) bench.session().loop().see_bone(mount(0));
   bench.run([&](const SessionTick& tick) {
     const TickRow row = row_of(bench, tick);
     EXPECT_TRUE(recording->append({&row, 1}));
     session.forces.push_back(tick.report.force_physical_n);
+    if (mount) bench.session().loop().see_bone(mount(tick.report.state_seq));
   });
   EXPECT_TRUE(bench.session().done());
   session.field_hash = to_hex(bench.replica().committed().hash());
@@ -109,6 +115,27 @@ TEST(Replay, MakesTheSameCutsAndForces) {
     EXPECT_GT(made.cuts.size(), 500u);
     std::printf("  %s: %zu ticks, %zu cuts, field %.12s\n", name, made.forces.size(), made.cuts.size(), made.field_hash.c_str());
   }
+}
+
+// A bone that swayed on its mount sways again, also where it is played on bone that stands: tools are taken up, felt and cut
+// with where the bone then was.
+TEST(Replay, MovesTheBoneAsItMoved) {
+  const osteon::test::TempDir temp;
+  const Case bone = block_case(16.0);
+  const std::vector<PlanStep> plan{drill(HandKind::expert, {3.1, -0.2, 0}), drill(HandKind::rig, {-3.4, 2.2, 0})};
+  const auto sways = [](std::uint64_t tick) {
+    const double t = 1e-3 * static_cast<double>(tick);
+    return Pose{Vec3(0.2 * std::sin(1.3 * t), 0.1, 0.6 * std::sin(0.7 * t + 0.3)),
+                Eigen::Quaterniond(Eigen::AngleAxisd(0.01 * std::sin(0.9 * t), Vec3::UnitX()))};
+  };
+  const Session stood = record(bone, plan, {}, temp / "stood.h5");
+  const Session made = record(bone, plan, {}, temp / "a.h5", sways);
+  EXPECT_NE(made.field_hash, stood.field_hash);
+  const Session again = replay(bone, plan, temp / "a.h5");
+  EXPECT_EQ(again.field_hash, made.field_hash);
+  EXPECT_EQ(again.cuts, made.cuts);
+  EXPECT_EQ(again.forces, made.forces);
+  EXPECT_GT(made.cuts.size(), 300u);
 }
 
 // A recording that was broken off ends the session that it is played in, and nothing is said of the bone.
