@@ -13,6 +13,7 @@ using namespace haptic;
 
 constexpr double kPitch_mm = 0.5;
 constexpr int kPatchTicks = 10;
+constexpr int kServerTicks = 8;  // 120 Hz, nearly
 
 // 30 mm wide, its upper face at z = 0, entered along +z.
 Case block() {
@@ -20,6 +21,10 @@ Case block() {
     return std::max({std::abs(p.x()) - 15.0, std::abs(p.y()) - 8.0, -p.z(), p.z() - 12.0});
   };
   return make_bone({{-17, -10, -4}, {17, 10, 14}}, kPitch_mm, distance, [](const Vec3&) { return 1.9; });
+}
+
+bool touches(const LoopReport& report) {
+  return report.phase == CuttingPhase::rubbing || report.phase == CuttingPhase::cutting;
 }
 
 Vec3 growth(const Vec3& now, const Vec3& before) {
@@ -46,6 +51,9 @@ OverseenHand::OverseenHand(const OverseenRun& run)
   device_->take(scaled(expert_hand(), params.force_scale, mapping.scale()), mapping.pose_device_tool(start).position_mm);
   builder_.build(replica_.bodies(), loop_->tool(0), start, patch_);
   command.target_mm = start.position_mm;
+  if (!run.mount) return;
+  yielding_ = std::make_unique<Yielding>(mount_about(bone_.bounds().centre_mm()));
+  for (const std::uint64_t author : {1, 2}) yielding_->server.join(author);
 }
 
 void OverseenHand::decide(const Supervision& supervision) {
@@ -55,11 +63,70 @@ void OverseenHand::decide(const Supervision& supervision) {
   decided_.push_back({ticks_ + run_.delay_ms, supervision, epoch_});
 }
 
-LoopReport OverseenHand::tick() {
+void OverseenHand::undo(int count) {
+  const std::uint64_t before = room_.undone();
+  room_.undo(count);
+  if (room_.undone() > before) undone_due_.push_back(ticks_ + run_.delay_ms);
+}
+
+void OverseenHand::hear() {
+  InContact none, &count = touches(last_) ? crossed_.in_contact : none;
   for (; !decided_.empty() && decided_.front().due <= ticks_; decided_.pop_front()) {
     const ToolModel tools[] = {loop_->tool(0)};
-    loop_->oversee(oversight_of(decided_.front().supervision, RoomSeq{++decisions_}, decided_.front().epoch, tools));
+    const Supervision& now = decided_.front().supervision;
+    loop_->oversee(oversight_of(now, RoomSeq{++decisions_}, decided_.front().epoch, tools));
+    count.stopped += now.stopped && !heard_.stopped;
+    count.taken += now.taken_by && !heard_.taken_by;
+    count.given_back += (!now.taken_by && heard_.taken_by) || (!now.stopped && heard_.stopped);
+    count.led += now.guide && !heard_.guide;
+    count.let_go += !now.guide && heard_.guide;
+    count.limited += now.force_limit != heard_.force_limit;
+    heard_ = now;
   }
+  for (; !undone_due_.empty() && undone_due_.front() <= ticks_; undone_due_.pop_front()) ++count.undone;
+}
+
+// What the lines bring, a millisecond of the bone, and what goes out. The hand's work is reckoned from the force that the
+// device showed and the way of the place that the tool stands at.
+void OverseenHand::move_bone() {
+  if (!yielding_) return;
+  Yielding& bone = *yielding_;
+  for (; !bone.up.empty() && bone.up.front().due <= ticks_; bone.up.pop_front())
+    (void)bone.server.receive(bone.up.front().author, bone.up.front().push);
+  if (ticks_ % kServerTicks == 0) {
+    bone.server.step(1e-3 * kServerTicks);
+    bone.down.push_back({ticks_ + run_.delay_ms, {bone.server.seen(1), bone.server.seen(2)}});
+  }
+  for (; !bone.down.empty() && bone.down.front().due <= ticks_; bone.down.pop_front()) {
+    bone.mine.see(1, bone.down.front().to[0]);
+    bone.other.see(bone.down.front().to[1]);
+  }
+
+  const Pose before = bone.mine.pose_rest_bone();
+  {
+    const AllocationCounter heap;
+    bone.mine.step(*loop_, last_);
+    crossed_.allocations += heap.count();
+  }
+  const Vec3& tip_mm = last_.pose_bone_proxy.position_mm;
+  const Vec3 carried_mm = bone.mine.pose_rest_bone().point(tip_mm) - before.point(tip_mm);
+  bone.by_hand_mj = loop_->mapping().to_bone(coupling_n_).dot(carried_mm) / -loop_->params().force_scale;
+  if (touches(last_)) crossed_.carried_mm += carried_mm.norm();
+
+  const Shift from = bone.other.shift();
+  bone.other.step(other, 1e-3);
+  const Shift to = bone.other.shift();
+  bone.put_in_mj += bone.by_hand_mj + other.force_n.dot(to.place_mm - from.place_mm) +
+                    other.moment_nmm.dot(to.turn_rad - from.turn_rad);
+  crossed_.made_mj = std::max(crossed_.made_mj, -bone.put_in_mj);
+
+  if (const std::optional<BonePush> push = bone.mine.push()) bone.up.push_back({ticks_ + run_.delay_ms, 1, *push});
+  if (ticks_ % kServerTicks == 0) bone.up.push_back({ticks_ + run_.delay_ms, 2, bone.other.push()});
+}
+
+LoopReport OverseenHand::tick() {
+  hear();
+  move_bone();
   ++ticks_;
   const WorkspaceMapping& mapping = loop_->mapping();
   HandCommand device_command = command;
@@ -105,9 +172,9 @@ void OverseenHand::see(const LoopReport& report, const Vec3& handle_mm) {
   crossed_.step_over_slew = std::max(crossed_.step_over_slew, (coupling_n + guide_n + partner_n) / kSlew_n);
   crossed_.fall_n = std::max(crossed_.fall_n, force_n_.norm() - report.force_device_n.norm());
 
-  const double cut_mj = params.force_scale / loop_->mapping().scale() * report.cutting_work_mj;
-  episode_mj_ += coupling_n_.dot(moved_mm) + cut_mj;
-  const bool touching = report.phase == CuttingPhase::rubbing || report.phase == CuttingPhase::cutting;
+  const double to_bone_mj = report.cutting_work_mj + (yielding_ ? yielding_->by_hand_mj : 0.0);
+  episode_mj_ += coupling_n_.dot(moved_mm) + params.force_scale / loop_->mapping().scale() * to_bone_mj;
+  const bool touching = touches(report);
   crossed_.touching += touching;
   crossed_.cutting += report.phase == CuttingPhase::cutting;
   if (!touching && report.coupling_device_n.isZero()) {

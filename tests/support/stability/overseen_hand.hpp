@@ -1,5 +1,6 @@
 // A simulated hand at the haptic loop while an instructor decides about it: stopped, taken over, led, limited, its cuts taken
-// back, all as late as a line makes it; and what crosses its handle meanwhile.
+// back, all as late as a line makes it; and what crosses its handle meanwhile. The bone stands still, or on a mount on which
+// this hand and another user push it.
 #pragma once
 #include <cstdint>
 #include <deque>
@@ -7,7 +8,9 @@
 #include <memory>
 #include <vector>
 
+#include "common/mechanics/passivity.hpp"
 #include "haptic_client/control/haptic_loop.hpp"
+#include "haptic_client/control/mounted_bone.hpp"
 #include "haptic_client/control/patch_builder.hpp"
 #include "haptic_client/device/simulated_device.hpp"
 #include "tests/support/stability/delayed_room.hpp"
@@ -19,14 +22,23 @@ struct OverseenRun {
   int delay_ms = 0;           // of everything, each way
   bool weak = false;          // a device of 3.3 N with half of its stiffness, on a workspace of another size
   double slew_n_per_ms = 0.5; // of the loop
+  bool mount = false;         // the bone yields
+};
+
+// How often something took hold of the hand while its tool touched bone.
+struct InContact {
+  int stopped = 0, taken = 0, given_back = 0, led = 0, let_go = 0, limited = 0, undone = 0;
 };
 
 // Of what crossed the handle.
 struct Crossed {
-  double step_over_slew = 0;  // largest growth of coupling, pull and others' tools in a tick that the hand's motion does not explain
-  double worst_mj = 0;        // most that one contact has given the hand and the cut beyond what it got
+  double step_over_slew = 0;  // largest growth of coupling, pull and others' tools in a tick, the hand's motion apart
+  double worst_mj = 0;        // most that one contact has given the hand, the cut and a bone that yields beyond what it got
   double led_mj = 0;          // the same of the pull, beyond what its far end's motion has paid
   double fall_n = 0;          // largest fall of the whole force in a tick
+  double made_mj = 0;         // most that a bone on its mount ever gave the hand and the other user beyond what both put in
+  double carried_mm = 0;      // way of such a bone under the tool while that touched it
+  InContact in_contact;
   std::int64_t allocations = 0, cutting = 0, touching = 0;
 };
 
@@ -36,7 +48,7 @@ class OverseenHand {
 
   // The room decides; the hand hears of it after the delay, and so late its cuts come to be refused.
   void decide(const Supervision& supervision);
-  void undo(int count) { room_.undo(count); }
+  void undo(int count);
 
   // A millisecond. Command, place and force in the bone's frame, as everything here.
   haptic::LoopReport tick();
@@ -44,6 +56,7 @@ class OverseenHand {
   void run(int ticks, const std::function<void(const haptic::LoopReport&)>& each = {});
   HandCommand command;
   bool pedal = false;
+  Load other;                 // of the other user on a bone that yields; held until it is set anew
   haptic::GuideSeen guide;
   std::vector<haptic::PartnerTool> partners;
 
@@ -58,6 +71,29 @@ class OverseenHand {
  private:
   void see(const haptic::LoopReport& report, const Vec3& handle_mm);
   void follow();
+  void hear();
+  void move_bone();
+
+  // A bone that yields: the server's, as this hand is shown it and as the other user is, and the lines between.
+  struct Yielding {
+    explicit Yielding(const MountParams& params) : mine(params), other({.mount = params}), server({.mount = params}) {}
+    haptic::MountedBone mine;
+    ShownBone other;
+    SharedBone server;
+    struct Push {
+      std::int64_t due;
+      std::uint64_t author;
+      BonePush push;
+    };
+    struct Seen {
+      std::int64_t due;
+      BoneSeen to[2];
+    };
+    std::deque<Push> up;
+    std::deque<Seen> down;
+    double put_in_mj = 0;      // by both, reckoned here
+    double by_hand_mj = 0;     // of it in this tick by the hand
+  };
 
   OverseenRun run_;
   Case bone_;
@@ -75,7 +111,9 @@ class OverseenHand {
     std::uint64_t epoch;
   };
   std::deque<Decided> decided_;
-  Supervision now_;             // as the room has decided
+  std::deque<std::int64_t> undone_due_;
+  std::unique_ptr<Yielding> yielding_;  // null: the bone stands
+  Supervision now_, heard_;     // as the room has decided, and as the hand knows it
   std::uint64_t decisions_ = 0, epoch_ = 0;
   std::int64_t ticks_ = 0;
   Eigen::Quaterniond rotation_;

@@ -243,6 +243,61 @@ INSTANTIATE_TEST_SUITE_P(Tools, Overseen,
                                            Case("burr-round-5", 150, false), Case("drill-3.2", 0, true),
                                            Case("drill-3.2", 50, false), Case("drill-3.2", 150, true)));
 
+// The bone yields on its mount under this hand and another user, who pushes it as suddenly as a push can be told, while the hand
+// is stopped, led, loses its tool and gets it back, and what it cut comes back round it, all with the tool on the bone.
+class OnAMount : public ::testing::TestWithParam<std::tuple<const char*, int, bool>> {};
+
+TEST_P(OnAMount, IsOverruledAsGentlyAsOnBoneThatStands) {
+  const auto [tool, delay_ms, weak] = GetParam();
+  Pressed pressed({.tool = tool, .delay_ms = delay_ms, .weak = weak, .mount = true});
+  OverseenHand& hand = pressed.hand;
+  for (int round = 0; round < 4; ++round) {
+    pressed.work(2500);
+    hand.other = Load::at(Vec3(3.0 - 3.0 * round, 4, round % 2 == 0 ? -15.0 : 15.0), Vec3(10, 5, 0));
+    Supervision now;
+    now.stopped = round % 2 == 0;
+    if (!now.stopped) now.taken_by = AuthorId{9};
+    hand.decide(now);
+    pressed.work(delay_ms + 400);
+    hand.undo(10 + 30 * round);
+    pressed.work(delay_ms + 400);
+    hand.other = {};
+    now = {};
+    now.guide = AuthorId{3};
+    now.guide_share = 500;
+    hand.decide(now);
+    hand.guide.there = true;
+    for (int i = 0; i < delay_ms + 800; ++i) {
+      ++hand.guide.state_seq;
+      hand.guide.place_mm = hand.last().pose_bone_device.position_mm + Vec3(2, 1, 0);
+      pressed.work(1);
+    }
+    hand.decide({});
+    hand.other = Load::at(Vec3(0, 0, 12), Vec3(-8, 0, 0));
+    pressed.work(delay_ms + 400);
+    pressed.lift();
+  }
+  const Crossed& crossed = hand.crossed();
+  const osteon::test::InContact& held = crossed.in_contact;
+  std::printf("  %s, %d ms: step over slew %.3f, worst %.5f mJ, led %.5f mJ, made %.4f mJ, bone %.1f mm, cutting %lld; in contact: "
+              "stopped %d, taken %d, back %d, led %d, undone %d\n",
+              tool, delay_ms, crossed.step_over_slew, crossed.worst_mj, crossed.led_mj, crossed.made_mj, crossed.carried_mm,
+              static_cast<long long>(crossed.cutting), held.stopped, held.taken, held.given_back, held.led, held.undone);
+  EXPECT_LE(crossed.step_over_slew, 1.0 + 1e-6);
+  EXPECT_LE(crossed.worst_mj, kBudget_mj);
+  EXPECT_LE(crossed.led_mj, kBudget_mj);
+  EXPECT_LE(crossed.made_mj, 2.0 * ShownBoneParams{}.allowance_mj);
+  EXPECT_GT(crossed.carried_mm, 5.0);
+  EXPECT_GT(crossed.cutting, 1000);
+  for (const int count : {held.stopped, held.taken, held.given_back, held.led, held.undone}) EXPECT_GT(count, 0);
+  EXPECT_EQ(crossed.allocations, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Tools, OnAMount,
+                         ::testing::Values(Case("burr-round-5", 0, true), Case("burr-round-5", 50, false),
+                                           Case("burr-round-5", 150, true), Case("drill-3.2", 0, false),
+                                           Case("drill-3.2", 50, true), Case("drill-3.2", 150, false)));
+
 // What is found to be within the limit is so because the loop keeps to it: one that lets force grow ten times as fast is seen.
 TEST(OverseenHand, SeesAStepThatIsTooLarge) {
   double most = 0.0;
