@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <string>
 
 namespace osteon::wire {
@@ -16,19 +17,10 @@ constexpr std::uint32_t kMostLag_ms = 60'000;
 
 using Numbers = google::protobuf::RepeatedField<std::int32_t>;
 
-tl::unexpected<Error> bad(const std::string& field, const std::string& what) {
-  return failure(ErrorCode::invalid_input, field + " " + what);
-}
-
 void set(Numbers& out, const Vec3& v, double per_unit) {
   constexpr double kMost = std::numeric_limits<std::int32_t>::max();
   for (int i = 0; i < 3; ++i)
     out.Add(std::isnan(v[i]) ? 0 : static_cast<std::int32_t>(std::clamp(std::round(v[i] * per_unit), -kMost, kMost)));
-}
-
-Result<Vec3> get(const Numbers& in, double per_unit, const char* field) {
-  if (in.size() != 3) return bad(field, "needs 3 numbers, this has " + std::to_string(in.size()));
-  return Vec3(Vec3(in[0], in[1], in[2]) / per_unit);
 }
 
 std::int64_t energy_steps(double mj) {
@@ -36,10 +28,29 @@ std::int64_t energy_steps(double mj) {
   return static_cast<std::int64_t>(std::min(std::floor(mj * kPerMillijoule), static_cast<double>(kMostEnergy)));
 }
 
-Result<double> energy_mj(std::int64_t steps, const char* field) {
-  if (steps < 0 || steps > kMostEnergy) return bad(field, "is " + std::to_string(steps) + " and must be from 0 to 2^53");
-  return static_cast<double>(steps) / kPerMillijoule;
-}
+// Reads on after a number that is wrong; the first such is the error.
+class Reading {
+ public:
+  void expect(bool good, const char* field, const std::string& what) {
+    if (!good && !error_) error_ = Error{ErrorCode::invalid_input, std::string(field) + " " + what};
+  }
+  Vec3 vector(const Numbers& in, double per_unit, const char* field) {
+    expect(in.size() == 3, field, "needs 3 numbers, this has " + std::to_string(in.size()));
+    return in.size() == 3 ? Vec3(Vec3(in[0], in[1], in[2]) / per_unit) : Vec3(Vec3::Zero());
+  }
+  double energy_mj(std::int64_t steps, const char* field) {
+    expect(steps >= 0 && steps <= kMostEnergy, field, "is " + std::to_string(steps) + " and must be from 0 to 2^53");
+    return static_cast<double>(steps) / kPerMillijoule;
+  }
+  template <class T>
+  Result<T> of(const T& read) const {
+    if (error_) return tl::unexpected(*error_);
+    return read;
+  }
+
+ private:
+  std::optional<Error> error_;
+};
 
 }  // namespace
 
@@ -66,28 +77,23 @@ v1::BoneSeen to_wire(const BoneSeen& seen) {
 }
 
 Result<BonePush> from_wire(const v1::BonePush& push) {
-  if (push.push_seq() == 0) return bad("push.push_seq", "must be at least 1");
-  const Result<Vec3> force = get(push.force(), kPerNewton, "push.force");
-  if (!force) return tl::unexpected(force.error());
-  const Result<Vec3> moment = get(push.moment(), kPerNewtonMillimetre, "push.moment");
-  if (!moment) return tl::unexpected(moment.error());
-  const Result<double> energy = energy_mj(push.energy(), "push.energy");
-  if (!energy) return tl::unexpected(energy.error());
-  return BonePush{push.push_seq(), {*force, *moment}, *energy, push.seen_seq()};
+  Reading read;
+  read.expect(push.push_seq() > 0, "push.push_seq", "must be at least 1");
+  const Vec3 force_n = read.vector(push.force(), kPerNewton, "push.force");
+  const Vec3 moment_nmm = read.vector(push.moment(), kPerNewtonMillimetre, "push.moment");
+  const double energy_mj = read.energy_mj(push.energy(), "push.energy");
+  return read.of(BonePush{push.push_seq(), {force_n, moment_nmm}, energy_mj, push.seen_seq()});
 }
 
 Result<BoneSeen> from_wire(const v1::BoneSeen& seen) {
-  if (seen.seen_seq() == 0) return bad("bone.seen_seq", "must be at least 1");
-  const Result<Vec3> place = get(seen.place(), kPerMillimetre, "bone.place");
-  if (!place) return tl::unexpected(place.error());
-  const Result<Vec3> turn = get(seen.turn(), kPerRadian, "bone.turn");
-  if (!turn) return tl::unexpected(turn.error());
-  if (turn->norm() > std::numbers::pi) return bad("bone.turn", "is more than half a turn");
-  const Result<double> energy = energy_mj(seen.energy(), "bone.energy");
-  if (!energy) return tl::unexpected(energy.error());
-  if (seen.lag_ms() > kMostLag_ms)
-    return bad("bone.lag_ms", "is " + std::to_string(seen.lag_ms()) + " and must be at most 60000");
-  return BoneSeen{seen.seen_seq(), {*place, *turn}, *energy, seen.push_seq(), 1e-3 * seen.lag_ms()};
+  Reading read;
+  read.expect(seen.seen_seq() > 0, "bone.seen_seq", "must be at least 1");
+  const Vec3 place_mm = read.vector(seen.place(), kPerMillimetre, "bone.place");
+  const Vec3 turn_rad = read.vector(seen.turn(), kPerRadian, "bone.turn");
+  read.expect(turn_rad.norm() <= std::numbers::pi, "bone.turn", "is more than half a turn");
+  const double energy_mj = read.energy_mj(seen.energy(), "bone.energy");
+  read.expect(seen.lag_ms() <= kMostLag_ms, "bone.lag_ms", "is " + std::to_string(seen.lag_ms()) + " and must be at most 60000");
+  return read.of(BoneSeen{seen.seen_seq(), {place_mm, turn_rad}, energy_mj, seen.push_seq(), 1e-3 * seen.lag_ms()});
 }
 
 }  // namespace osteon::wire
