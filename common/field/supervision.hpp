@@ -38,6 +38,13 @@ struct Supervision {
   friend bool operator==(const Supervision&, const Supervision&) = default;
 };
 
+// Whose word it is, as far as that is known.
+struct Decider {
+  AuthorId author{};   // null: nobody knows
+  std::string name{};  // empty: nobody knows
+  friend bool operator==(const Decider&, const Decider&) = default;
+};
+
 inline constexpr int kWholeShare = 1000;
 inline constexpr int kMostForceLimit = 10'000;  // 100 N
 inline constexpr std::size_t kMostLimitedTools = 64, kMostSupervisionWords = 256;

@@ -29,6 +29,8 @@ Focus focus_of(const Look& look, double pitch_mm) {
 Focus focus_of_tool(const Vec3& tip_mm) { return {tip_mm, kToolFull_mm, kToolHalf_mm}; }
 
 bool nearly_equal(const Look& a, const Look& b) {
+  if (a.up.has_value() != b.up.has_value()) return false;
+  if (a.up && (*a.up - *b.up).norm() > kSmallStep) return false;  // radians, as long as it is little
   const double small_mm = kSmallStep * (a.target_mm - a.eye_mm).norm();
   return (a.eye_mm - b.eye_mm).norm() <= small_mm && (a.target_mm - b.target_mm).norm() <= small_mm &&
          std::abs(a.pixel_rad - b.pixel_rad) <= kSmallStep * a.pixel_rad &&

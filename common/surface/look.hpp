@@ -1,5 +1,7 @@
 // Where somebody looks, and in how much detail the surface has to be drawn for that.
 #pragma once
+#include <optional>
+
 #include "common/surface/surface_blocks.hpp"
 
 namespace osteon {
@@ -10,6 +12,7 @@ struct Look {
   Vec3 target_mm = Vec3::Zero();  // what is in the middle of the picture
   double pixel_rad = 0;           // how wide a pixel is
   double view_rad = 0;            // from the middle of the picture to its corner
+  std::optional<Vec3> up{};       // unit vector, which way is up in the picture; none: nobody knows
   friend bool operator==(const Look&, const Look&) = default;
 };
 

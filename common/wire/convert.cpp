@@ -17,6 +17,12 @@ bool all_finite(std::initializer_list<double> values) {
 }
 
 constexpr double kFurthestLook_mm = 1e5;
+// Of what is up in a picture: how far its length may be from 1, and the sine of the least angle to the line of sight.
+constexpr double kUnitWithin = 1e-3, kLeastAcross = 0.01;
+
+bool is_up(const Vec3& up, const Vec3& sight) {
+  return up.allFinite() && std::abs(up.norm() - 1.0) <= kUnitWithin && up.cross(sight).norm() > kLeastAcross * sight.norm();
+}
 
 }  // namespace
 
@@ -256,6 +262,7 @@ v1::Look to_wire(const Look& look) {
   *out.mutable_target_mm() = to_wire(look.target_mm);
   out.set_pixel_rad(look.pixel_rad);
   out.set_view_rad(look.view_rad);
+  if (look.up) *out.mutable_up() = to_wire(*look.up);
   return out;
 }
 
@@ -265,12 +272,16 @@ Result<BlockKey> key_from_wire(const v1::MeshBlock& block) {
 }
 
 Result<Look> from_wire(const v1::Look& look) {
-  const Look out{from_wire(look.eye_mm()), from_wire(look.target_mm()), look.pixel_rad(), look.view_rad()};
+  Look out{from_wire(look.eye_mm()), from_wire(look.target_mm()), look.pixel_rad(), look.view_rad()};
   const auto placed = [](const Vec3& at) { return at.allFinite() && at.norm() <= kFurthestLook_mm; };
   if (!placed(out.eye_mm)) return bad("look.eye_mm", "is no place near the bone");
   if (!placed(out.target_mm)) return bad("look.target_mm", "is no place near the bone");
   if (!(out.pixel_rad > 0.0 && out.pixel_rad < 1.0)) return bad("look.pixel_rad", "must be between 0 and 1");
   if (!(out.view_rad > 0.0 && out.view_rad < 1.5)) return bad("look.view_rad", "must be between 0 and 1.5");
+  if (!look.has_up()) return out;
+  const Vec3 up = from_wire(look.up());
+  if (!is_up(up, out.target_mm - out.eye_mm)) return bad("look.up", "is no unit vector across the line of sight");
+  out.up = up.normalized();
   return out;
 }
 

@@ -228,6 +228,8 @@ SendItem piece_of(const SessionRow& row, std::uint64_t index) {
     out.set_room_seq(row.room_seq.value);
     *out.mutable_supervision() = to_wire(row.supervision);
     out.set_lease_epoch(row.lease_epoch);
+    out.set_decided_by(row.by.author.value);
+    out.set_decided_by_name(row.by.name);
   } else {
     v1::StreamedRow& out = *packet.add_streamed();
     out.set_index(index);
@@ -358,7 +360,8 @@ Result<std::vector<IndexedRow>> rows_of(const v1::DownPacket& packet, const Tool
     Result<Supervision> supervision = from_wire(row.supervision());
     if (!supervision) return tl::unexpected(supervision.error());
     rows.push_back({row.index(), {.room_seq = {row.room_seq()}, .kind = SessionRowKind::supervised,
-                                  .lease_epoch = row.lease_epoch(), .supervision = std::move(*supervision)}});
+                                  .lease_epoch = row.lease_epoch(), .supervision = std::move(*supervision),
+                                  .by = {AuthorId{row.decided_by()}, row.decided_by_name()}}});
   }
   for (const v1::StreamedRow& row : packet.streamed()) rows.push_back({row.index(), {.room_seq = {row.room_seq()}}});
   std::ranges::sort(rows, {}, &IndexedRow::index);

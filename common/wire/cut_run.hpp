@@ -75,13 +75,15 @@ struct SessionRow {
   std::uint32_t reason = 0;                        // rejected: as the room numbers its reasons
   std::uint64_t lease_epoch = 0;                   // rejected, supervised: of the session, from now on
   Supervision supervision{};                       // supervised: of the session's own hand, from now on
+  Decider by{};                                    // supervised: whose decision
   friend bool operator==(const SessionRow&, const SessionRow&) = default;
 };
 
-// The same of a row of any kind; a supervision of many tools goes over the stream too.
-inline constexpr std::size_t kMostToolsInPacket = 8;
+// The same of a row of any kind; a supervision of many tools, or of somebody with a long name, goes over the stream too.
+inline constexpr std::size_t kMostToolsInPacket = 8, kMostNameInPacket = 64;
 [[nodiscard]] inline bool fits_a_packet(const SessionRow& row) {
-  return row.kind != SessionRowKind::streamed && fits_a_packet(row.cut) && row.supervision.tools.size() <= kMostToolsInPacket;
+  return row.kind != SessionRowKind::streamed && fits_a_packet(row.cut) &&
+         row.supervision.tools.size() <= kMostToolsInPacket && row.by.name.size() <= kMostNameInPacket;
 }
 
 // Codes the rows of one session, as items whose numbers are their index.

@@ -18,7 +18,7 @@ class Channel;
 
 namespace osteon::wire {
 
-enum class ClientKind { haptic = 1, viewer = 2, audio = 3 };
+enum class ClientKind { haptic = 1, viewer = 2, audio = 3, console = 4 };
 
 struct JoinedRoom {
   std::shared_ptr<grpc::Channel> channel;  // shared with every stub made from it; every call over it is to this room

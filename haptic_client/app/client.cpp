@@ -107,19 +107,6 @@ GuideSeen guide_among(const Partners& partners, AuthorId guide) {
   return {};
 }
 
-// What holds, in words; empty: nothing.
-std::string words_of(const Supervision& now) {
-  std::string words;
-  const auto add = [&](const std::string& one) { words += (words.empty() ? "" : ", ") + one; };
-  if (now.stopped) add("stopped");
-  if (now.taken_by) add("tool taken by " + std::to_string(now.taken_by.value));
-  if (now.guide) add("led by " + std::to_string(now.guide.value) + " with a share of " + std::to_string(now.guide_share));
-  if (now.force_limit > 0) add("no more than " + std::to_string(now.force_limit) + " hundredths of a newton");
-  if (now.zone) add("within a ball only");
-  if (!now.tools.empty()) add("with " + std::to_string(now.tools.size()) + " tools only");
-  return words;
-}
-
 // Where the bone stands on its mount; lines to the room are counted from 1.
 struct ToldPlace {
   std::uint64_t line = 0;
@@ -493,13 +480,15 @@ class Client {
   void take(const HandSupervised& decided) {
     replica_.note(decided.place);
     follow_lease(decided.lease_epoch);
-    const std::string words = words_of(decided.supervision);
+    const std::string words = in_words(decided.supervision);
     // Where a line begins and nothing holds, nothing is said.
     if (words.empty() && !supervised_) return;
     supervised_ = !words.empty();
-    const std::string what = words.empty() ? "free" : words;
-    log::info("an instructor decides", {{"room_seq", decided.place.value}, {"what", what}, {"words", decided.supervision.words}});
-    outcome_.oversight.push_back({ns(Clock::now()), decided.place.value, what});
+    const std::string what = words.empty() ? "free" : words, by = called(decided.by);
+    log::info("an instructor decides",
+              {{"room_seq", decided.place.value}, {"what", what}, {"by", by}, {"words", decided.supervision.words}});
+    outcome_.oversight.push_back({ns(Clock::now()), decided.place.value, what, by});
+    overseer_ = words.empty() ? "" : by;
     if (!decided.supervision.words.empty())
       outcome_.words.push_back({ns(Clock::now()), decided.place.value, 0, decided.supervision.words});
   }
@@ -699,7 +688,7 @@ class Client {
                 row.depth_mm, r.force_physical_n.norm(), r.feed_mm_per_s, r.spindle_rpm, name(r.phase));
     if (r.out_of_range != 0) std::printf(", outside the range of its law: %s", out_of_range_words(r.out_of_range).c_str());
     const RoomHealth health = room_health_;
-    if (r.events & kForbidden) std::printf(", stopped by an instructor");
+    if (r.events & kForbidden) std::printf(", stopped by %s", overseer_.empty() ? "an instructor" : overseer_.c_str());
     if (r.events & kHandGuided) std::printf(", led, %.1f mm off", r.guide_distance_mm);
     if (health != RoomHealth::follows) std::printf(", held: %s, %zu cuts unconfirmed", name(health), unconfirmed_.load());
     if (live_.refresh()) {
@@ -771,6 +760,7 @@ class Client {
   std::vector<OversightNote> loop_notes_;
   // Replica thread.
   bool supervised_ = false;        // something was decided about this hand
+  std::string overseer_;           // by whom, as far as the room says it
   std::uint64_t lease_epoch_;      // of the room, as far as it was heard
   std::deque<Cut> unsent_;         // as bounded as what is unconfirmed
   Pose built_at_;

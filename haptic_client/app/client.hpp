@@ -28,6 +28,7 @@ struct OversightNote {
   std::int64_t mono_ns = 0;
   std::uint64_t room_seq = 0;  // of the decision; 0: the loop's own
   std::string what;
+  std::string by{};            // who decided, as far as the room says it
 };
 struct WordsNote {
   std::int64_t mono_ns = 0;

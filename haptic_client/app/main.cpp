@@ -95,6 +95,7 @@ json oversight_of(const ClientOutcome& outcome) {
   json notes = json::array(), words = json::array();
   for (const OversightNote& note : outcome.oversight) {
     notes.push_back({{"at_s", seconds(note.mono_ns)}, {"what", note.what}});
+    if (!note.by.empty()) notes.back()["by"] = note.by;
     if (note.room_seq != 0) notes.back()["room_seq"] = note.room_seq;
   }
   for (const WordsNote& note : outcome.words)

@@ -21,6 +21,25 @@ Oversight oversight_of(const Supervision& supervision, RoomSeq place, std::uint6
   return out;
 }
 
+std::string in_words(const Supervision& now) {
+  std::string words;
+  const auto add = [&](const std::string& one) { words += (words.empty() ? "" : ", ") + one; };
+  if (now.stopped) add("stopped");
+  if (now.taken_by) add("tool taken by " + std::to_string(now.taken_by.value));
+  if (now.guide) add("led by " + std::to_string(now.guide.value) + " with a share of " + std::to_string(now.guide_share));
+  if (now.force_limit > 0) add("no more than " + std::to_string(now.force_limit) + " hundredths of a newton");
+  if (now.zone) add("within a ball only");
+  if (!now.tools.empty()) add("with " + std::to_string(now.tools.size()) + " tools only");
+  return words;
+}
+
+std::string called(const Decider& by) {
+  std::string name = by.name;
+  std::ranges::replace_if(name, [](unsigned char byte) { return byte < 0x20 || byte == 0x7f; }, '?');
+  if (!name.empty()) return name;
+  return by.author ? "#" + std::to_string(by.author.value) : std::string();
+}
+
 bool Overseer::may_cut(int tool, const Vec3& tip_mm) const noexcept {
   if (stopped()) return false;
   const auto index = static_cast<std::size_t>(tool);

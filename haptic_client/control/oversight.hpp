@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 
 #include "common/field/supervision.hpp"
 #include "common/geometry/pose.hpp"
@@ -32,6 +33,11 @@ struct Oversight {
 // `tools`: the loop's.
 [[nodiscard]] Oversight oversight_of(const Supervision& supervision, RoomSeq place, std::uint64_t lease_epoch,
                                      std::span<const ToolModel> tools);
+
+// What holds, for a line of a log; empty: nothing does.
+[[nodiscard]] std::string in_words(const Supervision& supervision);
+// "Dr. Weber", fit for a terminal; "#3" for somebody without a name; empty: nobody knows.
+[[nodiscard]] std::string called(const Decider& by);
 
 // What the newest datagram says of the hand. It may come before the row that it stands for, which may be lost or wait for
 // others; epochs say which of the two is newer.

@@ -38,6 +38,7 @@ struct HandSupervised {
   RoomSeq place;                  // 0: it held when the stream began
   Supervision supervision;
   std::uint64_t lease_epoch = 0;  // of the caller's lease from now on; cuts of an earlier one will be rejected
+  Decider by{};                   // as far as the room says it
 };
 
 // Words of somebody in the room.

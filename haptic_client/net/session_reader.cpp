@@ -66,10 +66,10 @@ void SessionReader::take(const CuttingState& partner) {
   if (events_.partner) events_.partner(partner);
 }
 
-void SessionReader::supervised(RoomSeq place, const Supervision& supervision, std::uint64_t lease_epoch) {
-  place_ = std::max(place_, place);
+void SessionReader::supervised(const HandSupervised& decided) {
+  place_ = std::max(place_, decided.place);
   supervised_ = true;
-  if (events_.supervised) events_.supervised({place, supervision, lease_epoch});
+  if (events_.supervised) events_.supervised(decided);
 }
 
 void SessionReader::committed(RoomSeq place, const Cut& cut) {
@@ -88,7 +88,7 @@ Result<void> SessionReader::deliver(const wire::SessionRow& row) {
   if (row.kind == wire::SessionRowKind::committed)
     committed(row.room_seq, row.cut);
   else if (row.kind == wire::SessionRowKind::supervised)
-    supervised(row.room_seq, row.supervision, row.lease_epoch);
+    supervised({row.room_seq, row.supervision, row.lease_epoch, row.by});
   else
     rejected(row.room_seq, row.author_seq, row.lease_epoch, std::string(sentence(static_cast<Rejection>(row.reason))));
   return {};
@@ -109,7 +109,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
         events_.complete({RoomSeq{row.room_seq()}, bodies_of(row.bodies()), row.lease_epoch(), row.decided_author_seq()});
       place_ = std::max(place_, RoomSeq{row.room_seq()});
       // Nothing was said of this hand: what held over an earlier stream is over.
-      if (!supervised_) supervised(RoomSeq{}, {}, row.lease_epoch());
+      if (!supervised_) supervised({RoomSeq{}, {}, row.lease_epoch(), {}});
       return {};
     }
     case v1::SessionResponse::kTool: {
@@ -172,7 +172,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       const v1::Supervised& row = response.supervised();
       const Result<Supervision> supervision = wire::from_wire(row.supervision());
       if (!supervision) return tl::unexpected(supervision.error());
-      supervised(RoomSeq{row.room_seq()}, *supervision, row.lease_epoch());
+      supervised({RoomSeq{row.room_seq()}, *supervision, row.lease_epoch(), {AuthorId{row.decided_by()}, row.decided_by_name()}});
       return {};
     }
     case v1::SessionResponse::kSaid: {

@@ -47,7 +47,7 @@ class SessionReader {
   [[nodiscard]] Result<void> deliver(const wire::SessionRow& row);
   [[nodiscard]] bool cuts(const Cut& cut) const;  // with a tool that was sent
   void committed(RoomSeq place, const Cut& cut);
-  void supervised(RoomSeq place, const Supervision& supervision, std::uint64_t lease_epoch);
+  void supervised(const HandSupervised& decided);
   void rejected(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason);
 
   const AuthorId own_;

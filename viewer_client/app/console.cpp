@@ -230,6 +230,7 @@ std::string Console::text_of(const PersonSeen& person) const {
   for (std::size_t i = 0; i < word.tools.size(); ++i) out += (i == 0 ? " tools " : ",") + tool_name(word.tools[i]);
   if (!word.words.empty()) out += " words " + quoted(word.words);
   if (person.decided) out += person.pending() ? " pending" : " heard";
+  if (person.decided && person.decided_by) out += " decided by #" + std::to_string(person.decided_by.value);
   if (person.hand) out += " cuts " + std::to_string(person.cuts);
   return out;
 }
@@ -540,7 +541,8 @@ Console::Answer Console::view(const Words& words) {
   for (const PersonSeen& one : room_.people())
     if (!look && !words[1].starts_with('#') && one.name == words[1] && one.look) look = one.look;
   if (!look) return failure(ErrorCode::not_found, "nobody knows where " + words[1] + " looks");
-  return "eye " + osteon::text_of(look->eye_mm) + " target " + osteon::text_of(look->target_mm);
+  const std::string up = look->up ? " up " + osteon::text_of(*look->up) : "";
+  return "eye " + osteon::text_of(look->eye_mm) + " target " + osteon::text_of(look->target_mm) + up;
 }
 
 Console::Answer Console::demonstrate(const Words& words) {

@@ -40,6 +40,13 @@ Error error_of(const grpc::Status& status) {
   }
 }
 
+// A server from before consoles were a kind of their own refuses them by their kind.
+Error console_refused(const Error& why, const PeopleClientOptions& options) {
+  if (options.window || why.code != ErrorCode::invalid_input || !why.message.starts_with("kind ")) return why;
+  return {ErrorCode::unsupported, "the server at " + options.address + " is older than this console and does not let it in (" +
+                                      why.message + "); install a newer Osteon where the server runs"};
+}
+
 Result<PersonSeen> person_of(const v1::Person& sent) {
   PersonSeen person;
   person.author = AuthorId{sent.author()};
@@ -53,6 +60,7 @@ Result<PersonSeen> person_of(const v1::Person& sent) {
     person.supervision = std::move(*supervision);
   }
   person.decided = RoomSeq{sent.decided_room_seq()};
+  person.decided_by = AuthorId{sent.decided_by()};
   person.heard = RoomSeq{sent.heard_room_seq()};
   if (sent.has_look()) {
     const Result<Look> look = wire::from_wire(sent.look());
@@ -193,7 +201,7 @@ void PeopleClient::Impl::read() {
     log::warn("people stream ended", {{"server", options.address}, {"reason", ended.error_message()}});
     while (!stopping()) {
       std::this_thread::sleep_for(kRetryPause);
-      Result<wire::JoinedRoom> again = wire::join_again(room(), wire::ClientKind::viewer, {});
+      Result<wire::JoinedRoom> again = wire::join_again(room(), wire::ClientKind::console, {});
       if (again) {
         const std::lock_guard lock(mutex);
         joined = std::move(*again);
@@ -213,9 +221,9 @@ Result<std::unique_ptr<PeopleClient>> PeopleClient::start(const PeopleClientOpti
   impl->stop = std::move(stop);
   Result<wire::JoinedRoom> joined = options.window
                                         ? options.window()
-                                        : wire::join_room(options.address, wire::ClientKind::viewer, options.name,
+                                        : wire::join_room(options.address, wire::ClientKind::console, options.name,
                                                           options.patience, impl->stop, options.room, options.door);
-  if (!joined) return tl::unexpected(joined.error());
+  if (!joined) return tl::unexpected(console_refused(joined.error(), options));
   impl->joined = std::move(*joined);
   std::unique_ptr<PeopleClient> client(new PeopleClient(std::move(impl)));
   client->impl_->reader = std::thread([inside = client->impl_.get()] { inside->read(); });

@@ -19,8 +19,8 @@ struct PeopleClientOptions {
   wire::Door door{};
   std::string name = "console";  // shown to others
   std::chrono::milliseconds patience{5000};
-  // The newest join of a window that is in the room already: people are heard of under its identity, because a second
-  // one of the same person would push the window out. None: joins by itself.
+  // The newest join of a window that is in the room already: people are heard of under its identity. None: joins by itself,
+  // as a console.
   std::function<wire::JoinedRoom()> window{};
 };
 

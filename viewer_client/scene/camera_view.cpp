@@ -6,6 +6,8 @@ namespace osteon {
 
 namespace {
 
+constexpr double kLeastSight_mm = 1e-6;  // nearer than this one looks nowhere
+
 // The direction's part across `axis` as a unit vector; `otherwise` where the direction runs along the axis.
 Vec3 across(const Vec3& direction, const Vec3& axis, const Vec3& otherwise) {
   const Vec3 part = direction - direction.dot(axis) * axis;
@@ -17,16 +19,21 @@ Vec3 across(const Vec3& direction, const Vec3& axis, const Vec3& otherwise) {
 Look look_of(const CameraView& view, int width_px, int height_px) {
   const double half_height = std::tan(0.5 * view.view_angle_rad);
   const double shape = static_cast<double>(width_px) / height_px;
-  return {view.eye_mm, view.target_mm, 2.0 * half_height / height_px, std::atan(half_height * std::hypot(1.0, shape))};
+  Look look{view.eye_mm, view.target_mm, 2.0 * half_height / height_px, std::atan(half_height * std::hypot(1.0, shape))};
+  const Vec3 sight = view.target_mm - view.eye_mm;
+  const Vec3 up = sight.norm() > kLeastSight_mm ? across(view.up, sight.normalized(), Vec3::Zero()) : Vec3(Vec3::Zero());
+  if (up != Vec3::Zero()) look.up = up;
+  return look;
 }
 
 CameraView looking_as(const Look& look, const CameraView& now) {
   const Vec3 sight = look.target_mm - look.eye_mm;
-  if (!(sight.norm() > 1e-6)) return now;
+  if (!(sight.norm() > kLeastSight_mm)) return now;
   CameraView view = now;
   view.eye_mm = look.eye_mm;
   view.target_mm = look.target_mm;
   view.up = across(Vec3::UnitZ(), sight.normalized(), across(-Vec3::UnitY(), sight.normalized(), Vec3::UnitX()));
+  if (look.up) view.up = across(*look.up, sight.normalized(), view.up);
   return view;
 }
 

@@ -16,8 +16,8 @@ struct CameraView {
 // What a window of this size shows of it.
 [[nodiscard]] Look look_of(const CameraView& view, int width_px, int height_px);
 
-// As somebody else looks. A Look has neither an upright nor a picture's height: the head is up, or the face where one
-// looks along the body, and the angle stays that of `now`, this window's own view.
+// As somebody else looks. Where they do not say which way is up, the head is, or the face where one looks along the body. A
+// Look has no picture's height: the angle stays that of `now`, this window's own view.
 [[nodiscard]] CameraView looking_as(const Look& look, const CameraView& now);
 
 // The whole bone from the front, its left and a little above (DICOM LPS: +x left, -y front, +z up).

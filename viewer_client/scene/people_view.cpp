@@ -108,11 +108,12 @@ bool PeopleView::is_hand(const PersonSeen& person) const {
   return ours && ours->author == person.author;
 }
 
-// Nobody says who decided what: where one alone is an instructor, they did.
-std::string PeopleView::overseer() const {
+// Where the room does not say who decided what, and one alone is an instructor, they did.
+std::string PeopleView::overseer(const PersonSeen& person) const {
+  if (person.decided_by) return name_of(person.decided_by);
   std::set<std::string> names;
-  for (const auto& [author, person] : people_)
-    if (person.role == Role::instructor) names.insert(name_of(author));
+  for (const auto& [author, one] : people_)
+    if (one.role == Role::instructor) names.insert(name_of(author));
   return names.size() == 1 ? *names.begin() : "An instructor";
 }
 
@@ -121,7 +122,7 @@ void PeopleView::notice_decision(const PersonSeen& person, const Supervision& wa
   if (is == was) return;
   const bool ours = is_hand(person);
   const std::string whom = ours ? "you" : name_of(person.author), whose = ours ? "your" : name_of(person.author) + "'s";
-  const std::string hand = whose + " hand", tool = whose + " tool", by = overseer();
+  const std::string hand = whose + " hand", tool = whose + " tool", by = overseer(person);
   std::vector<std::string> said;
   if (is.stopped != was.stopped) said.push_back(by + (is.stopped ? " has stopped " + hand : " has set " + hand + " free"));
   if (is.taken_by != was.taken_by)
@@ -201,6 +202,7 @@ std::string PeopleView::holding() const {
   }
   if (!holds.tools.empty()) line("Cut only with " + tool_names(holds.tools));
   if (!holds.words.empty()) line(holds.words);
+  if (!text.empty() && ours->decided_by) line("Decided by " + name_of(ours->decided_by));
   return text;
 }
 

@@ -55,7 +55,7 @@ class PeopleView {
     std::string text;
   };
   [[nodiscard]] bool is_hand(const PersonSeen& person) const;
-  [[nodiscard]] std::string overseer() const;
+  [[nodiscard]] std::string overseer(const PersonSeen& person) const;  // who decided last about them
   void notice_decision(const PersonSeen& person, const Supervision& before, Clock::time_point now);
 
   std::string hand_;

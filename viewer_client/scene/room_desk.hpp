@@ -25,6 +25,7 @@ struct PersonSeen {
   bool here = false, hand = false;
   Supervision supervision;         // what holds for the hand
   RoomSeq decided, heard;          // the place of what was decided last, null for nothing; the newest that their client has
+  AuthorId decided_by;             // who decided it; null: nobody knows
   std::optional<Look> look;        // from where they look, where somebody knows
   std::uint32_t cuts = 0;          // that were taken
   [[nodiscard]] bool pending() const { return decided && heard < decided; }

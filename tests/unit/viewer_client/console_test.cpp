@@ -251,7 +251,11 @@ TEST_F(ConsoleTest, SaysWhereSomebodyLooksAndWhetherTheyHaveHeard) {
   EXPECT_EQ(say("view Ben").find("error nobody knows"), 0u);
   desk.people_[2].look = Look{.eye_mm = {1, 2, 3}, .target_mm = {4, 5, -6}};
   EXPECT_EQ(say("view Ben"), "ok eye 1.000 2.000 3.000 target 4.000 5.000 -6.000") << "by the viewer of the same name";
+  desk.people_[2].look->up = Vec3(0, 1, 0);
+  EXPECT_EQ(say("view Ben"), "ok eye 1.000 2.000 3.000 target 4.000 5.000 -6.000 up 0.000 1.000 0.000");
   desk.people_[1].decided = RoomSeq{9};
+  desk.people_[1].decided_by = AuthorId{1};
+  EXPECT_NE(say("people").find(" pending decided by #1"), std::string::npos) << say("people");
   EXPECT_EQ(say("wait heard Ben 2"), "error #2 \"Ben\" has not heard of event 9 yet");
   EXPECT_EQ(desk.patience_, 2s);
   desk.people_[1].heard = RoomSeq{12};

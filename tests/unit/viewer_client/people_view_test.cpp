@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "common/tools/tool.hpp"
 #include "viewer_client/scene/camera_view.hpp"
 
@@ -102,6 +104,23 @@ TEST(PeopleView, WhoDecidedIsNamedOnlyWhereItIsCertain) {
   change.people[0].supervision.stopped = true;
   view.take(change, kSelf, kNow);
   EXPECT_THAT(view.notices(kNow), ElementsAre("An instructor has stopped your hand"));
+}
+
+TEST(PeopleView, TheRoomSaysWhoDecided) {
+  PeopleView view("Ada");
+  PeopleSeen change = all_three();
+  change.people.push_back(person(AuthorId{9}, "Dr. Cho", Role::instructor));
+  view.take(change, kSelf, kNow);
+  change.people[0].supervision.stopped = true;
+  change.people[0].decided_by = AuthorId{9};
+  view.take(change, kSelf, kNow);
+  EXPECT_THAT(view.notices(kNow), ElementsAre("Dr. Cho has stopped your hand"));
+  EXPECT_EQ(view.holding(), "Your hand is stopped\nDecided by Dr. Cho");
+  change.people[0].supervision = {};
+  change.people[0].decided_by = kBerg;
+  view.take(change, kSelf, kNow);
+  EXPECT_THAT(view.notices(kNow), ElementsAre(testing::_, "Dr. Berg has set your hand free"));
+  EXPECT_EQ(view.holding(), "") << "nothing holds that anybody has decided";
 }
 
 TEST(PeopleView, WhatAlreadyHoldsIsToldToWhoComesLater) {
@@ -231,6 +250,34 @@ TEST(CameraView, LooksAsSomebodyElse) {
   EXPECT_LT((looking_as(look, own).up - Vec3(0, -1, 0)).norm(), 1e-9);
   look.eye_mm = look.target_mm;
   EXPECT_EQ(looking_as(look, own).eye_mm, own.eye_mm);
+}
+
+// Who follows sees the picture as the other does, also where they have rolled it.
+TEST(CameraView, RollsAsSomebodyElseDoes) {
+  CameraView theirs;
+  theirs.eye_mm = Vec3(10, -200, 0);
+  theirs.target_mm = Vec3(10, 0, 0);
+  theirs.up = Vec3(2, 3, 2);  // as `look at … up` takes it
+  const Look look = look_of(theirs, 800, 600);
+  ASSERT_TRUE(look.up);
+  EXPECT_LT((*look.up - Vec3(1, 0, 1).normalized()).norm(), 1e-9) << "across the line of sight, of length 1";
+  EXPECT_LT((looking_as(look, CameraView()).up - *look.up).norm(), 1e-9);
+  theirs.up = Vec3(0, 1, 0);
+  EXPECT_FALSE(look_of(theirs, 800, 600).up) << "along the line of sight nothing is up";
+  theirs.eye_mm = theirs.target_mm;
+  EXPECT_FALSE(look_of(theirs, 800, 600).up);
+}
+
+// A turn of the picture is told as any other move of the camera is.
+TEST(CameraView, LooksThatRollAreNotNearEachOther) {
+  Look look{Vec3(0, -200, 0), Vec3::Zero(), 0.001, 0.4, Vec3(0, 0, 1)}, other = look;
+  EXPECT_TRUE(nearly_equal(look, other));
+  other.up = Vec3(std::sin(0.03), 0, std::cos(0.03));
+  EXPECT_TRUE(nearly_equal(look, other));
+  other.up = Vec3(std::sin(0.2), 0, std::cos(0.2));
+  EXPECT_FALSE(nearly_equal(look, other));
+  other.up.reset();
+  EXPECT_FALSE(nearly_equal(look, other));
 }
 
 }  // namespace

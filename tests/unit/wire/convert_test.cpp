@@ -293,6 +293,31 @@ TEST(Wire, ALookComesBackAndBadOnesAreRefusedByTheNameOfTheField) {
   refused([](v1::Look& l) { l.set_pixel_rad(0); }, "pixel_rad");
   refused([](v1::Look& l) { l.set_view_rad(std::numeric_limits<double>::infinity()); }, "view_rad");
   refused([](v1::Look& l) { l.Clear(); }, "pixel_rad");
+  EXPECT_FALSE(back->up) << "of those who do not say it nobody knows which way is up";
+
+  Look upright = look;
+  upright.up = Vec3(1, 0, 0);
+  const auto with_up = wire::from_wire(wire::to_wire(upright));
+  ASSERT_TRUE(with_up);
+  EXPECT_EQ(*with_up, upright);
+  const auto up_of = [](double x, double y, double z) {
+    return [=](v1::Look& l) {
+      l.mutable_up()->set_x(x);
+      l.mutable_up()->set_y(y);
+      l.mutable_up()->set_z(z);
+    };
+  };
+  refused(up_of(0, 0, 0), "look.up");
+  refused(up_of(0, 1.1, 0), "look.up");
+  refused(up_of(0, std::numeric_limits<double>::infinity(), 0), "look.up");
+  refused(up_of(std::numeric_limits<double>::quiet_NaN(), 1, 0), "look.up");
+  const Vec3 sight = (look.target_mm - look.eye_mm).normalized();
+  refused(up_of(sight.x(), sight.y(), sight.z()), "look.up");
+  refused(up_of(-sight.x(), -sight.y(), -sight.z()), "look.up");
+  refused([&](v1::Look& l) {
+    *l.mutable_target_mm() = l.eye_mm();
+    up_of(0, 1, 0)(l);
+  }, "look.up");
 }
 
 }  // namespace

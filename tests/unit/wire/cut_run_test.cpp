@@ -355,6 +355,7 @@ TEST(RowRun, TheLongestSupervisionFitsAPacket) {
                      .force_limit = kMostForceLimit, .zone = ZoneLimit{{kLow, kLow, kLow}, 1 << 30}, .tools = {},
                      .words = std::string(kMostSupervisionWords, 'w')};
   for (std::size_t n = 0; n < wire::kMostToolsInPacket; ++n) row.supervision.tools.push_back(digest(static_cast<std::uint8_t>(n)));
+  row.by = {AuthorId{~std::uint64_t{0}}, std::string(wire::kMostNameInPacket, 'n')};
   ASSERT_TRUE(check(row.supervision));
   ASSERT_TRUE(wire::fits_a_packet(row));
   SendWindow window(kWide);
@@ -362,6 +363,10 @@ TEST(RowRun, TheLongestSupervisionFitsAPacket) {
   wire::RowSender sender(window, none);
   ASSERT_TRUE(sender.push(row));
   EXPECT_LE(window.least_room(0s), kMostPlainBytes - 100);
+  row.by.name += 'n';
+  EXPECT_FALSE(wire::fits_a_packet(row)) << "no name is cut off";
+  row.by.name.clear();
+  EXPECT_TRUE(wire::fits_a_packet(row));
   row.supervision.tools.push_back(digest(99));
   EXPECT_FALSE(wire::fits_a_packet(row));
 }
@@ -406,6 +411,7 @@ TEST(RowRun, AnyRowsComeBackInTheSessionsOrder) {
         row.kind = wire::SessionRowKind::supervised;
         row.lease_epoch = any(random);
         row.supervision = any_supervision(random, wire::kMostToolsInPacket);
+        row.by = {AuthorId{random.index(4)}, std::string(random.index(wire::kMostNameInPacket + 1), 'n')};
       } else if (kind > 0.1) {
         Cut& cut = last[random.index(3)];
         cut = any_cut(random, cut, random.unit() < 0.1);

@@ -483,7 +483,8 @@ TEST(LinkEnds, ARowDecidesTheOwnCutInIt) {
 TEST(LinkEnds, AnInstructorsWordFreezesAndEndsTheLease) {
   Pair pair;
   pair.run(300ms);
-  wire::SessionRow word{.room_seq = {5}, .kind = wire::SessionRowKind::supervised, .lease_epoch = 6, .supervision = {.taken_by = {3}}};
+  wire::SessionRow word{.room_seq = {5}, .kind = wire::SessionRowKind::supervised, .lease_epoch = 6, .supervision = {.taken_by = {3}},
+                        .by = {AuthorId{3}, "Dr. Weber"}};
   EXPECT_TRUE(pair.server.tell(1, word));
   pair.run(100ms);
   EXPECT_TRUE(pair.client.frozen());
@@ -498,6 +499,7 @@ TEST(LinkEnds, AnInstructorsWordFreezesAndEndsTheLease) {
   const auto first = pair.client.take_row();
   ASSERT_TRUE(first);
   EXPECT_EQ(first->row.supervision, (Supervision{.taken_by = {3}}));
+  EXPECT_EQ(first->row.by, (Decider{AuthorId{3}, "Dr. Weber"}));
   EXPECT_FALSE(pair.client.take_row());
   EXPECT_TRUE(pair.client.offer({2, word}));
   const auto second = pair.client.take_row();

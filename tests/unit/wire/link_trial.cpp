@@ -222,6 +222,7 @@ void Trial::tick() {
 wire::SessionRow Trial::supervised(RoomSeq seq) {
   wire::SessionRow row{.room_seq = seq, .kind = wire::SessionRowKind::supervised, .lease_epoch = seq.value + 1};
   row.supervision = {.stopped = seq.value % 2 == 0, .force_limit = static_cast<int>(seq.value % 1000), .words = "as agreed"};
+  row.by = {AuthorId{1 + seq.value % 5}, seq.value % 5 == 0 ? "" : "Dr. Weber"};
   for (std::uint64_t tool = 1; tool <= seq.value % 9 * 2; ++tool) row.supervision.tools.push_back(tool_of(tool));
   return row;
 }
