@@ -2,23 +2,29 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <sched.h>
 #include <spawn.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <thread>
+#include <utility>
 
+#include "common/runtime/log.hpp"
 #include "common/volume/case.hpp"
+#include "server/intake/confine.hpp"
 
 extern char** environ;
 
@@ -108,9 +114,97 @@ void limit_self(__rlimit_resource resource, std::uint64_t most) {
   ::setrlimit(resource, &limit);
 }
 
+// What the process may unpack, in one of its arguments.
+std::string text_of(const IntakeQuota& quota) {
+  return nlohmann::json{{"archive_bytes", quota.archive_bytes}, {"unpacked_bytes", quota.unpacked_bytes}, {"entries", quota.entries},
+                        {"ratio", quota.ratio}, {"ratio_free_bytes", quota.ratio_free_bytes}}.dump();
+}
+IntakeQuota quota_of(const std::string& text) {
+  const nlohmann::json said = nlohmann::json::parse(text);
+  IntakeQuota quota;
+  said.at("archive_bytes").get_to(quota.archive_bytes);
+  said.at("unpacked_bytes").get_to(quota.unpacked_bytes);
+  said.at("entries").get_to(quota.entries);
+  said.at("ratio").get_to(quota.ratio);
+  said.at("ratio_free_bytes").get_to(quota.ratio_free_bytes);
+  return quota;
+}
+
+// How the process says which kind of error it is.
+const char* word_of(ErrorCode code) {
+  if (code == ErrorCode::exhausted) return "exhausted";
+  return code == ErrorCode::internal ? "internal" : "invalid";
+}
+ErrorCode code_of(const nlohmann::json& answer) {
+  const std::string word = answer.contains("code") && answer["code"].is_string() ? answer["code"].get<std::string>() : "";
+  if (word == "exhausted") return ErrorCode::exhausted;
+  return word == "internal" ? ErrorCode::internal : ErrorCode::invalid_input;
+}
+
+// A kernel without what confines the process is said once, not with every case.
+void say_what_holds(const nlohmann::json& answer) {
+  const auto holds = [&](const char* what) { return answer.contains(what) && answer[what] == true; };
+  if (holds("files_held") && holds("calls_held")) return;
+  static std::atomic<bool> said{false};
+  if (!said.exchange(true))
+    log::warn("cases are looked through with less held back than could be", {{"files_held", holds("files_held")}, {"calls_held", holds("calls_held")}});
+}
+
+bool has_plain_files(const fs::path& folder) {
+  std::size_t files = 0;
+  std::error_code error;
+  if (fs::symlink_status(folder, error).type() != fs::file_type::directory) return false;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const bool known = std::ranges::find(kCaseFiles, entry.path().filename().string()) != std::end(kCaseFiles);
+    if (!known || entry.symlink_status(error).type() != fs::file_type::regular || error) return false;
+    ++files;
+  }
+  return !error && files == std::size(kCaseFiles);
+}
+
+// A file of the case as it is unpacked.
+class Files {
+ public:
+  explicit Files(fs::path folder) : folder_(std::move(folder)) {}
+  Result<void> put(std::string_view file, std::span<const std::byte> piece) {
+    if (file != name_) {
+      out_ = std::ofstream(folder_ / file, std::ios::binary | std::ios::trunc);
+      name_ = file;
+    }
+    out_.write(reinterpret_cast<const char*>(piece.data()), static_cast<std::streamsize>(piece.size()));
+    return out_ ? Result<void>{} : no_space(file);
+  }
+  Result<void> close() {
+    out_.close();
+    return out_ ? Result<void>{} : no_space(name_);
+  }
+
+ private:
+  static Result<void> no_space(std::string_view file) {
+    return failure(ErrorCode::internal, "the server cannot unpack " + std::string(file) + ": its disk takes no more");
+  }
+  const fs::path folder_;
+  std::string name_;
+  std::ofstream out_;
+};
+
+// [the process]
+Result<Case> unpack_and_read(const fs::path& archive, const fs::path& sent, const IntakeQuota& quota) {
+  std::error_code error;
+  fs::create_directory(sent, error);
+  if (error) return failure(ErrorCode::internal, "the server cannot unpack a case: " + error.message());
+  Files files(sent);
+  const auto put = [&](std::string_view file, std::span<const std::byte> piece) { return files.put(file, piece); };
+  if (const auto unpacked = unpack_case(archive, quota, put); !unpacked) return tl::unexpected(unpacked.error());
+  if (const Result<void> closed = files.close(); !closed) return tl::unexpected(closed.error());
+  Result<Case> read = Case::load(sent);
+  if (!read) return failure(ErrorCode::invalid_input, "the case is not sound: " + read.error().message);
+  return read;
+}
+
 }  // namespace
 
-Result<CheckedCase> check_case(const fs::path& program, const fs::path& from, const fs::path& to, const IntakeQuota& quota,
+Result<CheckedCase> check_case(const fs::path& program, const fs::path& archive, const fs::path& folder, const IntakeQuota& quota,
                                const std::function<bool()>& stop) {
   int ends[2];
   if (::pipe2(ends, O_CLOEXEC) != 0) return cannot_start(errno);
@@ -120,8 +214,8 @@ Result<CheckedCase> check_case(const fs::path& program, const fs::path& from, co
   ::posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   ::posix_spawn_file_actions_adddup2(&actions, out.number(), STDOUT_FILENO);
   ::posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
-  std::array<std::string, 4> words{program.string(), "check-case", from.string(), to.string()};
-  std::array<char*, 5> arguments{words[0].data(), words[1].data(), words[2].data(), words[3].data(), nullptr};
+  std::array<std::string, 5> words{program.string(), "check-case", archive.string(), folder.string(), text_of(quota)};
+  std::array<char*, 6> arguments{words[0].data(), words[1].data(), words[2].data(), words[3].data(), words[4].data(), nullptr};
   pid_t id = 0;
   const int failed = ::posix_spawn(&id, words[0].c_str(), &actions, nullptr, arguments.data(), environ);
   ::posix_spawn_file_actions_destroy(&actions);
@@ -141,35 +235,40 @@ Result<CheckedCase> check_case(const fs::path& program, const fs::path& from, co
   }
   const int status = child.join(Clock::now() + std::chrono::seconds(5));
   const nlohmann::json answer = nlohmann::json::parse(*said, nullptr, false);
+  if (answer.is_object()) say_what_holds(answer);
   if (answer.is_object() && answer.contains("error") && answer["error"].is_string())
-    return failure(ErrorCode::invalid_input, "the case is not sound: " + answer["error"].get<std::string>());
+    return failure(code_of(answer), answer["error"].get<std::string>());
   const bool whole = WIFEXITED(status) && WEXITSTATUS(status) == 0 && answer.is_object() && answer.contains("hash") &&
-                     answer["hash"].is_string() && answer.contains("title") && answer["title"].is_string();
+                     answer["hash"].is_string() && answer.contains("title") && answer["title"].is_string() &&
+                     answer.contains("memory_bytes") && answer["memory_bytes"].is_number_unsigned();
   if (!whole && WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGXFSZ))
     return failure(ErrorCode::exhausted, "the case takes more to read than it may");
   if (!whole) return failure(ErrorCode::invalid_input, "the case is damaged so that it cannot be read; import it again");
   const Result<Digest> hash = digest_from_hex(answer["hash"].get<std::string>());
   if (!hash) return tl::unexpected(hash.error());
-  return CheckedCase{*hash, answer["title"].get<std::string>()};
+  // One that was taken over by what it read may have left anything.
+  if (!has_plain_files(folder / kSoundCase)) return failure(ErrorCode::invalid_input, "the case is damaged so that it cannot be read; import it again");
+  return CheckedCase{*hash, answer["title"].get<std::string>(), answer["memory_bytes"].get<std::uint64_t>()};
 }
 
-int run_case_check(const fs::path& from, const fs::path& to) {
+int run_case_check(const fs::path& archive, const fs::path& folder, const std::string& quota_text) {
   limit_self(RLIMIT_CORE, 0);
   ::prctl(PR_SET_DUMPABLE, 0);
-  ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  ::close_range(3, ~0U, 0);          // whatever the server had open is none of its business
-  (void)::unshare(CLONE_NEWNET);     // no network, where the system lets it give that up
+  ::close_range(3, ~0U, 0);  // whatever the server had open is none of its business
+  const Confinement held = confine_to(folder);
   nlohmann::json answer;
   try {
-    const Result<Case> read = Case::load(from);
-    if (const Result<void> kept = read ? read->save(to) : tl::unexpected(read.error()); !kept)
-      answer["error"] = kept.error().message;
+    const Result<Case> read = unpack_and_read(archive, folder / "sent", quota_of(quota_text));
+    if (const Result<void> kept = read ? read->save(folder / kSoundCase) : tl::unexpected(read.error()); !kept)
+      answer = {{"error", kept.error().message}, {"code", word_of(kept.error().code)}};
     else
-      answer = {{"hash", to_hex(read->hash())}, {"title", read->info().title}};
+      answer = {{"hash", to_hex(read->hash())}, {"title", read->info().title}, {"memory_bytes", read->memory_bytes()}};
   } catch (const std::exception& broken) {
-    answer = {{"error", std::string("it cannot be read: ") + broken.what()}};
+    answer = {{"error", std::string("the case is not sound: it cannot be read: ") + broken.what()}};
   }
+  answer["files_held"] = held.files;
+  answer["calls_held"] = held.calls;
   const std::string line = answer.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace) + "\n";
   std::fputs(line.c_str(), stdout);
   return answer.contains("error") ? 1 : 0;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <system_error>
 #include <utility>
 
@@ -15,6 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kIncoming = "incoming-", kArchive = "upload.zip";
+constexpr std::string_view kNote = "memory.json";  // in a case's folder: what it takes once it is loaded
 
 tl::unexpected<Error> disk(const fs::path& where, const std::string& why) {
   return failure(ErrorCode::internal, "cannot write " + where.string() + ": " + why);
@@ -27,30 +29,6 @@ std::uint64_t bytes_in(const fs::path& folder) {
     if (std::error_code none; at->is_regular_file(none)) bytes += at->file_size(none);
   return bytes;
 }
-
-// A file of the case as it is unpacked.
-class Files {
- public:
-  explicit Files(fs::path folder) : folder_(std::move(folder)) {}
-  Result<void> put(std::string_view file, std::span<const std::byte> piece) {
-    if (file != name_) {
-      out_ = std::ofstream(folder_ / file, std::ios::binary | std::ios::trunc);
-      name_ = file;
-    }
-    out_.write(reinterpret_cast<const char*>(piece.data()), static_cast<std::streamsize>(piece.size()));
-    if (!out_) return disk(folder_ / file, "the disk takes no more");
-    return {};
-  }
-  Result<void> close() {
-    out_.close();
-    return out_ ? Result<void>{} : Result<void>(disk(folder_, "the disk takes no more"));
-  }
-
- private:
-  const fs::path folder_;
-  std::string name_;
-  std::ofstream out_;
-};
 
 }  // namespace
 
@@ -91,14 +69,18 @@ Result<std::unique_ptr<CaseStore>> CaseStore::open(fs::path folder, fs::path pro
   return std::unique_ptr<CaseStore>(new CaseStore(fs::absolute(folder), std::move(program), quota));
 }
 
-std::uint64_t CaseStore::kept_bytes() const { return bytes_in(folder_); }
+std::uint64_t CaseStore::case_bytes() const {
+  std::uint64_t bytes = 0;
+  for (const fs::path& one : folders()) bytes += bytes_in(one);
+  return bytes;
+}
 
 Result<std::unique_ptr<Upload>> CaseStore::begin() {
   if (++open_ > kMostUploads) {
     --open_;
     return failure(ErrorCode::exhausted, std::to_string(kMostUploads) + " uploads are under way; try again later");
   }
-  if (kept_bytes() > quota_.kept_bytes) {
+  if (case_bytes() >= quota_.kept_bytes) {
     --open_;
     return failure(ErrorCode::exhausted, "the server's folder of cases is full; ask the operator to delete some");
   }
@@ -115,25 +97,23 @@ Result<std::unique_ptr<Upload>> CaseStore::begin() {
 Result<StoredCase> CaseStore::keep(std::unique_ptr<Upload> upload, const std::function<bool()>& stop) {
   upload->file_->out.close();
   if (!upload->file_->out) return disk(upload->folder(), "the disk takes no more");
-  const fs::path sent = upload->folder() / "sent", sound = upload->folder() / "sound";
+  const fs::path sound = upload->folder() / kSoundCase;
   std::error_code error;
-  fs::create_directory(sent, error);
-  if (error) return disk(sent, error.message());
-  Files files(sent);
-  const auto unpacked = unpack_case(upload->folder() / kArchive, quota_, [&](std::string_view file, std::span<const std::byte> piece) {
-    return files.put(file, piece);
-  });
-  if (!unpacked) return tl::unexpected(unpacked.error());
-  if (Result<void> closed = files.close(); !closed) return tl::unexpected(closed.error());
-  const Result<CheckedCase> checked = check_case(program_, sent, sound, quota_, stop);
+  const Result<CheckedCase> checked = check_case(program_, upload->folder() / kArchive, upload->folder(), quota_, stop);
   if (!checked) return tl::unexpected(checked.error());
 
+  std::ofstream(sound / kNote) << nlohmann::json{{"memory_bytes", checked->memory_bytes}} << "\n";
+
   const std::lock_guard lock(keeping_);
-  StoredCase stored{checked->hash, checked->title, folder_ / to_hex(checked->hash), bytes_in(sound), false};
+  StoredCase stored{checked->hash, checked->title, folder_ / to_hex(checked->hash), bytes_in(sound), false, checked->memory_bytes};
   if (fs::exists(stored.folder, error)) {
     stored.known = true;
     return stored;
   }
+  // Others may have come since it began.
+  if (case_bytes() + stored.bytes > quota_.kept_bytes)
+    return failure(ErrorCode::exhausted, "the server's folder of cases has no " + std::to_string(stored.bytes) +
+                                             " bytes left for this one; ask the operator to delete some");
   fs::rename(sound, stored.folder, error);
   if (error) return disk(stored.folder, error.message());
   return stored;
@@ -146,6 +126,20 @@ std::vector<fs::path> CaseStore::folders() const {
     if (digest_from_hex(entry.path().filename().string())) found.push_back(entry.path());
   std::ranges::sort(found);
   return found;
+}
+
+Result<StoredCase> CaseStore::peek(const fs::path& folder) {
+  const Result<Digest> hash = digest_from_hex(folder.filename().string());
+  if (!hash) return failure(ErrorCode::invalid_input, folder.string() + " is not called by the hash of a case");
+  std::ifstream described(folder / "case.json"), noted(folder / kNote);
+  const nlohmann::json about = nlohmann::json::parse(described, nullptr, false), note = nlohmann::json::parse(noted, nullptr, false);
+  if (!about.is_object() || !about.contains("title") || !about["title"].is_string())
+    return failure(ErrorCode::invalid_input,
+                   (folder / "case.json").string() + " does not describe a case; delete the folder and upload the case again");
+  // Without the note, as of an earlier version, it shows when the case is loaded.
+  const bool known = note.is_object() && note.contains("memory_bytes") && note["memory_bytes"].is_number_unsigned();
+  return StoredCase{*hash, about["title"].get<std::string>(), folder, bytes_in(folder), true,
+                    known ? note["memory_bytes"].get<std::uint64_t>() : 0};
 }
 
 }  // namespace osteon

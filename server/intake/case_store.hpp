@@ -19,8 +19,9 @@ struct StoredCase {
   Digest hash;
   std::string title;
   std::filesystem::path folder;
-  std::uint64_t bytes = 0;
-  bool known = false;  // it was there before
+  std::uint64_t bytes = 0;         // on the disk
+  bool known = false;              // it was there before
+  std::uint64_t memory_bytes = 0;  // that it takes once it is loaded; 0: not known
 };
 
 // An archive on its way in, in a file of the store that is gone with this.
@@ -56,16 +57,19 @@ class CaseStore {
 
   // Error exhausted: so many are under way already, or the store is full.
   [[nodiscard]] Result<std::unique_ptr<Upload>> begin();
-  // Takes it apart, looks it through and keeps it; takes long. Errors: those of unpack_case() and check_case(), exhausted (the
-  // store is full), internal (disk), cancelled (`stop` returned true).
+  // Takes it apart, looks it through and keeps it; takes long. Errors: those of check_case(), exhausted (the store is full),
+  // internal (disk), cancelled (`stop` returned true).
   [[nodiscard]] Result<StoredCase> keep(std::unique_ptr<Upload> upload, const std::function<bool()>& stop = {});
   // Folders of the cases that are kept, in the order of their hashes.
   [[nodiscard]] std::vector<std::filesystem::path> folders() const;
+  // What is kept in one of them, without reading its bone. Error invalid_input: its description cannot be read.
+  [[nodiscard]] static Result<StoredCase> peek(const std::filesystem::path& folder);
+  [[nodiscard]] const IntakeQuota& quota() const { return quota_; }
 
  private:
   CaseStore(std::filesystem::path folder, std::filesystem::path program, IntakeQuota quota)
       : folder_(std::move(folder)), program_(std::move(program)), quota_(quota) {}
-  [[nodiscard]] std::uint64_t kept_bytes() const;
+  [[nodiscard]] std::uint64_t case_bytes() const;  // of those that are kept
 
   const std::filesystem::path folder_, program_;
   const IntakeQuota quota_;

@@ -96,11 +96,21 @@ TEST_F(StoreTest, QuotasHold) {
   ASSERT_FALSE(out);
   EXPECT_EQ(out.error().code, ErrorCode::exhausted);
 
-  auto full = make_store({.kept_bytes = 1});
-  ASSERT_TRUE(keep(*full, archive));  // the first is let in, since nothing is there
-  const auto beyond = keep(*full, archive);
+  // One byte less than the case takes once it is written anew: that shows at the end, and nothing of it stays.
+  const auto kept = keep(*store_, archive);
+  ASSERT_TRUE(kept) << kept.error().message;
+  fs::remove_all(kept->folder);
+  auto tight = make_store({.kept_bytes = kept->bytes - 1});
+  const auto beyond = keep(*tight, archive);
   ASSERT_FALSE(beyond);
   EXPECT_EQ(beyond.error().code, ErrorCode::exhausted);
+  EXPECT_TRUE(tight->folders().empty());
+  // As much as it takes: it is kept, and then the store is full before anything is sent.
+  auto full = make_store({.kept_bytes = kept->bytes});
+  ASSERT_TRUE(keep(*full, archive));
+  const auto no_more = full->begin();
+  ASSERT_FALSE(no_more);
+  EXPECT_EQ(no_more.error().code, ErrorCode::exhausted);
 
   std::vector<std::unique_ptr<Upload>> open;
   for (int i = 0; i < CaseStore::kMostUploads; ++i) {
@@ -128,6 +138,14 @@ TEST_F(StoreTest, AReaderThatDiesOrHangsOrWantsTooMuchIsOneSentence) {
   EXPECT_EQ(with("exit 0").code, ErrorCode::invalid_input);
   EXPECT_EQ(with("echo '{\"hash\":\"00\",\"title\":\"x\"}'").code, ErrorCode::invalid_input);
   EXPECT_EQ(with("exec sleep 60", {.time = std::chrono::seconds(1)}).code, ErrorCode::exhausted);
+  // One that was taken over leaves what is no case.
+  const std::string hash(64, 'a');
+  const std::string lie = "echo '{\"hash\":\"" + hash + "\",\"title\":\"x\",\"memory_bytes\":1}'";
+  EXPECT_EQ(with(lie).code, ErrorCode::invalid_input) << "nothing";
+  const std::string plain = "mkdir $3/sound; echo > $3/sound/case.json; ";
+  EXPECT_EQ(with(plain + "ln -s /etc/passwd $3/sound/bone.vdb; " + lie).code, ErrorCode::invalid_input) << "a link";
+  EXPECT_EQ(with(plain + "echo > $3/sound/bone.vdb; echo > $3/sound/more; " + lie).code, ErrorCode::invalid_input) << "more than a case has";
+  EXPECT_EQ(with("mkdir $3/real; ln -s real $3/sound; echo > $3/real/case.json; echo > $3/real/bone.vdb; " + lie).code, ErrorCode::invalid_input);
   EXPECT_EQ(with("exec yes").code, ErrorCode::exhausted);
   EXPECT_EQ(with("exec 1>&-; exec sleep 60").code, ErrorCode::invalid_input);  // says nothing more, and stays
   EXPECT_EQ(left_over(), 0U);
