@@ -51,6 +51,13 @@ const CutHistory::Part* CutHistory::part_of(RoomSeq place) const {
 bool CutHistory::contains(RoomSeq place) const { return part_of(place) != nullptr; }
 bool CutHistory::undone(RoomSeq place) const { return undone_.contains(place); }
 
+const Cut* CutHistory::find_cut(RoomSeq place) const {
+  const Part* part = part_of(place);
+  if (part == nullptr) return nullptr;
+  const Cut& cut = part->events.at(place).cut;
+  return cut.path.empty() ? nullptr : &cut;
+}
+
 std::size_t CutHistory::size() const {
   std::size_t events = own_.events.size();
   for (const auto& part : shared_) events += part->events.size();

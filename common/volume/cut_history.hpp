@@ -48,6 +48,7 @@ class CutHistory {
 
   [[nodiscard]] bool contains(RoomSeq place) const;
   [[nodiscard]] bool undone(RoomSeq place) const;
+  [[nodiscard]] const Cut* find_cut(RoomSeq place) const;  // null: unknown, or a mask; until the next add()
   [[nodiscard]] std::size_t size() const;
 
   // Takes events back, or applies them again, and returns the leaves that changed, by level. Places that are unknown, or

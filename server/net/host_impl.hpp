@@ -71,6 +71,16 @@ struct RoomHost::Impl {
     [[nodiscard]] bool is_for(AuthorId author) const { return row && (!to || to == author); }
   };
   [[nodiscard]] static Personal personal_row(const RoomEvent& event);
+  // [tick] In a room that nobody keeps; 0: without a name.
+  [[nodiscard]] std::uint32_t person_of(const std::string& name) {
+    return name.empty() ? 0 : persons.emplace(name, static_cast<std::uint32_t>(persons.size() + 1)).first->second;
+  }
+  // What sessions hear of one event.
+  struct Said {
+    RoomSeq place;
+    MessageParts rows;
+    Personal personal;
+  };
   // Whether any hand still lacks some of it.
   bool tell_hands(const std::vector<CuttingState>& states);
   [[nodiscard]] std::uint32_t number_of(const Digest& tool);
@@ -142,6 +152,7 @@ struct RoomHost::Impl {
   Bytes redial;                           // under sessions_mutex: what sessions are told when the process is to stop
   std::mutex copy_mutex;                  // held while the bone is copied: of a stopped host by whoever asks
   std::optional<BoneStatus> last_status;  // under copy_mutex
+  std::map<std::string, std::uint32_t> persons;  // of the tick thread: by name, where no journal numbers them
   std::vector<Queued> batch;              // of the tick thread
   std::vector<Committer::Tell> tells;     // of the tick thread
   std::chrono::nanoseconds next_kept{};   // of the tick thread: when it is next said how much is kept

@@ -93,32 +93,34 @@ void RoomHost::Impl::decide(QueuedEvent& queued) {
     room_seq = room.room_seq().value;
     return decision;
   }();
-  MessageParts rows;
-  Personal personal;
+  std::vector<Said> said;
   if (event && event->room_seq) {
-    rows = rows_of(*event);
-    personal = personal_row(*event);
+    said.push_back({event->room_seq, rows_of(*event), personal_row(*event)});
     event->leaves.clear();
+    for (const RoomEvent& one : event->further) said.push_back({one.room_seq, rows_of(one), personal_row(one)});
     if (event->scene || event->bone) show_scene();
     if (event->bone) note_changed(queued.arrived);
   }
-  later([this, rows = std::move(rows), personal = std::move(personal), event = std::move(event),
-         answer = std::move(queued.answer)](const Result<void>& durable) {
+  later([this, said = std::move(said), event = std::move(event), answer = std::move(queued.answer)](const Result<void>& durable) {
     if (!durable) return answer(tl::unexpected(durable.error()));
-    if (event) people.take(*event);
+    if (event) {
+      people.take(*event);
+      for (const RoomEvent& one : event->further) people.take(one);
+    }
     {
       const std::lock_guard lock(sessions_mutex);
       if (event && event->tool && event->room_seq) {
         const std::uint32_t number = number_of(event->tool->hash);
         sessions.each([&](SessionSink& sink) { sink.know_tool(number, event->tool->hash); });
       }
-      for (const Bytes& row : rows)
-        sessions.each([&](SessionSink& sink) {
-          if (personal.is_for(sink.author()))
-            sink.offer(event->room_seq, personal.row, personal.fast);
-          else
-            sink.offer(event->room_seq, row, {.room_seq = event->room_seq, .kind = wire::SessionRowKind::streamed});
-        });
+      for (const auto& [place, rows, personal] : said)
+        for (const Bytes& row : rows)
+          sessions.each([&](SessionSink& sink) {
+            if (personal.is_for(sink.author()))
+              sink.offer(place, personal.row, personal.fast);
+            else
+              sink.offer(place, row, {.room_seq = place, .kind = wire::SessionRowKind::streamed});
+          });
     }
     answer(event);
   });
@@ -206,16 +208,13 @@ void RoomHost::join(MemberKind kind, const std::string& name, const Digest& secr
     person = *known;
   }
   queue_event(
-      [=](Room& room) -> Result<RoomEvent> {
-        RoomEvent event;
-        event.kind = EventKind::join;
-        event.author = room.join(kind, person, secret, role);
-        event.room_seq = room.room_seq();
-        return event;
+      [=, this](Room& room) -> Result<RoomEvent> {
+        return room.admit(kind, impl_->keeper ? person : impl_->person_of(name), secret, role);
       },
       [this, kind, name, role, answer = std::move(answer)](const Result<RoomEvent>& event) {
         if (!event) return answer(tl::unexpected(event.error()));
         impl_->people.joined(event->author, name, role, kind == MemberKind::surgeon);
+        for (const RoomEvent& held : event->further) impl_->people.take(held);
         impl_->authors = std::max<std::uint64_t>(impl_->authors, event->author.value);
         answer(event->author);
       });

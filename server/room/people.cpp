@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <span>
 
+#include "common/access/role_table.hpp"
+
 namespace osteon {
 
 void People::draw(const AnnotationRow& row) {
@@ -26,6 +28,23 @@ std::uint32_t People::person(AuthorId author) const {
 bool People::oversees(AuthorId author) const {
   const Role of = role(author);
   return of == Role::instructor || of == Role::none;
+}
+
+bool People::may_undo_all(AuthorId author) const {
+  const Role of = role(author);
+  return of == Role::none || has_right(of, Right::undo_all);
+}
+
+AuthorId People::newest_hand(std::uint32_t person) const {
+  if (person == 0) return {};
+  for (auto member = members_.rbegin(); member != members_.rend(); ++member)
+    if (member->second.hand && member->second.person == person) return member->first;
+  return {};
+}
+
+std::array<const Supervision*, 2> People::binding(AuthorId author) const {
+  const AuthorId hand = oversees(author) ? author : newest_hand(person(author));
+  return {&supervised(author).supervision, &supervised(hand).supervision};
 }
 
 const People::Supervised& People::supervised(AuthorId author) const {

@@ -1,5 +1,6 @@
 // The people of a room as its rows have made them: what they may do, what was decided about them, what they have drawn.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -20,10 +21,11 @@ class People {
   struct Supervised {
     Supervision supervision;
     RoomSeq place;  // of the row that set it
+    AuthorId by;    // who did
   };
 
-  void join(AuthorId author, Role role, std::uint32_t person) { members_[author] = {role, person}; }
-  void supervise(RoomSeq place, const SuperviseRow& row) { supervised_[row.subject] = {row.supervision, place}; }
+  void join(AuthorId author, Role role, std::uint32_t person, bool hand) { members_[author] = {role, person, hand}; }
+  void supervise(RoomSeq place, AuthorId by, const SuperviseRow& row) { supervised_[row.subject] = {row.supervision, place, by}; }
   void draw(const AnnotationRow& row);
 
   [[nodiscard]] Role role(AuthorId author) const;
@@ -32,8 +34,17 @@ class People {
   // knows nobody by name.
   [[nodiscard]] bool oversees(AuthorId author) const;
   [[nodiscard]] bool only_own(AuthorId author) const { return role(author) == Role::trainee; }
+  // Whether they may take back all that others did.
+  [[nodiscard]] bool may_undo_all(AuthorId author) const;
+  // Whether both are one person, as far as it is known who they are.
+  [[nodiscard]] bool same_person(AuthorId a, AuthorId b) const { return a == b || (person(a) != 0 && person(a) == person(b)); }
+  // The hand of a person that came last, here or not; null: there is none, or nobody knows who it is (0).
+  [[nodiscard]] AuthorId newest_hand(std::uint32_t person) const;
   // What holds for a hand; nothing but the default where nobody has decided anything.
   [[nodiscard]] const Supervised& supervised(AuthorId author) const;
+  // What an author keeps to: what holds for it as a hand, then what holds for the newest hand of its person, unless it may
+  // oversee others.
+  [[nodiscard]] std::array<const Supervision*, 2> binding(AuthorId author) const;
   [[nodiscard]] const std::map<std::uint32_t, Annotation>& annotations() const { return annotations_; }
   [[nodiscard]] std::uint32_t last_annotation() const { return last_annotation_; }
   // The one that a new drawing of this kind takes the place of; 0: none.
@@ -47,6 +58,7 @@ class People {
   struct Member {
     Role role = Role::none;
     std::uint32_t person = 0;
+    bool hand = false;
   };
   std::map<AuthorId, Member> members_;
   std::map<AuthorId, Supervised> supervised_;

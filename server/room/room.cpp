@@ -76,10 +76,17 @@ RoomEvent Room::decide(AuthorId by, decltype(RoomRow::what) what) {
   return event;
 }
 
-AuthorId Room::join(MemberKind kind, std::uint32_t person, const Digest& secret, Role role) {
+RoomEvent Room::admit(MemberKind kind, std::uint32_t person, const Digest& secret, Role role) {
   const AuthorId author{authors_ + 1};
-  decide(author, JoinRow{author, kind, person, secret, role});
-  return author;
+  const People::Supervised before = people_.supervised(people_.newest_hand(person));
+  RoomEvent event = decide(author, JoinRow{author, kind, person, secret, role});
+  if (kind == MemberKind::surgeon && secret != Digest{} && before.supervision != Supervision{})
+    event.further.push_back(decide(before.by, SuperviseRow{author, before.supervision}));
+  return event;
+}
+
+AuthorId Room::join(MemberKind kind, std::uint32_t person, const Digest& secret, Role role) {
+  return admit(kind, person, secret, role).author;
 }
 
 bool Room::knows(AuthorId author) const { return author && author.value <= authors_; }

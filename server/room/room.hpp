@@ -75,7 +75,9 @@ class Room {
   void set_time(std::chrono::nanoseconds now) { now_ = std::max(now_, now); }
   [[nodiscard]] std::chrono::nanoseconds time() const { return now_; }
 
-  // A new identity, never given twice.
+  // A new identity, never given twice: the event's author. What holds for the person's newest hand holds for the new one, by a
+  // row of its own (RoomEvent::further), unless the server itself joins, which has no secret.
+  RoomEvent admit(MemberKind kind, std::uint32_t person = 0, const Digest& secret = {}, Role role = Role::none);
   AuthorId join(MemberKind kind, std::uint32_t person = 0, const Digest& secret = {}, Role role = Role::none);
   [[nodiscard]] bool knows(AuthorId author) const;
   [[nodiscard]] std::uint64_t authors() const { return authors_; }  // so many have joined
@@ -97,8 +99,8 @@ class Room {
   // The other events. Errors, without a place in the order: invalid_input (an author who has not joined, an unknown
   // body, item, tool or place), unavailable (nothing to undo or redo, or the bone has changed meanwhile).
   Result<RoomEvent> add_tool(AuthorId by, const Tool& tool);  // place 0 when it is known already
-  // Takes back these events, or the newest `count` of one author or (null) of all. With a cut falls every later split of
-  // a body that it had reached, and what was done to the piece as such; cuts made since stay in the bone.
+  // Takes back these events, or the newest `count` of one author or (null) of all, of a trainee their own. With a cut falls every
+  // later split of a body that it had reached, and what was done to the piece as such; cuts made since stay in the bone.
   Result<RoomEvent> undo(AuthorId by, std::span<const RoomSeq> places);
   Result<RoomEvent> undo_last(AuthorId by, std::size_t count, AuthorId of);
   Result<RoomEvent> undo_to(AuthorId by, RoomSeq mark);         // all that came after it
@@ -116,7 +118,7 @@ class Room {
   }
   Result<RoomEvent> split(Separation found);
   // What people decide about each other, draw and say: room_people.cpp. A trainee takes back and does again what is their
-  // own; errors as above, and denied where the author's role does not allow it.
+  // own; errors as above, and denied where the author's role, or what was decided about their hand, does not allow it.
   Result<RoomEvent> supervise(AuthorId by, AuthorId subject, Supervision supervision);
   Result<RoomEvent> annotate(AuthorId by, Annotation drawn);        // id 0: a new one; an author has one pointer
   Result<RoomEvent> wipe_off(AuthorId by, std::uint32_t annotation);  // an own one, or anyone's for an instructor
@@ -198,6 +200,8 @@ class Room {
     std::vector<SplitPiece> pieces = {};
     std::uint32_t item = 0;             // scene
     std::vector<RoomSeq> places = {};   // undo
+    std::shared_ptr<const Cut> missed = {};  // cut: one that is in no body's history; never changed
+    bool all_of_others = false;         // undo: nothing was left of what anybody but its author had done
     std::string label = {};             // mark
     std::chrono::nanoseconds at{};
   };
@@ -235,7 +239,17 @@ class Room {
   void apply(const RoomRow& row, const SuperviseRow& supervise, RoomEvent& event);
   void apply(const RoomRow& row, const AnnotationRow& annotation, RoomEvent& event);
   void apply(const RoomRow& row, const WordsRow& words, RoomEvent& event);
+  // The bone or the scene, otherwise than by a cut: whoever has joined and is neither stopped nor without their tool.
+  [[nodiscard]] Result<void> may_change(AuthorId by) const;
+  // Whether cuts that come again are such as `by` may make now, and those whose they are, unless `by` oversees them.
+  [[nodiscard]] Result<void> may_cut_again(AuthorId by, const std::set<RoomSeq>& places) const;
+  // By their role; the same however the events are named.
   [[nodiscard]] Result<void> may_take_back(AuthorId by, const std::set<RoomSeq>& places) const;
+  // Whether some of them are others', and nothing that others did stands without them. Splits are nobody's.
+  [[nodiscard]] bool takes_all_of_others(AuthorId by, const std::set<RoomSeq>& places) const;
+  [[nodiscard]] Result<void> are_own(AuthorId by, const std::set<RoomSeq>& places) const;
+  // Undo events.
+  [[nodiscard]] Result<void> may_do_again(AuthorId by, const std::set<RoomSeq>& undos) const;
   void bone_came_back(RoomEvent& event);
   void grant(Surgeon& surgeon);
   Event& add_event(const RoomRow& row, EventKind kind);

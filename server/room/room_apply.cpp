@@ -187,7 +187,7 @@ void Room::apply(const RoomRow& row, const JoinRow& join, RoomEvent& event) {
   event.author = join.author;
   authors_ = join.author.value;
   secrets_[join.author] = join.secret;
-  people_.join(join.author, join.role, join.person);
+  people_.join(join.author, join.role, join.person, join.kind == MemberKind::surgeon);
   if (join.kind == MemberKind::surgeon) surgeons_[join.author].granted = row.at;
 }
 
@@ -217,6 +217,8 @@ void Room::apply(const RoomRow& row, const CutRow& what, RoomEvent& event) {
     event.cut.changed_leaves.insert(event.cut.changed_leaves.end(), part.changed_leaves.begin(), part.changed_leaves.end());
     if (!part.changed_leaves.empty()) note_changed(id, {{cut.level, std::move(part.changed_leaves)}}, nullptr);
   }
+  if (std::ranges::none_of(bodies_, [&](const auto& body) { return body.second.history.contains(row.place); }))
+    events_.at(row.place).missed = std::make_shared<const Cut>(cut);
 }
 
 // What its author has predicted on top of a cut that fell, falls too; but a stale cut says that he does not know yet, and
@@ -245,7 +247,10 @@ void Room::bone_came_back(RoomEvent& event) {
 
 void Room::apply(const RoomRow& row, const UndoRow& undo, RoomEvent& event) {
   event.kind = EventKind::undo;
-  add_event(row, EventKind::undo).places = undo.places;
+  const bool all_of_others = takes_all_of_others(row.author, {undo.places.begin(), undo.places.end()});
+  Event& added = add_event(row, EventKind::undo);
+  added.places = undo.places;
+  added.all_of_others = all_of_others;
   event.places = undo.places;
   std::set<BodyId> back;
   for (auto place = undo.places.rbegin(); place != undo.places.rend(); ++place) {

@@ -44,6 +44,7 @@ struct RoomEvent {
   CutReport cut;                          // of all bodies together
   std::string mark;                       // its label
   std::variant<std::monostate, SuperviseRow, AnnotationRow, WordsRow> people;  // what was decided, drawn or said
+  std::vector<RoomEvent> further;         // decided with it, each at a place of its own after it
 };
 
 }  // namespace osteon

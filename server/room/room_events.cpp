@@ -226,7 +226,7 @@ RoomEvent Room::take_back(AuthorId by, std::set<RoomSeq> places) {
 }
 
 Result<RoomEvent> Room::undo(AuthorId by, std::span<const RoomSeq> places) {
-  if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
+  if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
   if (places.empty()) return refuse("undo names no event");
   for (const RoomSeq place : places) {
     if (!can_be_undone(place)) return refuse("event " + std::to_string(place.value) + " is none that can be undone");
@@ -238,13 +238,12 @@ Result<RoomEvent> Room::undo(AuthorId by, std::span<const RoomSeq> places) {
 }
 
 Result<RoomEvent> Room::undo_last(AuthorId by, std::size_t count, AuthorId of) {
-  if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
+  if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
   if (count == 0) return refuse("undo needs a count of at least 1");
-  if (people_.only_own(by) && !of) of = by;
   std::set<RoomSeq> places;
   for (auto event = events_.rbegin(); event != events_.rend() && places.size() < count; ++event) {
     const Event& row = event->second;
-    if (row.undone || (of && row.author != of)) continue;
+    if (row.undone || (of ? row.author != of : people_.only_own(by) && !people_.same_person(by, row.author))) continue;
     if (can_be_undone(event->first) && row.kind != EventKind::split) places.insert(event->first);
   }
   if (places.empty()) return failure(ErrorCode::unavailable, "there is nothing to undo");
@@ -258,7 +257,7 @@ Result<RoomEvent> Room::undo_since(AuthorId by, std::chrono::nanoseconds since) 
 }
 
 Result<RoomEvent> Room::undo_to(AuthorId by, RoomSeq mark) {
-  if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
+  if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
   if (mark > room_seq_) return refuse("place " + std::to_string(mark.value) + " lies beyond the newest event");
   std::set<RoomSeq> places;
   for (auto event = events_.upper_bound(mark); event != events_.end(); ++event)
@@ -271,13 +270,13 @@ Result<RoomEvent> Room::undo_to(AuthorId by, RoomSeq mark) {
 }
 
 Result<RoomEvent> Room::redo_last(AuthorId by, std::size_t count) {
-  if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
+  if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
   if (count == 0) return refuse("redo needs a count of at least 1");
   RedoRow row;
   for (auto event = events_.rbegin(); event != events_.rend() && row.undos.size() < count; ++event)
     if (event->second.kind == EventKind::undo && !event->second.undone) row.undos.push_back(event->first);
   if (row.undos.empty()) return failure(ErrorCode::unavailable, "there is nothing to redo");
-  if (Result<void> may = may_take_back(by, {row.undos.begin(), row.undos.end()}); !may) return tl::unexpected(may.error());
+  if (Result<void> may = may_do_again(by, {row.undos.begin(), row.undos.end()}); !may) return tl::unexpected(may.error());
 
   std::set<RoomSeq> again;
   for (const RoomSeq undo : row.undos) {
@@ -290,6 +289,7 @@ Result<RoomEvent> Room::redo_last(AuthorId by, std::size_t count) {
     for (const RoomSeq place : events_.at(undo).places)
       if (events_.at(place).kind != EventKind::split || !split_since(events_.at(place).body)) again.insert(place);
   }
+  if (Result<void> may = may_cut_again(by, again); !may) return tl::unexpected(may.error());
   row.places.assign(again.begin(), again.end());
   return decide(by, std::move(row));
 }
@@ -310,7 +310,7 @@ std::vector<std::pair<RoomSeq, std::string>> Room::marks() const {
 }
 
 Result<RoomEvent> Room::remove_body(AuthorId by, BodyId body) {
-  if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
+  if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
   if (!exists(body)) return refuse("the room has no body " + std::to_string(body.value));
   if (bodies().size() == 1) return refuse("body " + std::to_string(body.value) + " is the last one and stays");
   return decide(by, RemoveBodyRow{body});
@@ -340,7 +340,7 @@ Result<RoomEvent> Room::split(Separation found) {
 }
 
 Result<RoomEvent> Room::set_item(AuthorId by, SceneItem item, const Placing& placing) {
-  if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
+  if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
   if (!exists(item.body)) return refuse("the room has no body " + std::to_string(item.body.value));
   if (!tools_->find(item.tool)) return refuse("item.tool_hash is of no tool that the room knows");
   if (item.id != 0 && !items_.contains(item.id)) return refuse("item.item: the room has no item " + std::to_string(item.id));
@@ -369,7 +369,7 @@ Result<RoomEvent> Room::set_item(AuthorId by, SceneItem item, const Placing& pla
 }
 
 Result<RoomEvent> Room::remove_item(AuthorId by, std::uint32_t item) {
-  if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
+  if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
   const auto standing = items();
   const auto found = std::ranges::find(standing, item, &SceneItem::id);
   if (found == standing.end()) return refuse("item " + std::to_string(item) + " does not stand in the scene");

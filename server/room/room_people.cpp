@@ -26,7 +26,14 @@ Result<RoomEvent> Room::supervise(AuthorId by, AuthorId subject, Supervision sup
   }
   for (const Digest& tool : supervision.tools)
     if (!tools_->find(tool)) return refuse("supervision.tools names " + to_hex(tool) + ", which this room does not know; add it first");
-  return decide(by, SuperviseRow{subject, std::move(supervision)});
+  // Who decided it may not know yet that the person has come again: what held for both alike goes on doing so.
+  const Supervision before = people_.supervised(subject).supervision;
+  const AuthorId newest = people_.role(subject) == Role::none ? subject : people_.newest_hand(people_.person(subject));
+  const bool follows = newest && newest != subject && newest != supervision.taken_by && newest != supervision.guide &&
+                       people_.supervised(newest).supervision == before && before != supervision;
+  RoomEvent event = decide(by, SuperviseRow{subject, supervision});
+  if (follows) event.further.push_back(decide(by, SuperviseRow{newest, std::move(supervision)}));
+  return event;
 }
 
 Result<RoomEvent> Room::annotate(AuthorId by, Annotation drawn) {
@@ -66,12 +73,66 @@ Result<RoomEvent> Room::say(AuthorId by, AuthorId to, std::string words) {
   return decide(by, WordsRow{to, std::move(words)});
 }
 
+Result<void> Room::may_change(AuthorId by) const {
+  if (Result<void> member = check_member(by); !member) return member;
+  for (const Supervision* held : people_.binding(by))
+    if (!held->may_cut())
+      return deny(std::string(held->stopped ? "your hand is stopped" : "your tool is taken") +
+                  "; until an instructor lets you go on, you take nothing back, do nothing again, place and take away nothing");
+  return {};
+}
+
+Result<void> Room::may_cut_again(AuthorId by, const std::set<RoomSeq>& places) const {
+  for (const RoomSeq place : places) {
+    const Event& event = events_.at(place);
+    if (event.kind != EventKind::cut) continue;
+    const Cut* cut = event.missed.get();
+    for (auto body = bodies_.begin(); body != bodies_.end() && cut == nullptr; ++body) cut = body->second.history.find_cut(place);
+    if (cut == nullptr) continue;
+    const auto forbidden = [&](AuthorId whose) -> Result<void> {
+      for (const Supervision* held : people_.binding(whose))
+        if (const Rejection why = breach(*held, *cut); why != Rejection::none)
+          return deny("event " + std::to_string(place.value) + " is a cut that " + author_name(whose) + " may not make now: " +
+                      std::string(sentence(why)));
+      return {};
+    };
+    if (Result<void> may = forbidden(by); !may) return may;
+    if (people_.oversees(by)) continue;
+    if (Result<void> may = forbidden(event.author); !may) return may;
+  }
+  return {};
+}
+
 Result<void> Room::may_take_back(AuthorId by, const std::set<RoomSeq>& places) const {
-  if (!people_.only_own(by)) return {};
+  if (people_.may_undo_all(by)) return {};
+  if (people_.only_own(by)) return are_own(by, places);
+  if (!takes_all_of_others(by, places)) return {};
+  return deny("this takes back all that others have done here, which only an instructor does; take back less, or only your own");
+}
+
+Result<void> Room::may_do_again(AuthorId by, const std::set<RoomSeq>& undos) const {
+  if (people_.may_undo_all(by)) return {};
+  if (people_.only_own(by)) return are_own(by, undos);
+  for (const RoomSeq place : undos)
+    if (const Event& undo = events_.at(place); undo.all_of_others && !people_.same_person(by, undo.author))
+      return deny("event " + std::to_string(place.value) + " took back all that others had done, which only an instructor does again");
+  return {};
+}
+
+Result<void> Room::are_own(AuthorId by, const std::set<RoomSeq>& places) const {
   for (const RoomSeq place : places)
-    if (events_.at(place).author != by)
+    if (!people_.same_person(by, events_.at(place).author))
       return deny("event " + std::to_string(place.value) + " is not " + author_name(by) + "'s own, and a trainee takes back no other");
   return {};
+}
+
+bool Room::takes_all_of_others(AuthorId by, const std::set<RoomSeq>& places) const {
+  const auto is_others = [&](const Event& event) { return event.kind != EventKind::split && !people_.same_person(by, event.author); };
+  if (std::ranges::none_of(places, [&](RoomSeq place) { return is_others(events_.at(place)); })) return false;
+  const auto stays = [&](const auto& event) {
+    return can_be_undone(event.first) && !event.second.undone && is_others(event.second) && !places.contains(event.first);
+  };
+  return std::ranges::none_of(events_, stays);
 }
 
 // Who stops a hand or takes its tool takes its lease: what it predicted on top falls.
@@ -81,7 +142,7 @@ void Room::apply(const RoomRow& row, const SuperviseRow& supervise, RoomEvent& e
   Surgeon& surgeon = surgeons_.at(supervise.subject);
   const Supervision& before = people_.supervised(supervise.subject).supervision;
   if (before.stopped != supervise.supervision.stopped || before.taken_by != supervise.supervision.taken_by) grant(surgeon);
-  people_.supervise(row.place, supervise);
+  people_.supervise(row.place, row.author, supervise);
   event.lease_epoch = surgeon.epoch;
 }
 

@@ -1,6 +1,8 @@
 #include "tests/simulation/ledger.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <set>
 #include <utility>
 
@@ -11,6 +13,12 @@ std::string number(RoomSeq place) { return std::to_string(place.value); }
 
 std::string whose(AuthorId author, std::uint64_t author_seq) {
   return "cut " + std::to_string(author_seq) + " of author " + std::to_string(author.value);
+}
+
+bool lies_in(const ZoneLimit& zone, const std::array<std::int32_t, 3>& tip) {
+  double square = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) square += std::pow(double{1} * tip[axis] - zone.centre[axis], 2);
+  return square <= std::pow(double{1} * zone.radius, 2);
 }
 
 std::optional<EventKind> kind_of(const RoomRow& row) {
@@ -33,6 +41,18 @@ std::optional<EventKind> kind_of(const RoomRow& row) {
 }
 
 }  // namespace
+
+// Who has come with a hand, what holds for it, and what was cut.
+struct Ledger::Hands {
+  std::map<AuthorId, std::uint32_t> persons;  // of those that cut, in the order in which they came
+  std::map<AuthorId, Supervision> held;
+  std::map<RoomSeq, const Cut*> cuts;
+
+  [[nodiscard]] Supervision of(AuthorId author) const {
+    const auto found = held.find(author);
+    return found == held.end() ? Supervision{} : found->second;
+  }
+};
 
 std::string_view name(Invariant invariant) {
   switch (invariant) {
@@ -101,13 +121,52 @@ void Ledger::check_author(const RoomRow& row, AuthorId author, std::uint64_t aut
         "row " + number(row.place) + " is " + whose(author, author_seq) + ", with other bytes than he made");
 }
 
+void Ledger::check_held(const RoomRow& row, const Hands& hands) {
+  const bool changes = std::holds_alternative<UndoRow>(row.what) || std::holds_alternative<RedoRow>(row.what) ||
+                       std::holds_alternative<ItemRow>(row.what) || std::holds_alternative<RemoveBodyRow>(row.what);
+  const Supervision now = hands.of(row.author);
+  check(!changes || (!now.stopped && now.taken_by == AuthorId{}), Invariant::overseen,
+        "row " + number(row.place) + " is what author " + std::to_string(row.author.value) + " did while held");
+  const auto* redo = std::get_if<RedoRow>(&row.what);
+  if (redo == nullptr) return;
+  for (const RoomSeq place : redo->places)
+    if (const auto cut = hands.cuts.find(place); cut != hands.cuts.end()) check_cut(row, hands, row.author, *cut->second);
+}
+
+void Ledger::check_cut(const RoomRow& row, const Hands& hands, AuthorId by, const Cut& cut) {
+  const Supervision now = hands.of(by);
+  const auto forbidden = [&](const std::string& why) {
+    fault(Invariant::overseen, "row " + number(row.place) + " has " + whose(cut.author, cut.author_seq) + ", and author " +
+                                   std::to_string(by.value) + " " + why);
+  };
+  if (now.stopped) forbidden("was stopped");
+  if (now.taken_by != AuthorId{}) forbidden("had no tool");
+  if (!now.tools.empty() && std::ranges::find(now.tools, cut.tool) == now.tools.end()) forbidden("might not cut with that tool");
+  if (!now.zone) return;
+  for (const QuantisedPose& knot : cut.path)
+    if (!lies_in(*now.zone, knot.position)) return forbidden("might not cut there");
+}
+
+// Whoever starts their program again is held as they were, from the next row on.
+void Ledger::check_carried(std::span<const RoomRow> rows, std::size_t join, Hands& hands) {
+  const auto& joined = std::get<JoinRow>(rows[join].what);
+  Supervision before;
+  for (const auto& [author, person] : hands.persons)
+    if (person != 0 && person == joined.person) before = hands.of(author);
+  hands.persons[joined.author] = joined.person;
+  if (before == Supervision{}) return;
+  const auto* next = join + 1 < rows.size() ? std::get_if<SuperviseRow>(&rows[join + 1].what) : nullptr;
+  check(next != nullptr && next->subject == joined.author && next->supervision == before, Invariant::overseen,
+        "row " + number(rows[join].place) + " lets a person's new hand go, author " + std::to_string(joined.author.value));
+}
+
 void Ledger::check_rows(std::span<const RoomRow> rows) {
   if (furthest_.value > rows.size())
     fault(Invariant::acknowledged,
           "the room was said to stand at " + number(furthest_) + ", and " + std::to_string(rows.size()) + " rows are kept");
   std::map<AuthorId, std::uint64_t> newest, lease;  // of the leases that are not 1
   std::map<RoomSeq, bool> of_bone;                  // places of events that can be undone: whether bone comes back with them
-  std::map<AuthorId, Supervision> held;
+  Hands hands;
   const auto lease_of = [&](AuthorId author) {
     const auto found = lease.find(author);
     return found == lease.end() ? std::uint64_t{1} : found->second;
@@ -117,6 +176,7 @@ void Ledger::check_rows(std::span<const RoomRow> rows) {
     check(row.place.value == i + 1, Invariant::replay, "row " + std::to_string(i + 1) + " has the place " + number(row.place));
     Told kept{*kind_of(row), false, {}, 0, {}};
     bool bone_back = false;
+    check_held(row, hands);
     if (const auto* cut = std::get_if<CutRow>(&row.what)) {
       const Digest bytes = cut_digest(cut->cut);
       kept = {EventKind::cut, false, cut->cut.author, cut->cut.author_seq, bytes};
@@ -125,10 +185,8 @@ void Ledger::check_rows(std::span<const RoomRow> rows) {
             "row " + number(row.place) + ", " + whose(cut->cut.author, cut->cut.author_seq) + ", is of lease " +
                 std::to_string(cut->cut.lease_epoch) + " where " + std::to_string(lease_of(cut->cut.author)) + " holds");
       of_bone[row.place] = true;
-      const Rejection breached = breach(held[cut->cut.author], cut->cut);
-      check(breached == Rejection::none, Invariant::overseen,
-            "row " + number(row.place) + ", " + whose(cut->cut.author, cut->cut.author_seq) + ", is what was forbidden: " +
-                std::string(sentence(breached)));
+      hands.cuts[row.place] = &cut->cut;
+      check_cut(row, hands, cut->cut.author, cut->cut);
     } else if (const auto* rejection = std::get_if<RejectionRow>(&row.what)) {
       kept = {EventKind::cut, true, rejection->author, rejection->author_seq, {}};
       check_author(row, rejection->author, rejection->author_seq, rejection->bytes, newest);
@@ -141,8 +199,9 @@ void Ledger::check_rows(std::span<const RoomRow> rows) {
       }
     } else if (const auto* join = std::get_if<JoinRow>(&row.what)) {
       lease[join->author] = 1;
+      if (join->kind == MemberKind::surgeon) check_carried(rows, i, hands);
     } else if (const auto* decided = std::get_if<SuperviseRow>(&row.what)) {
-      Supervision& before = held[decided->subject];
+      Supervision& before = hands.held[decided->subject];
       const Supervision& now = decided->supervision;
       if (before.stopped != now.stopped || before.taken_by != now.taken_by) lease[decided->subject] = row.place.value + 1;
       before = now;

@@ -73,6 +73,12 @@ class Ledger {
     friend bool operator==(const Told&, const Told&) = default;
   };
   void told(RoomSeq place, const Told& what);
+  // What an instructor forbids, in this page's own words: of a cut, made or done again by `by`, and of all else that changes
+  // bone or scene.
+  struct Hands;
+  void check_held(const RoomRow& row, const Hands& hands);
+  void check_cut(const RoomRow& row, const Hands& hands, AuthorId by, const Cut& cut);
+  void check_carried(std::span<const RoomRow> rows, std::size_t join, Hands& hands);
   void check_author(const RoomRow& row, AuthorId author, std::uint64_t author_seq, const Digest& bytes,
                     std::map<AuthorId, std::uint64_t>& newest);
 

@@ -1,5 +1,12 @@
 // Many small rooms: what matters is who said what when, not how much bone there is.
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "tests/simulation/ledger.hpp"
 #include "tests/simulation/seeds.hpp"
+#include "tests/support/scenes/bones.hpp"
 
 namespace osteon {
 namespace {
@@ -14,6 +21,7 @@ TEST(Simulation, KeepsItsPromisesWhateverHappens) {
     expect_no_faults(one, "");
     sum.committed += one.committed, sum.rejected += one.rejected, sum.undone += one.undone, sum.crashes += one.crashes;
     sum.decisions += one.decisions, sum.forbidden += one.forbidden;
+    sum.denied += one.denied, sum.carried += one.carried;
     sum.disk_failures += one.disk_failures, sum.breaks += one.breaks, sum.resumed += one.resumed;
     fast_path += one.fast_path ? 1 : 0;
     sum.datagrams.opened += one.datagrams.opened, sum.datagrams.forged += one.datagrams.forged;
@@ -26,6 +34,8 @@ TEST(Simulation, KeepsItsPromisesWhateverHappens) {
   EXPECT_GT(sum.undone, 100u);
   EXPECT_GT(sum.decisions, 500u);
   EXPECT_GT(sum.forbidden, 100u);
+  EXPECT_GT(sum.denied, 50u);
+  EXPECT_GT(sum.carried, 20u);
   EXPECT_GT(sum.crashes, 300u);
   EXPECT_GT(sum.disk_failures, 10u);
   EXPECT_GT(sum.breaks, 300u);
@@ -60,6 +70,93 @@ TEST(Simulation, FindsAReplicaThatDoesNotComeBackRight) { EXPECT_GT(found(Breaka
 TEST(Simulation, FindsAJournalThatWaitsForNoDisk) { EXPECT_GT(found(Breakage::forgetful, 40), 0u); }
 
 TEST(Simulation, FindsAHandThatIsNotTold) { EXPECT_GT(found(Breakage::unsaid, 40), 0u); }
+
+// Rows of a room that heeds nothing: what is found in them goes by no room's judgement.
+struct Rows {
+  Rows() {
+    join(1, 7);
+    join(2, 8);
+  }
+  void add(std::uint64_t by, decltype(RoomRow::what) what) {
+    rows.push_back({RoomSeq{rows.size() + 1}, {}, AuthorId{by}, std::move(what)});
+  }
+  void join(std::uint64_t author, std::uint32_t person) {
+    add(author, JoinRow{.author = AuthorId{author}, .kind = MemberKind::surgeon, .person = person});
+  }
+  void hold(std::uint64_t subject, const Supervision& word) { add(1, SuperviseRow{AuthorId{subject}, word}); }
+  void cut(std::uint64_t author, std::uint64_t lease = 1) {
+    Cut one = straight_cut(find_tool("burr-round-3.2").value(), {1, 0, 0}, {2, 0, 0}, {0, 0, -1}, ++cuts[author]);
+    one.author = AuthorId{author};
+    one.lease_epoch = lease;
+    ledger.made(one, {});
+    add(author, CutRow{one});
+  }
+  std::size_t overseen() {
+    ledger.check_rows(rows);
+    for (const Fault& fault : ledger.faults()) EXPECT_EQ(fault.invariant, Invariant::overseen) << fault.sentence;
+    return ledger.faults().size();
+  }
+
+  Ledger ledger;
+  std::vector<RoomRow> rows;
+  std::map<std::uint64_t, std::uint64_t> cuts;
+};
+
+const Digest kBurr = find_tool("burr-round-3.2").value().hash(), kDrill = find_tool("drill-3.2").value().hash();
+
+TEST(Ledger, FindsCutsThatWereForbidden) {
+  const auto found = [](const Supervision& word) {
+    Rows all;
+    all.hold(2, word);
+    all.cut(2, word.may_cut() ? 1 : 4);
+    return all.overseen();
+  };
+  const std::int32_t mm = static_cast<std::int32_t>(1.0 / kQuantum_mm);
+  EXPECT_EQ(found({}), 0u);
+  EXPECT_EQ(found({.stopped = true}), 1u);
+  EXPECT_EQ(found({.taken_by = AuthorId{1}}), 1u);
+  EXPECT_EQ(found({.tools = {kBurr}}), 0u);
+  EXPECT_EQ(found({.tools = {kDrill}}), 1u);
+  EXPECT_EQ(found({.zone = ZoneLimit{{mm, 0, 0}, mm}}), 0u) << "its end is on the edge";
+  EXPECT_EQ(found({.zone = ZoneLimit{{mm, 0, 0}, mm - 1}}), 1u);
+}
+
+TEST(Ledger, FindsWhatAHeldHandTookBackOrDidAgain) {
+  const auto found = [](std::uint64_t by, const Supervision& word, bool again) {
+    Rows all;
+    all.cut(2);
+    if (again) all.add(1, UndoRow{{RoomSeq{3}}});
+    all.hold(2, word);
+    if (again)
+      all.add(by, RedoRow{{RoomSeq{4}}, {RoomSeq{3}}});
+    else
+      all.add(by, UndoRow{{RoomSeq{3}}});
+    return all.overseen();
+  };
+  EXPECT_EQ(found(2, {}, true), 0u);
+  EXPECT_EQ(found(2, {.stopped = true}, false), 1u);
+  EXPECT_EQ(found(2, {.taken_by = AuthorId{1}}, false), 1u);
+  EXPECT_EQ(found(1, {.stopped = true}, false), 0u) << "another's word is no matter of this one";
+  EXPECT_EQ(found(2, {.stopped = true}, true), 2u) << "that it did anything, and the cut";
+  EXPECT_EQ(found(2, {.tools = {kDrill}}, true), 1u);
+  EXPECT_EQ(found(2, {.zone = ZoneLimit{{0, 0, 0}, 1}}, true), 1u);
+  EXPECT_EQ(found(2, {.tools = {kDrill}}, false), 0u);
+}
+
+TEST(Ledger, FindsAHandThatIsLetGoByComingAgain) {
+  const auto found = [](std::uint32_t person, std::optional<Supervision> carried) {
+    Rows all;
+    all.hold(2, {.stopped = true});
+    all.join(3, person);
+    if (carried) all.hold(3, *carried);
+    return all.overseen();
+  };
+  EXPECT_EQ(found(8, {}), 1u);
+  EXPECT_EQ(found(8, Supervision{.stopped = true}), 0u);
+  EXPECT_EQ(found(8, Supervision{.force_limit = 1}), 1u);
+  EXPECT_EQ(found(7, {}), 0u) << "whose hand is free";
+  EXPECT_EQ(found(0, {}), 0u) << "nobody knows who that is";
+}
 
 TEST(Simulation, FindsRowsThatDatagramsLose) { EXPECT_GT(found(Breakage::pruning, 150), 0u); }
 

@@ -117,6 +117,7 @@ void SimClient::start() {
   renewed_.clear();
   own_.clear();
   felt_.clear();
+  held_ = {};
   work_planned_ = bone_is_here_ = interrupted_ = heard_ = false;
   join();
 }
@@ -142,7 +143,9 @@ void SimClient::leave() {
 }
 
 void SimClient::join() {
-  const std::string user = random_.unit() < 0.3 ? "user " + std::to_string(random_.index(3)) : "";
+  // Who has a name has it again when the program is started again; nobody knows the others.
+  if (!user_) user_ = random_.unit() < 0.7 ? "user " + std::to_string(number_) : "";
+  const std::string user = *user_;
   const SimServer::JoinRequest request{.name = user, .resume = {}, .secret = {}, .kept = {}};
   ask<SimServer::Joined>([this, request](auto answer) { server_.join(request, answer); }, kFirstAnswer,
                          [this](const Result<SimServer::Joined>& room) {
@@ -556,6 +559,7 @@ void SimClient::change(std::function<Result<RoomEvent>(Room&, AuthorId)> change)
       },
       5s, [this](const Result<RoomEvent>& event) {
         if (event && event->room_seq) ledger_.told_event(event->room_seq, event->kind);
+        if (!event && event.error().code == ErrorCode::denied) ++denied_;
       });
 }
 

@@ -31,7 +31,7 @@ struct HandPlan {
   int run = 8;                   // cuts behind each other, at most
   std::chrono::nanoseconds pause_most = std::chrono::milliseconds(800);  // between two runs
   // Between two runs, with these chances:
-  double undo = 0.12, redo = 0.06, mark = 0.05, again = 0.15, beyond = 0.08, oversee = 0.35, say = 0.05;
+  double undo = 0.12, redo = 0.10, mark = 0.05, again = 0.15, beyond = 0.08, oversee = 0.35, say = 0.05;
 };
 
 // How a client's datagrams fare.
@@ -75,6 +75,7 @@ class SimClient {
   [[nodiscard]] Digest hash() const { return replica_->hash(); }
   [[nodiscard]] RoomSeq room_seq() const { return replica_->room_seq(); }
   [[nodiscard]] std::uint64_t cuts() const { return cuts_made_; }
+  [[nodiscard]] std::uint64_t denied() const { return denied_; }  // of what it has asked for while it was held
   [[nodiscard]] std::uint64_t resumed() const { return resumed_; }
   [[nodiscard]] std::uint64_t programs() const { return programs_; }
   // Milliseconds from others' cuts until the replica had them, by what brought them.
@@ -153,8 +154,9 @@ class SimClient {
   const Breakage breakage_;
   std::uint64_t life_ = 0, programs_ = 0;
   bool gone_ = false, resting_ = false;
+  std::optional<std::string> user_;
   int cuts_left_;
-  std::uint64_t cuts_made_ = 0, resumed_ = 0;
+  std::uint64_t cuts_made_ = 0, resumed_ = 0, denied_ = 0;
 
   // Of the running program.
   std::optional<SimServer::Joined> room_;

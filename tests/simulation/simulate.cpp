@@ -90,9 +90,13 @@ class Simulation {
       std::ranges::copy(client->felt_by_stream_ms(), std::back_inserter(report.felt_by_stream_ms));
       report.cuts += client->cuts();
       report.resumed += client->resumed();
+      report.denied += client->denied();
       report.programs += client->programs();
     }
     report.rows = rows_.size();
+    for (std::size_t i = 1; i < rows_.size(); ++i)
+      if (const auto* held = std::get_if<SuperviseRow>(&rows_[i].what))
+        if (const auto* join = std::get_if<JoinRow>(&rows_[i - 1].what)) report.carried += held->subject == join->author;
     for (const RoomRow& row : rows_) {
       report.committed += std::holds_alternative<CutRow>(row.what);
       report.rejected += std::holds_alternative<RejectionRow>(row.what);

@@ -1,0 +1,348 @@
+// What holds for a person: wherever their hand comes back, in all that they do beside cutting, and told to whoever is there.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "osteon/v1/people.pb.h"
+#include "server/net/journal_rows.hpp"
+#include "server/net/room_host.hpp"
+#include "server/net/room_keeper.hpp"
+#include "server/room/room.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/unit/room/cuts.hpp"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+using test::strokes;
+using test::test_block;
+using test::tool_named;
+
+constexpr std::uint32_t kAda = 1, kBen = 2, kCy = 3;
+const Digest kSecret{{7}};
+
+// An instructor's console, a trainee with a hand and a viewer, a collaborator with a hand.
+struct Held {
+  Held() : room(test_block()) {
+    ada = room.join(MemberKind::watcher, kAda, kSecret, Role::instructor);
+    ben = room.join(MemberKind::surgeon, kBen, kSecret, Role::trainee);
+    viewer = room.join(MemberKind::watcher, kBen, kSecret, Role::trainee);
+    cy = room.join(MemberKind::surgeon, kCy, kSecret, Role::collaborator);
+    for (const AuthorId author : {ben, cy}) cuts[author] = strokes(author, 100, static_cast<unsigned>(author.value));
+  }
+  Outcome cut(AuthorId author) {
+    Cut next = cuts.at(author).at(room.decided(author));
+    next.lease_epoch = room.lease_epoch(author);
+    room.set_time(room.time() + 8ms);
+    return room.submit(next).value();
+  }
+  void decide(AuthorId subject, const Supervision& word) {
+    const auto decided = room.supervise(ada, subject, word);
+    ASSERT_TRUE(decided) << decided.error().message;
+  }
+  AuthorId again(std::uint32_t person, Role role) {
+    const AuthorId author = room.join(MemberKind::surgeon, person, kSecret, role);
+    cuts[author] = strokes(author, 100, static_cast<unsigned>(author.value));
+    return author;
+  }
+  static ErrorCode refused(const Result<RoomEvent>& event) {
+    EXPECT_FALSE(event);
+    return event ? ErrorCode::internal : event.error().code;
+  }
+
+  Room room;
+  AuthorId ada, ben, viewer, cy;
+  std::map<AuthorId, std::vector<Cut>> cuts;
+};
+
+TEST(CarriedOver, AHandThatJoinsAnewIsHeldAsItWas) {
+  Held all;
+  const Supervision word{.stopped = true, .force_limit = 300, .words = "wait"};
+  all.decide(all.ben, word);
+  const RoomSeq before = all.room.room_seq();
+  const AuthorId again = all.again(kBen, Role::trainee);
+  EXPECT_EQ(all.room.room_seq().value, before.value + 2) << "the join, and what holds";
+  EXPECT_EQ(all.room.people().supervised(again).supervision, word);
+  EXPECT_EQ(all.room.people().supervised(again).by, all.ada) << "it is hers all the same";
+  EXPECT_EQ(all.cut(again).rejection, Rejection::frozen);
+  // Another role is no way out; nor is a third start.
+  const AuthorId third = all.again(kBen, Role::collaborator);
+  EXPECT_EQ(all.cut(third).rejection, Rejection::frozen);
+  all.decide(third, {});
+  EXPECT_TRUE(all.cut(all.again(kBen, Role::trainee)).committed()) << "what counts is the newest hand";
+}
+
+TEST(CarriedOver, OnlyToTheSamePersonsHand) {
+  Held all;
+  all.decide(all.ben, {.stopped = true});
+  const RoomSeq before = all.room.room_seq();
+  (void)all.room.join(MemberKind::watcher, kBen, kSecret, Role::trainee);
+  EXPECT_TRUE(all.cut(all.again(kCy, Role::collaborator)).committed());
+  EXPECT_TRUE(all.cut(all.again(0, Role::trainee)).committed()) << "nobody knows who that is";
+  // A hand of the server itself, which shows something, is nobody's that comes back.
+  EXPECT_EQ(all.room.people().supervised(all.room.join(MemberKind::surgeon, kBen, {}, Role::collaborator)).place, RoomSeq{});
+  EXPECT_EQ(all.room.room_seq().value, before.value + 6) << "four joins, two cuts and nothing else";
+  // Nor do those whom nobody knows hold each other.
+  all.decide(all.again(0, Role::trainee), {.stopped = true});
+  EXPECT_TRUE(all.cut(all.again(0, Role::trainee)).committed());
+}
+
+// The program was started again while the word was on its way.
+TEST(CarriedOver, AWordAboutAnOlderHandHoldsForTheNewestToo) {
+  Held all;
+  const AuthorId again = all.again(kBen, Role::trainee);
+  all.decide(all.ben, {.stopped = true});
+  EXPECT_EQ(all.cut(again).rejection, Rejection::frozen);
+  // But not where something else was decided about the newer.
+  all.decide(again, {.force_limit = 100});
+  all.decide(all.ben, {});
+  EXPECT_EQ(all.room.people().supervised(again).supervision, (Supervision{.force_limit = 100}));
+  // Without roles anybody may be called the same: only who is named is meant.
+  Room plain(test_block());
+  const AuthorId one = plain.join(MemberKind::surgeon, kBen, kSecret), other = plain.join(MemberKind::surgeon, kBen, kSecret);
+  ASSERT_TRUE(plain.supervise(other, one, {.stopped = true}));
+  EXPECT_TRUE(plain.people().supervised(other).supervision.may_cut());
+}
+
+TEST(CarriedOver, ItsRowsReplay) {
+  Held all;
+  all.decide(all.ben, {.stopped = true, .zone = ZoneLimit{{1, 2, 3}, 4}});
+  (void)all.again(kBen, Role::trainee);
+  all.decide(all.ben, {});
+  Room replayed(test_block());
+  for (const RoomRow& row : all.room.take_rows()) {
+    const Result<RoomRow> read = row_from_bytes(row.place, row.at, to_bytes(row));
+    ASSERT_TRUE(read) << read.error().message;
+    ASSERT_TRUE(replayed.replay(*read));
+  }
+  EXPECT_EQ(replayed.room_hash(), all.room.room_hash());
+}
+
+// A journal of a server that did not carry anything over: its rows decide.
+TEST(CarriedOver, NothingInAReplay) {
+  Held all;
+  all.decide(all.ben, {.stopped = true});
+  Room replayed(test_block());
+  for (const RoomRow& row : all.room.take_rows()) ASSERT_TRUE(replayed.replay(row));
+  const AuthorId next{replayed.authors() + 1};
+  ASSERT_TRUE(replayed.replay({RoomSeq{replayed.room_seq().value + 1}, replayed.time(), next,
+                               JoinRow{next, MemberKind::surgeon, kBen, kSecret, Role::trainee}}));
+  EXPECT_EQ(replayed.people().supervised(next).place, RoomSeq{});
+  Cut cut = strokes(next, 1, 5).front();
+  ASSERT_TRUE(replayed.replay({RoomSeq{replayed.room_seq().value + 1}, replayed.time(), next, CutRow{cut}}));
+}
+
+SceneItem guide() {
+  SceneItem item;
+  item.tool = tool_named("guide-1").hash();
+  item.pose_bone_item = pose_along({1, 2, 0}, {0, 0, -1});
+  return item;
+}
+
+// All but cutting: from the hand, and from the person's viewer.
+TEST(Held, TakesNothingBackAndPlacesNothing) {
+  for (const bool taken : {false, true}) {
+    Held all;
+    for (int i = 0; i < 4; ++i) ASSERT_TRUE(all.cut(all.ben).committed());
+    ASSERT_TRUE(all.room.undo_last(all.ben, 1, {}));
+    const auto placed = all.room.set_item(all.ben, guide());
+    ASSERT_TRUE(placed) << placed.error().message;
+    all.decide(all.ben, taken ? Supervision{.taken_by = all.cy} : Supervision{.stopped = true});
+    const RoomSeq place = all.room.room_seq();
+    const Digest bone = all.room.field_hash();
+    const RoomSeq first[] = {RoomSeq{5}};
+    for (const AuthorId by : {all.ben, all.viewer}) {
+      EXPECT_EQ(all.refused(all.room.redo_last(by, 1)), ErrorCode::denied);
+      EXPECT_EQ(all.refused(all.room.undo(by, first)), ErrorCode::denied);
+      EXPECT_EQ(all.refused(all.room.undo_last(by, 1, {})), ErrorCode::denied);
+      EXPECT_EQ(all.refused(all.room.undo_to(by, RoomSeq{4})), ErrorCode::denied);
+      EXPECT_EQ(all.refused(all.room.undo_since(by, 0s)), ErrorCode::denied);
+      EXPECT_EQ(all.refused(all.room.set_item(by, guide())), ErrorCode::denied);
+      EXPECT_EQ(all.refused(all.room.remove_item(by, placed->item)), ErrorCode::denied);
+      EXPECT_EQ(all.refused(all.room.remove_body(by, BodyId{0})), ErrorCode::denied);
+    }
+    EXPECT_EQ(all.room.room_seq(), place);
+    EXPECT_EQ(all.room.field_hash(), bone);
+    EXPECT_TRUE(all.room.say(all.ben, {}, "why?")) << "to speak is no work on the bone";
+    all.decide(all.ben, {});
+    EXPECT_TRUE(all.room.redo_last(all.ben, 1));
+    EXPECT_TRUE(all.room.remove_item(all.ben, placed->item));
+  }
+}
+
+// It took back what the instructor has then forbidden; and it does again what somebody else took back.
+TEST(Held, DoesNothingAgainThatItMayNotCut) {
+  Held all;
+  ASSERT_TRUE(all.cut(all.ben).committed());  // the burr's
+  const RoomSeq drilled = all.cut(all.ben).room_seq;
+  ASSERT_TRUE(all.room.undo_last(all.ben, 1, {}));
+  const Digest bone = all.room.field_hash();
+  all.decide(all.ben, {.tools = {tool_named("burr-round-5").hash()}});
+  const Result<RoomEvent> denied = all.room.redo_last(all.ben, 1);
+  EXPECT_EQ(all.refused(denied), ErrorCode::denied);
+  EXPECT_NE(denied.error().message.find("event " + std::to_string(drilled.value)), std::string::npos) << denied.error().message;
+  EXPECT_EQ(all.refused(all.room.redo_last(all.cy, 1)), ErrorCode::denied) << "nor does a friend, for it";
+  EXPECT_EQ(all.room.field_hash(), bone);
+  all.decide(all.ben, {.tools = {tool_named("drill-3.2").hash()}});
+  EXPECT_TRUE(all.room.redo_last(all.ben, 1));
+
+  ASSERT_TRUE(all.room.undo_last(all.cy, 1, {}));
+  const auto at = all.cuts.at(all.ben)[1].path.front().position;
+  all.decide(all.cy, {.zone = ZoneLimit{at, 1}});
+  EXPECT_EQ(all.refused(all.room.redo_last(all.cy, 1)), ErrorCode::denied) << "another's cut, out of its zone";
+  all.decide(all.cy, {.zone = ZoneLimit{at, 1 << 20}});
+  EXPECT_TRUE(all.room.redo_last(all.cy, 1));
+
+  // Who oversees them does again what they like.
+  ASSERT_TRUE(all.room.undo_last(all.ada, 2, {}));
+  all.decide(all.ben, {.stopped = true});
+  EXPECT_TRUE(all.room.redo_last(all.ada, 1));
+}
+
+// Such a cut is in no body's history.
+TEST(Held, ACutThatMetNoBoneIsJudgedToo) {
+  Held all;
+  for (Cut& cut : all.cuts.at(all.ben))
+    for (QuantisedPose& knot : cut.path) knot.position[2] += static_cast<std::int32_t>(20.0 / kQuantum_mm);
+  ASSERT_TRUE(all.cut(all.ben).committed());
+  ASSERT_EQ(all.room.field_hash(), Room(test_block()).field_hash());
+  ASSERT_TRUE(all.room.undo_last(all.ben, 1, {}));
+  all.decide(all.ben, {.tools = {tool_named("drill-3.2").hash()}});
+  EXPECT_EQ(all.refused(all.room.redo_last(all.ben, 1)), ErrorCode::denied);
+}
+
+// No hand has a command for it: they take back at their viewer what their hand did, also before it came again.
+TEST(TakeBackByPerson, AtAnyOfTheirPrograms) {
+  Held all;
+  const RoomSeq own = all.cut(all.ben).room_seq, others = all.cut(all.cy).room_seq;
+  const AuthorId again = all.again(kBen, Role::trainee);
+  const RoomSeq named[] = {own}, foreign[] = {others};
+  EXPECT_EQ(all.refused(all.room.undo(all.viewer, foreign)), ErrorCode::denied);
+  for (const AuthorId by : {all.viewer, again}) {
+    const auto undone = all.room.undo_last(by, 1, {});
+    ASSERT_TRUE(undone) << undone.error().message;
+    EXPECT_EQ(undone->places, std::vector{own}) << "the newest of all is another's";
+    ASSERT_TRUE(all.room.redo_last(all.viewer, 1)) << "whoever of them took it back";
+    ASSERT_TRUE(all.room.undo(by, named));
+    ASSERT_TRUE(all.room.redo_last(all.ben, 1));
+  }
+  ASSERT_TRUE(all.cut(again).committed());
+  const auto older = all.room.undo_last(all.cy, 1, all.ben);
+  ASSERT_TRUE(older) << older.error().message;
+  EXPECT_EQ(older->places, std::vector{own}) << "of that author alone";
+  EXPECT_EQ(all.refused(all.room.redo_last(all.viewer, 1)), ErrorCode::denied) << "another's undo";
+  // Whom nobody knows has only their own number.
+  const AuthorId nobody = all.again(0, Role::trainee), stranger = all.room.join(MemberKind::watcher, 0, kSecret, Role::trainee);
+  const RoomSeq cut[] = {all.cut(nobody).room_seq};
+  EXPECT_EQ(all.refused(all.room.undo(stranger, cut)), ErrorCode::denied);
+  EXPECT_TRUE(all.room.undo(nobody, cut));
+}
+
+// Keeps the places that a session is told.
+class Placed final : public SessionSink {
+ public:
+  explicit Placed(AuthorId author) : author_(author) {}
+  AuthorId author() const override { return author_; }
+  void begin(RoomSeq, MessageParts, Bytes) override {}
+  void set_leaves(std::vector<FieldLeaf>) override {}
+  void offer(RoomSeq place, const Bytes&) override { places.push_back(place.value); }
+  void offer(RoomSeq place, const Bytes&, const wire::SessionRow& fast) override {
+    places.push_back(place.value);
+    if (fast.kind == wire::SessionRowKind::supervised) told.push_back(fast.supervision);
+  }
+  void hold(const wire::SessionRow& supervised) override { held = supervised.supervision; }
+  void answer(const Bytes&) override {}
+  void refuse(const Error& why) override { ADD_FAILURE() << why.message; }
+  void decided() override {}
+  void end(const std::string&) override {}
+  std::size_t waiting() const override { return 0; }
+
+  std::vector<std::uint64_t> places;
+  std::vector<Supervision> told;
+  std::optional<Supervision> held;
+
+ private:
+  const AuthorId author_;
+};
+
+struct HeldHost {
+  explicit HeldHost(RoomHost& of) : host(of) {}
+  AuthorId join(MemberKind kind, const std::string& name, Role role) {
+    std::optional<AuthorId> author;
+    host.join(kind, name, kSecret, role, [&](const Result<AuthorId>& given) { author = given.value(); });
+    host.tick(now += 8ms);
+    return author.value();
+  }
+  void supervise(AuthorId by, AuthorId subject, const Supervision& word) {
+    host.queue_event([=](Room& room) { return room.supervise(by, subject, word); },
+                     [](const Result<RoomEvent>& decided) { EXPECT_TRUE(decided); });
+    host.tick(now += 8ms);
+  }
+  std::shared_ptr<Placed> session(AuthorId author) {
+    auto sink = std::make_shared<Placed>(author);
+    EXPECT_TRUE(host.open_session(sink, kSecret));
+    sinks.push_back(sink);  // the host's until it goes
+    return sink;
+  }
+  RoomHost& host;
+  std::chrono::nanoseconds now{};
+  std::vector<std::shared_ptr<Placed>> sinks;
+};
+
+constexpr HostRates kDriven{.tick = 0ns, .mesh = 1s, .pieces = 0ns};
+
+void expect_held(HeldHost& lesson) {
+  const AuthorId ada = lesson.join(MemberKind::watcher, "Ada", Role::instructor);
+  const AuthorId ben = lesson.join(MemberKind::surgeon, "Ben", Role::trainee);
+  const AuthorId cy = lesson.join(MemberKind::surgeon, "Cy", Role::trainee);
+  const auto session = lesson.session(cy);
+  const Supervision word{.stopped = true, .words = "wait"};
+  lesson.supervise(ada, ben, word);
+  const AuthorId again = lesson.join(MemberKind::surgeon, "Ben", Role::trainee);
+  EXPECT_EQ(lesson.session(again)->held, word);
+  EXPECT_EQ(lesson.session(lesson.join(MemberKind::surgeon, "Dora", Role::trainee))->held, std::nullopt);
+  // Who is there misses no place of the order.
+  ASSERT_FALSE(session->places.empty());
+  EXPECT_EQ(session->places.back(), lesson.host.room_seq().value);
+  for (std::size_t i = 1; i < session->places.size(); ++i) EXPECT_EQ(session->places[i], session->places[i - 1] + 1);
+  // And the board of people shows it.
+  PeopleCursor cursor;
+  v1::WatchPeopleResponse news;
+  ASSERT_TRUE(news.ParseFromString(*lesson.host.people().news(cursor, ada, {})));
+  const auto person = std::ranges::find(news.people(), again.value, &v1::Person::author);
+  ASSERT_NE(person, news.people().end());
+  EXPECT_TRUE(person->supervision().stopped());
+  // A word that was on its way while its hand was started again.
+  const AuthorId third = lesson.join(MemberKind::surgeon, "Ben", Role::trainee);
+  const auto own = lesson.session(third);
+  lesson.supervise(ada, again, {});
+  ASSERT_EQ(own->told.size(), 1u);
+  EXPECT_EQ(own->told.front(), Supervision{});
+  EXPECT_EQ(session->places.back(), lesson.host.room_seq().value);
+}
+
+TEST(CarriedOver, IsToldByAHostThatKeepsNothing) {
+  RoomHost host(Room(test_block()), kDriven, {});
+  HeldHost lesson(host);
+  expect_held(lesson);
+  host.stop();
+}
+
+TEST(CarriedOver, IsToldByAHostWithAJournal) {
+  const test::TempDir folder;
+  KeptRoom kept = RoomKeeper::open(folder / "room.journal", test_block(), RoomKeeper::Options{}).value();
+  RoomHost host(std::move(kept.room), kDriven, {}, Detail::automatic, kept.keeper.get());
+  HeldHost lesson(host);
+  expect_held(lesson);
+  host.stop();
+  ASSERT_TRUE(kept.keeper->close());
+}
+
+}  // namespace
+}  // namespace osteon
