@@ -33,7 +33,16 @@ struct CallRow {
 [[nodiscard]] bool may_call(Role role, std::string_view method);
 
 // What a session's packets carry, up and down: proto/osteon/v1/link.proto.
-enum class DatagramContent : std::uint8_t { cuts, tool_state, bone_push, acknowledgements, committed_cuts, partners, supervision, bone_seen };
+enum class DatagramContent : std::uint8_t {
+  cuts,
+  tool_state,
+  bone_push,
+  acknowledgements,  // what became of the client's own cuts
+  committed_cuts,    // of others
+  partners,          // others' tools
+  supervision,       // what was decided about the client
+  bone_seen,
+};
 inline constexpr int kDatagrams = 8;
 // As sender of what goes up, as hearer of what comes down.
 [[nodiscard]] bool may_carry(Role role, DatagramContent kind);

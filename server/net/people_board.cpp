@@ -156,7 +156,7 @@ Bytes PeopleBoard::news(PeopleCursor& cursor, AuthorId reader, const PeopleRight
 
   v1::WatchPeopleResponse out;
   for (const auto& [author, entry] : people_) {
-    if (entry.revision <= cursor.revision || (entry.streams == 0 && entry.last_here < least)) continue;
+    if (!rights.people || entry.revision <= cursor.revision || (entry.streams == 0 && entry.last_here < least)) continue;
     v1::Person& person = *out.add_people();
     person.set_author(author.value);
     person.set_name(entry.name);
@@ -165,7 +165,7 @@ Bytes PeopleBoard::news(PeopleCursor& cursor, AuthorId reader, const PeopleRight
     person.set_hand(entry.hand);
     person.set_session_cuts(entry.cuts);
     if (entry.look) *person.mutable_look() = wire::to_wire(*entry.look);
-    if (!rights.others_supervision && author != reader) continue;
+    if (!(author == reader ? rights.own_supervision : rights.others_supervision)) continue;
     if (entry.decided) *person.mutable_supervision() = wire::to_wire(entry.supervision);
     person.set_decided_room_seq(entry.decided.value);
     person.set_heard_room_seq(entry.heard.value);
@@ -173,13 +173,13 @@ Bytes PeopleBoard::news(PeopleCursor& cursor, AuthorId reader, const PeopleRight
   std::set<std::uint32_t> drawn;
   for (const auto& [id, one] : annotations_) {
     drawn.insert(id);
-    if (one.revision > cursor.revision) *out.add_annotations() = wire::to_wire(one.annotation);
+    if (rights.drawings && one.revision > cursor.revision) *out.add_annotations() = wire::to_wire(one.annotation);
   }
   for (const std::uint32_t known : cursor.annotations)
-    if (!drawn.contains(known)) out.add_wiped(known);
+    if (rights.drawings && !drawn.contains(known)) out.add_wiped(known);
   for (const Said& said : words_) {
     const bool own = !said.to || said.to == reader || said.from == reader;
-    if (said.number <= cursor.words || (!own && !rights.others_words)) continue;
+    if (said.number <= cursor.words || !(own ? rights.own_words : rights.others_words)) continue;
     v1::Words& words = *out.add_words();
     words.set_room_seq(said.place.value);
     words.set_from(said.from.value);

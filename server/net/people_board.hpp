@@ -32,9 +32,9 @@ struct PeopleCursor {
   bool begun = false;
 };
 
-// What a reader may be told beside what concerns themselves.
+// What a reader may be told.
 struct PeopleRights {
-  bool others_supervision = true, others_words = true;
+  bool people = true, drawings = true, own_supervision = true, others_supervision = true, own_words = true, others_words = true;
 };
 
 // Any thread. Lock order: that of the streams, then a stream's own, then that of the people.

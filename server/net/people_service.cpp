@@ -30,7 +30,11 @@ class PeopleStream final : public OutStream<WriteReactor>, public PeopleSink {
 
  private:
   bool take(ByteBuffer& message) override {
-    const PeopleRights rights{.others_supervision = may_receive(StreamContent::others_supervision),
+    const PeopleRights rights{.people = may_receive(StreamContent::people),
+                              .drawings = may_receive(StreamContent::scene),
+                              .own_supervision = may_receive(StreamContent::own_supervision),
+                              .others_supervision = may_receive(StreamContent::others_supervision),
+                              .own_words = may_receive(StreamContent::own_words),
                               .others_words = may_receive(StreamContent::others_words)};
     const Bytes news = room_->host().people().news(cursor_, author_, rights);
     if (news) message = buffer_of({news});

@@ -2,6 +2,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <mutex>
 #include <optional>
@@ -44,7 +45,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
       link_ = links_->add(author_, decided + 1, *this);
       before.insert(before.begin(), link_row(link_->keys(), links_->port()));
     }
-    for (Bytes& row : before) row = in_its_version(row);
+    for (Bytes& row : before) row = in_its_version(row_for_role(RoomSeq{}, row));
     std::erase(before, nullptr);
     const std::lock_guard lock(mutex_);
     taken_ = decided;
@@ -52,18 +53,19 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     pump();
   }
   void set_leaves(std::vector<FieldLeaf> leaves) override {
+    if (!may_receive(StreamContent::field)) leaves.clear();
     const std::lock_guard lock(mutex_);
     outbox_.set_leaves(std::move(leaves));
     pump();
   }
   void offer(RoomSeq place, const Bytes& any) override {
-    const Bytes row = in_its_version(any);
+    const Bytes row = in_its_version(row_for_role(place, any));
     const std::lock_guard lock(mutex_);
     if (row && !closing()) send_or_give_up(outbox_.add(place, row));
   }
   // [committing thread]
   void offer(RoomSeq place, const Bytes& any, const wire::SessionRow& fast) override {
-    const Bytes row = in_its_version(any);
+    const Bytes row = in_its_version(row_for_role(place, any));
     if (!row) return;
     std::uint64_t index = 0;
     {
@@ -74,22 +76,24 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
       if (outbox_.index() > before) index = outbox_.index();
     }
     // Beside the stream, which carries all.
-    if (link_) link_->tell(index, row == any ? fast : wire::SessionRow{.room_seq = place, .kind = wire::SessionRowKind::streamed});
+    const bool goes = row == any && may_carry(content_of(fast));
+    if (link_) link_->tell(index, goes ? fast : wire::SessionRow{.room_seq = place, .kind = wire::SessionRowKind::streamed});
   }
   void hold(const wire::SessionRow& supervised) override {
-    if (link_) link_->tell(0, supervised);
+    if (link_ && may_carry(DatagramContent::supervision)) link_->tell(0, supervised);
   }
   bool show_partners(const std::vector<CuttingState>& states) override {
     std::vector<CuttingState> others;
     std::ranges::copy_if(states, std::back_inserter(others), [&](const CuttingState& state) { return state.author != author_; });
-    const bool by_link = link_ && link_->set_partners(others);
+    const bool by_link = link_ && may_carry(DatagramContent::partners) && link_->set_partners(others);
     const std::lock_guard lock(mutex_);
-    if (closing()) return false;
+    if (closing() || !may_receive(StreamContent::tool_states)) return false;
     partners_.offer(others, !by_link);
     pump();
     return partners_.waits();
   }
   void show_bone(const BoneSeen& seen) override {
+    if (!may_carry(DatagramContent::bone_seen)) return;
     const bool by_link = link_ && link_->set_bone(seen);
     const std::lock_guard lock(mutex_);
     const auto now = PartnerOutbox::Clock::now();
@@ -235,8 +239,38 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     read_on();
   }
 
-  // A row as this client's version of the protocol has it; null where it has none.
+  // A row that is streamed is told of without what it says.
+  [[nodiscard]] DatagramContent content_of(const wire::SessionRow& row) const {
+    if (row.kind == wire::SessionRowKind::supervised) return DatagramContent::supervision;
+    const bool others = row.kind == wire::SessionRowKind::committed && row.cut.author != author_;
+    return others ? DatagramContent::committed_cuts : DatagramContent::acknowledgements;
+  }
+
+  // What a row of the order tells, of what not every role is told.
+  [[nodiscard]] static std::optional<StreamContent> content_of(const v1::SessionResponse& row) {
+    switch (row.message_case()) {
+      case v1::SessionResponse::kLeaf:
+      case v1::SessionResponse::kCommitted:
+      case v1::SessionResponse::kChange: return StreamContent::field;
+      case v1::SessionResponse::kScene: return StreamContent::scene;
+      case v1::SessionResponse::kSupervised: return StreamContent::own_supervision;
+      case v1::SessionResponse::kSaid: return StreamContent::own_words;
+      default: return {};
+    }
+  }
+  // A row as the reader may be told it: without what is not for them it says only that there was something.
+  [[nodiscard]] Bytes row_for_role(RoomSeq place, const Bytes& row) const {
+    constexpr std::array kAll{StreamContent::field, StreamContent::scene, StreamContent::own_supervision, StreamContent::own_words};
+    if (std::ranges::all_of(kAll, [&](StreamContent content) { return may_receive(content); })) return row;
+    v1::SessionResponse said;
+    (void)said.ParseFromString(*row);
+    const std::optional<StreamContent> content = content_of(said);
+    if (!content || may_receive(*content)) return row;
+    return place ? noted_row(place, {}) : nullptr;
+  }
+  // The same as this client's version of the protocol has it; null where it has none.
   [[nodiscard]] Bytes in_its_version(const Bytes& row) const {
+    if (!row) return nullptr;
     if (version_ == wire::kProtocolVersion) return row;
     v1::SessionResponse said;
     (void)said.ParseFromString(*row);

@@ -23,10 +23,10 @@ void StateBoard::watch(CuttingSink& sink) {
   const std::lock_guard lock(streams_mutex_);
   Stream& stream = streams_.emplace_back(Stream{&sink, Pace(sink.apart(), streams_.size())});
   std::unique_lock states_lock(states_mutex_);
-  const Bytes message = newest_;
+  const ShownNow shown = newest_;
   const std::uint64_t number = number_;
   states_lock.unlock();
-  if (message) offer(stream, number, message, Clock::now());
+  if (number > 0) offer(stream, number, shown, Clock::now());
   if (ended_) sink.end(*ended_);
 }
 
@@ -77,7 +77,7 @@ void StateBoard::show(const std::vector<SceneItem>& items, const std::vector<Bod
   for (const SceneItem& item : items) *scene.add_items() = wire::to_wire(item);
   for (const BodyId body : bodies) scene.add_bodies(body.value);
   const std::lock_guard lock(states_mutex_);
-  scene_ = scene.SerializeAsString();
+  scene_ = serialised(scene);
   changed_ = true;
 }
 
@@ -89,8 +89,7 @@ void StateBoard::publish(RoomSeq room_seq) {
     v1::WatchCuttingResponse response;
     response.set_room_seq(room_seq.value);
     for (const auto& [author, shown] : states_) *response.add_states() = wire::to_wire(shown.state);
-    // Two messages of one kind behind each other are one message with the fields of both.
-    newest_ = std::make_shared<const std::string>(response.SerializeAsString() + scene_);
+    newest_ = {serialised(response), scene_};
     ++number_;
     due_ = true;
   }
@@ -121,14 +120,14 @@ void StateBoard::run() {
 void StateBoard::tell(Clock::time_point now) {
   const std::lock_guard lock(streams_mutex_);
   std::unique_lock states_lock(states_mutex_);
-  const Bytes message = newest_;
+  const ShownNow shown = newest_;
   const std::uint64_t number = number_;
   states_lock.unlock();
   bool owed = false;
   for (Stream& stream : streams_) {
     if (stream.told == number) continue;
     if (stream.pace.due(now))
-      offer(stream, number, message, now);
+      offer(stream, number, shown, now);
     else
       owed = true;
   }
@@ -136,10 +135,10 @@ void StateBoard::tell(Clock::time_point now) {
   owed_ = owed;
 }
 
-void StateBoard::offer(Stream& stream, std::uint64_t number, const Bytes& message, Clock::time_point now) {
+void StateBoard::offer(Stream& stream, std::uint64_t number, const ShownNow& shown, Clock::time_point now) {
   stream.told = number;
   stream.pace.done(now);
-  stream.sink->offer(message);
+  stream.sink->offer(shown);
 }
 
 std::vector<Vec3> StateBoard::tool_tips_mm() const {

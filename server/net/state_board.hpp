@@ -20,9 +20,15 @@
 
 namespace osteon {
 
+// A WatchCuttingResponse in two parts, each of which is one by itself.
+struct ShownNow {
+  Bytes tools;  // every tool's state, at the room's place
+  Bytes scene;  // items and bodies
+};
+
 class CuttingSink : public StreamSink {
  public:
-  virtual void offer(const Bytes& message) = 0;  // a whole WatchCuttingResponse; newest wins
+  virtual void offer(const ShownNow& now) = 0;  // newest wins
   // Whose stream it is; null: nobody knows.
   [[nodiscard]] virtual AuthorId author() const { return {}; }
   // It wants them no closer together, on average.
@@ -72,7 +78,7 @@ class StateBoard {
   };
   void run();
   void tell(Clock::time_point now);
-  static void offer(Stream& stream, std::uint64_t number, const Bytes& message, Clock::time_point now);
+  static void offer(Stream& stream, std::uint64_t number, const ShownNow& shown, Clock::time_point now);
 
   mutable std::mutex streams_mutex_;
   std::vector<Stream> streams_;
@@ -81,9 +87,9 @@ class StateBoard {
   mutable std::mutex states_mutex_;
   std::condition_variable wake_;
   std::map<AuthorId, Shown> states_;
-  std::string scene_;         // a serialised WatchCuttingResponse of items and bodies alone
-  Bytes newest_;              // message
-  std::uint64_t number_ = 0;  // of the newest message, from 1
+  Bytes scene_ = std::make_shared<const std::string>();
+  ShownNow newest_;           // nothing before the first
+  std::uint64_t number_ = 0;  // of the newest, from 1
   bool changed_ = false;      // since it was made
   bool due_ = false;          // to be told
   bool owed_ = false;         // someone lacks the newest, who wants it later

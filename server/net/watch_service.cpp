@@ -42,7 +42,7 @@ class MeshStream final : public OutStream<WriteReactor>, public MeshSink {
 
  private:
   bool take(ByteBuffer& message) override {
-    if (!outbox_) return false;
+    if (!outbox_ || !may_receive(StreamContent::surface)) return false;
     const MessageParts parts = outbox_->take();
     if (!parts.empty()) message = buffer_of(parts);
     return !parts.empty();
@@ -61,10 +61,10 @@ class CuttingStream final : public OutStream<WriteReactor>, public CuttingSink {
   AuthorId author() const override { return author_; }
 
   std::chrono::nanoseconds apart() const override { return apart_; }
-  void offer(const Bytes& message) override {
+  void offer(const ShownNow& now) override {
     const std::lock_guard lock(mutex_);
     if (closing()) return;
-    waiting_ = message;
+    waiting_ = now;
     pump();
   }
   void end(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
@@ -76,15 +76,20 @@ class CuttingStream final : public OutStream<WriteReactor>, public CuttingSink {
  private:
   bool take(ByteBuffer& message) override {
     if (!waiting_) return false;
-    message = buffer_of({std::exchange(waiting_, nullptr)});
-    return true;
+    // Two messages of one kind behind each other are one message with the fields of both.
+    MessageParts parts;
+    if (may_receive(StreamContent::tool_states)) parts.push_back(waiting_->tools);
+    if (may_receive(StreamContent::scene)) parts.push_back(waiting_->scene);
+    waiting_.reset();
+    if (!parts.empty()) message = buffer_of(parts);
+    return !parts.empty();
   }
   void leave() override { room_->host().leave(*this); }
 
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
   const AuthorId author_;
   const std::chrono::nanoseconds apart_;
-  Bytes waiting_;
+  std::optional<ShownNow> waiting_;
 };
 
 using WatchBase = v1::WatchService::WithRawCallbackMethod_WatchMesh<v1::WatchService::WithRawCallbackMethod_WatchCutting<

@@ -63,13 +63,13 @@ TEST(Pace, ManyThatBeginTogetherTakeTurns) {
 class SlowSink final : public CuttingSink {
  public:
   explicit SlowSink(std::chrono::nanoseconds apart = {}) : apart_(apart) {}
-  void offer(const Bytes& message) override {
+  void offer(const ShownNow& now) override {
     std::unique_lock lock(mutex_);
     inside_ = true;
     opened_.wait(lock, [&] { return open_; });
     inside_ = false;
     ++messages_;
-    newest_ = message;
+    newest_ = now.tools;
   }
   std::chrono::nanoseconds apart() const override { return apart_; }
   void end(const std::string&) override {}
