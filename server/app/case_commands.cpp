@@ -11,28 +11,21 @@
 #include <system_error>
 
 #include "common/runtime/progress.hpp"
-#include "common/wire/door.hpp"
+#include "server/app/asking.hpp"
 #include "server/intake/case_archive.hpp"
 #include "server/intake/case_check.hpp"
-#include "server/net/rooms_client.hpp"
 
 namespace osteon {
 namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
-  std::string server;
-  wire::DoorArguments door;
-  fs::path from;
-};
-
 void print(const RoomsClient::CaseLine& one) {
   std::printf("%s  %8.1f MB  [%s]%s\n", to_hex(one.hash).c_str(), static_cast<double>(one.bytes) / 1e6, one.title.c_str(),
               one.known ? "  was here before" : "");
 }
 
-Result<void> list(RoomsClient& client, const Arguments&) {
+Result<void> list(RoomsClient& client) {
   const auto all = client.cases();
   if (!all) return tl::unexpected(all.error());
   for (const RoomsClient::CaseLine& one : *all) print(one);
@@ -40,8 +33,8 @@ Result<void> list(RoomsClient& client, const Arguments&) {
 }
 
 // A folder is packed first, into a file that is gone afterwards.
-Result<void> upload(RoomsClient& client, const Arguments& given) {
-  fs::path archive = given.from;
+Result<void> upload(RoomsClient& client, const fs::path& from) {
+  fs::path archive = from;
   std::error_code error;
   struct Packed {
     fs::path folder;
@@ -50,12 +43,12 @@ Result<void> upload(RoomsClient& client, const Arguments& given) {
       if (!folder.empty()) fs::remove_all(folder, ignored);
     }
   } packed;
-  if (fs::is_directory(given.from, error)) {
+  if (fs::is_directory(from, error)) {
     std::string place = (fs::temp_directory_path() / "osteon-upload-XXXXXX").string();
     if (::mkdtemp(place.data()) == nullptr) return failure(ErrorCode::internal, "cannot make a folder for the archive in " + place);
     packed.folder = place;
     archive = packed.folder / "case.zip";
-    if (Result<void> done = pack_case(given.from, archive); !done) return done;
+    if (Result<void> done = pack_case(from, archive); !done) return done;
   }
   Progress progress("upload");
   const auto stored = client.upload_case(archive, [&](double fraction) { progress.update(fraction); });
@@ -69,25 +62,11 @@ Result<void> upload(RoomsClient& client, const Arguments& given) {
 void add_case_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
   CLI::App* cases = app.add_subcommand("cases", "The cases of a server that runs: lists them, uploads one");
   cases->require_subcommand(1);
-  const auto given = std::make_shared<Arguments>();  // shared by the commands, of which one is chosen
-  const auto command = [&](const char* name, const char* what, Result<void> (*run)(RoomsClient&, const Arguments&)) {
-    CLI::App* sub = cases->add_subcommand(name, what);
-    sub->add_option("--server", given->server, "HOST:PORT of osteon-server")->required();
-    wire::add_door_options(*sub, given->door);
-    sub->callback([&chosen, given, run] {
-      chosen = [given, run]() -> Result<void> {
-        const Result<wire::Door> door = wire::door_of(given->door);
-        if (!door) return tl::unexpected(door.error());
-        Result<RoomsClient> client = RoomsClient::reach(given->server, std::chrono::seconds(5), {}, *door);
-        if (!client) return tl::unexpected(client.error());
-        return run(*client, *given);
-      };
-    });
-    return sub;
-  };
-  command("list", "Lists them all", list);
-  command("upload", "Sends a case to the server, which looks it through and keeps it", upload)
-      ->add_option("case", given->from, "Folder of a case, as osteon-import writes it, or a zip archive of one")
+  add_asking_command(*cases, "list", "Lists them all", chosen, list);
+  const auto from = std::make_shared<fs::path>();  // shared by the option and by what runs
+  add_asking_command(*cases, "upload", "Sends a case to the server, which looks it through and keeps it", chosen,
+                     [from](RoomsClient& client) { return upload(client, *from); })
+      ->add_option("case", *from, "Folder of a case, as osteon-import writes it, or a zip archive of one")
       ->required();
 }
 

@@ -2,23 +2,21 @@
 
 #include <CLI/CLI.hpp>
 
-#include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <string>
 
-#include "server/net/rooms_client.hpp"
+#include "server/app/asking.hpp"
 
 namespace osteon {
 namespace {
 
 struct Arguments {
-  std::string server, name, new_name, case_hash, file_name;
+  std::string name, new_name, case_hash, file_name;
   std::uint64_t from = 0, to = 0;
   double speed = 1.0;
   bool with_branches = false;
-  wire::DoorArguments door;
 };
 
 void print(const RoomLine& room) {
@@ -82,20 +80,7 @@ void add_room_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
   rooms->require_subcommand(1);
   using Run = Result<void> (*)(RoomsClient&, const Arguments&);
   const auto command = [&](const char* name, const char* what, Run run) {
-    CLI::App* sub = rooms->add_subcommand(name, what);
-    sub->add_option("--server", given->server, "HOST:PORT of osteon-server")->required();
-    wire::add_door_options(*sub, given->door);
-    sub->callback([&chosen, given, run] {
-      chosen = [given, run]() -> Result<void> {
-        // What the server is asked may take long: Ctrl-C ends this program, and the server goes on.
-        const Result<wire::Door> door = wire::door_of(given->door);
-        if (!door) return tl::unexpected(door.error());
-        Result<RoomsClient> client = RoomsClient::reach(given->server, std::chrono::seconds(5), {}, *door);
-        if (!client) return tl::unexpected(client.error());
-        return run(*client, *given);
-      };
-    });
-    return sub;
+    return add_asking_command(*rooms, name, what, chosen, [given, run](RoomsClient& client) { return run(client, *given); });
   };
   const auto of_room = [&](const char* name, const char* what, Run run) {
     CLI::App* sub = command(name, what, run);
