@@ -1,28 +1,28 @@
-// osteon-override [TIMES]: how soon and how gently an instructor's word takes hold of a hand. A real server and a haptic client's
-// own threads with osteon-impair between them, one way 0, 50 and 150 ms late, and with 30 % of the datagrams lost: from the
-// answer to Supervise, which is given when the row is kept, until the 1 kHz loop cuts no more, less the time of the way. And on
-// virtual time what the hand feels of being stopped, taken over, given back, limited, led and undone under, at both kinds of
-// device. Hands, devices and the bad line are simulated. JSON, milliseconds, newtons and millijoules.
+// osteon-override [TIMES | touch]: how soon and how gently an instructor's word takes hold of a hand. A real server and a haptic
+// client's own threads with osteon-impair between them, one way 0, 50 and 150 ms late, and with 30 % of the datagrams lost: from
+// the answer to Supervise, which is given when the row is kept, until the 1 kHz loop cuts no more, less the time of the way. And
+// on virtual time (that alone with `touch`) what the hand feels of being stopped, taken over, given back, limited, led and undone
+// under, at both kinds of device, on bone that stands and on a mount that another user pushes too. Hands, devices and the bad
+// line are simulated. JSON, milliseconds, newtons and millijoules.
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
-#include <optional>
+#include <string_view>
 #include <thread>
 #include <vector>
 
 #include "common/core/check.hpp"
 #include "common/runtime/log.hpp"
 #include "common/wire/convert.hpp"
-#include "haptic_client/app/client.hpp"
 #include "osteon/v1/people.grpc.pb.h"
 #include "tests/integration/bad_network.hpp"
 #include "tests/integration/stage.hpp"
 #include "tests/perf/percentiles.hpp"
+#include "tests/perf/working_hand.hpp"
 #include "tests/support/relay/impair_process.hpp"
 #include "tests/support/scenes/random.hpp"
 #include "tests/support/stability/overseen_hand.hpp"
@@ -44,23 +44,6 @@ struct Line {
 };
 
 std::int64_t now_ns() { return Clock::now().time_since_epoch().count(); }
-
-// A bur to and fro over the block's upper face for about so long, then nobody moves for half of that.
-std::vector<haptic::PlanStep> plan_of(double seconds) {
-  haptic::PlanStep burr;
-  burr.action = haptic::Action::burr;
-  burr.tool = "burr-round-5";
-  burr.entry.point_mm = Vec3(0, 0, 0);
-  burr.entry.axis = Vec3(0, 0, -1);
-  burr.sweep_mm_per_s = 15;
-  burr.window_u_mm = 20;
-  burr.window_v_mm = 10;
-  burr.depth_mm = std::max(0.5, seconds / 20.0);
-  haptic::PlanStep rest;
-  rest.action = haptic::Action::wait;
-  rest.seconds = 0.5 * seconds;
-  return {burr, rest};
-}
 
 class Instructor {
  public:
@@ -96,21 +79,11 @@ json run_line(const Line& line, int times) {
   options.fast_path = relay.udp();
   options.patience = 20s;
   options.cache = folder / "cache";
-  Result<RoomSession> room = RoomSession::join(options, {});
-  OSTEON_CHECK(room.has_value());
   const auto rest = std::chrono::milliseconds(150 + 2 * line.one_way_ms + (line.loss > 0.0 ? 200 : 0));
-  Result<haptic::ReadyPlan> plan = haptic::make_ready(plan_of(2.4e-3 * static_cast<double>(rest.count()) * times), room->bone());
-  OSTEON_CHECK(plan.has_value());
-  haptic::SimulatedSession session(std::move(*plan), {}, 0.0);
-  const StopSignal stop;
-  std::optional<Result<haptic::ClientOutcome>> outcome;
-  std::atomic<bool> over{false};
-  std::thread client([&] {
-    outcome = haptic::run_client(*room, session, {}, stop);
-    over = true;
-  });
+  const double seconds = 2.4e-3 * static_cast<double>(rest.count()) * times;
+  WorkingHand client(options, burr_then_rest(seconds, 0.0, 0.5 * seconds));
   // Joined on a good line, as one joins before the operation.
-  while (!over && !room->fast_path().alive) std::this_thread::sleep_for(20ms);
+  while (!client.over() && !client.room().fast_path().alive) std::this_thread::sleep_for(20ms);
   if (line.one_way_ms > 0) OSTEON_CHECK(relay.command("delay " + std::to_string(line.one_way_ms) + " 0") == "ok");
   if (line.loss > 0.0) OSTEON_CHECK(relay.command("loss " + std::to_string(line.loss)) == "ok");
   std::this_thread::sleep_for(2s);
@@ -121,9 +94,9 @@ json run_line(const Line& line, int times) {
   };
   std::vector<Word> words;
   Random random(3);
-  const AuthorId hand = room->room().author;
+  const AuthorId hand = client.room().room().author;
   const auto pause = [&] { std::this_thread::sleep_for(rest + std::chrono::microseconds(random.index(17'000))); };
-  for (int i = 0; i < times && !over; ++i) {
+  for (int i = 0; i < times && !client.over(); ++i) {
     Supervision stopped;
     stopped.stopped = true;
     const std::int64_t asked_ns = now_ns();
@@ -133,10 +106,8 @@ json run_line(const Line& line, int times) {
     instructor.decide(hand, {});
     pause();
   }
-  const FastPathHealth path = room->fast_path();
-  client.join();
-  OSTEON_CHECK(outcome.has_value() && outcome->has_value());
-  const haptic::ClientOutcome& done = **outcome;
+  const FastPathHealth path = client.room().fast_path();
+  const haptic::ClientOutcome& done = client.outcome();
   (void)stage.server().terminate(20s);
 
   std::vector<double> after_answer, after_asking;
@@ -201,6 +172,11 @@ Crossed run_touch(const OverseenRun& run, std::uint64_t seed, int seconds) {
       }
       hand.decide(now);
     }
+    // The other user on a bone that yields pushes as suddenly as a push can be told, on either side of it, and lets go.
+    if (run.mount && i % 700 == 350) {
+      const Vec3 push_n = random.unit() < 0.3 ? Vec3(Vec3::Zero()) : random.in_cube(15.0);
+      hand.other = Load::at(push_n, random.in_cube(8.0));
+    }
     // Of the leading hand now and then a state comes, one in three is lost, and sometimes there is silence.
     if (i % 16 == 0 && random.unit() > 0.3 && i % 7000 < 6000)
       hand.guide = {true, ++seq, Vec3(6.0 * std::cos(1.3e-3 * i), 4.0 * std::sin(0.9e-3 * i), 1.0 + 3.0 * std::sin(2.1e-3 * i))};
@@ -209,24 +185,42 @@ Crossed run_touch(const OverseenRun& run, std::uint64_t seed, int seconds) {
   return hand.crossed();
 }
 
-json run_touches(int seconds) {
+json in_contact(const InContact& held) {
+  return {{"stopped", held.stopped}, {"taken", held.taken},     {"given_back", held.given_back}, {"led", held.led},
+          {"let_go", held.let_go},   {"limited", held.limited}, {"undone", held.undone}};
+}
+
+// Each tool at each device over a line of that length: on bone that stands, or that another user pushes too.
+json run_touches(bool mount, int delay_ms, int seconds) {
   Crossed worst;
-  std::int64_t hands = 0;
+  InContact& held = worst.in_contact;
+  std::uint64_t seed = 100 + static_cast<std::uint64_t>(delay_ms);
   for (const char* tool : {"burr-round-5", "drill-3.2"})
-    for (const int delay_ms : {0, 50, 150})
-      for (const bool weak : {false, true}) {
-        const OverseenRun run{.tool = tool, .delay_ms = delay_ms, .weak = weak};
-        const Crossed one = run_touch(run, 100 + static_cast<std::uint64_t>(hands), seconds);
-        worst.step_over_slew = std::max(worst.step_over_slew, one.step_over_slew);
-        worst.worst_mj = std::max(worst.worst_mj, one.worst_mj);
-        worst.led_mj = std::max(worst.led_mj, one.led_mj);
-        worst.touching += one.touching;
-        worst.cutting += one.cutting;
-        ++hands;
-      }
-  return {{"hands", hands},          {"seconds_each", seconds},          {"step_over_slew", rounded(worst.step_over_slew)},
-          {"contact_mj", worst.worst_mj}, {"led_mj", worst.led_mj},      {"budget_mj", kBudget_mj},
-          {"touching_s", 1e-3 * static_cast<double>(worst.touching)}, {"cutting_s", 1e-3 * static_cast<double>(worst.cutting)}};
+    for (const bool weak : {false, true}) {
+      const Crossed one = run_touch({.tool = tool, .delay_ms = delay_ms, .weak = weak, .mount = mount}, seed++, seconds);
+      worst.step_over_slew = std::max(worst.step_over_slew, one.step_over_slew);
+      worst.worst_mj = std::max(worst.worst_mj, one.worst_mj);
+      worst.led_mj = std::max(worst.led_mj, one.led_mj);
+      worst.made_mj = std::max(worst.made_mj, one.made_mj);
+      worst.carried_mm += one.carried_mm;
+      worst.touching += one.touching;
+      worst.cutting += one.cutting;
+      held.stopped += one.in_contact.stopped, held.taken += one.in_contact.taken, held.led += one.in_contact.led;
+      held.given_back += one.in_contact.given_back, held.let_go += one.in_contact.let_go;
+      held.limited += one.in_contact.limited, held.undone += one.in_contact.undone;
+    }
+  return {{"mount", mount},
+          {"one_way_ms", delay_ms},
+          {"step_over_slew", worst.step_over_slew},
+          {"contact_mj", worst.worst_mj},
+          {"led_mj", worst.led_mj},
+          {"budget_mj", kBudget_mj},
+          {"made_mj", worst.made_mj},
+          {"allowance_mj", 2.0 * ShownBoneParams{}.allowance_mj},
+          {"carried_mm", rounded(worst.carried_mm)},
+          {"touching_s", 1e-3 * static_cast<double>(worst.touching)},
+          {"cutting_s", 1e-3 * static_cast<double>(worst.cutting)},
+          {"in_contact", in_contact(held)}};
 }
 
 }  // namespace
@@ -235,11 +229,14 @@ json run_touches(int seconds) {
 int main(int argc, char** argv) {
   using namespace osteon::test;
   osteon::log::open("osteon-override");
-  const int times = argc > 1 ? std::max(4, std::atoi(argv[1])) : 50;
-  nlohmann::json out{{"touch", run_touches(std::max(5, times / 2))}};
+  const bool lines = argc < 2 || std::string_view(argv[1]) != "touch";
+  const int times = argc > 1 && lines ? std::max(4, std::atoi(argv[1])) : 50;
+  nlohmann::json out;
+  for (const bool mount : {false, true})
+    for (const int delay_ms : {0, 50, 150}) out["touch"].push_back(run_touches(mount, delay_ms, std::max(5, times)));
   out["lines"] = nlohmann::json::array();
   for (const Line& line : {Line{0, 0.0}, Line{50, 0.0}, Line{150, 0.0}, Line{0, 0.3}})
-    out["lines"].push_back(run_line(line, times));
+    if (lines) out["lines"].push_back(run_line(line, times));
   std::printf("%s\n", out.dump(1).c_str());
   return 0;
 }

@@ -17,10 +17,10 @@
 
 #include "common/core/check.hpp"
 #include "common/runtime/log.hpp"
-#include "haptic_client/app/client.hpp"
 #include "tests/integration/bad_network.hpp"
 #include "tests/integration/stage.hpp"
 #include "tests/perf/percentiles.hpp"
+#include "tests/perf/working_hand.hpp"
 #include "tests/support/relay/impair_process.hpp"
 
 namespace osteon::test {
@@ -85,24 +85,6 @@ json rates(const std::vector<Sent>& bins) {
           {"busiest_second", rounded(worst)}};
 }
 
-// A bur to and fro over the block's upper face, deeper with each pass, for about so long; then nobody moves.
-std::vector<haptic::PlanStep> plan_of(double seconds) {
-  haptic::PlanStep burr;
-  burr.action = haptic::Action::burr;
-  burr.tool = "burr-round-5";
-  burr.tremor_mm = 0.1;
-  burr.entry.point_mm = Vec3(0, 0, 0);
-  burr.entry.axis = Vec3(0, 0, -1);
-  burr.sweep_mm_per_s = 15;
-  burr.window_u_mm = 20;
-  burr.window_v_mm = 10;
-  burr.depth_mm = std::max(0.5, seconds / 20.0);
-  haptic::PlanStep rest;
-  rest.action = haptic::Action::wait;
-  rest.seconds = kIdle_s;
-  return {burr, rest};
-}
-
 // The journal's files by what they are.
 std::map<std::string, std::uint64_t> journal_bytes(const fs::path& folder) {
   std::map<std::string, std::uint64_t> bytes{{"database", 0}, {"log", 0}, {"checkpoints", 0}};
@@ -131,25 +113,13 @@ json run_tool(const BadNetwork& network, double seconds) {
     options.address = relay->tcp();
     options.fast_path = relay->udp();
   }
-  Result<RoomSession> room = RoomSession::join(options, {});
-  OSTEON_CHECK(room.has_value());
-  Result<haptic::ReadyPlan> plan = haptic::make_ready(plan_of(seconds), room->bone());
-  OSTEON_CHECK(plan.has_value());
-  haptic::SimulatedSession session(std::move(*plan), {}, 0.0);
-  const StopSignal stop;
-
   const std::map<std::string, std::uint64_t> at_first = journal_bytes(folder / "kept");
-  std::optional<Result<haptic::ClientOutcome>> outcome;
-  std::atomic<bool> over{false};
-  std::thread client([&] {
-    outcome = haptic::run_client(*room, session, {}, stop);
-    over = true;
-  });
+  WorkingHand client(options, burr_then_rest(seconds, 0.1, kIdle_s));
   std::vector<Sample> samples;
   bool impaired = network.impairment.empty();
   std::uint64_t log_bytes = 0;
-  for (auto next = Clock::now(); !over; std::this_thread::sleep_until(next += kBin)) {
-    const FastPathHealth path = room->fast_path();
+  for (auto next = Clock::now(); !client.over(); std::this_thread::sleep_until(next += kBin)) {
+    const FastPathHealth path = client.room().fast_path();
     // Joined on a good network, as one joins before the operation.
     if (!impaired && path.alive) {
       for (const std::string& command : network.impairment) OSTEON_CHECK(relay->command(command) == "ok");
@@ -158,9 +128,7 @@ json run_tool(const BadNetwork& network, double seconds) {
     samples.push_back({Clock::now(), {path.bytes_sent + path.packets_sent * kDatagramHeader, sent_over_tcp()}});
     log_bytes = std::max(log_bytes, journal_bytes(folder / "kept").at("log"));
   }
-  client.join();
-  OSTEON_CHECK(outcome.has_value() && outcome->has_value());
-  const haptic::ClientOutcome& done = **outcome;
+  const haptic::ClientOutcome& done = client.outcome();
   (void)stage.server().terminate(20s);
   const std::map<std::string, std::uint64_t> at_last = journal_bytes(folder / "kept");
 

@@ -403,16 +403,26 @@ FIGURES = [
     Figure("freeze_missing", "count", "words that stopped no hand before the next, on all these lines", "override", ("==", 0),
            full=True),
     Figure("override_force_step", "ratio", "largest growth of force in a tick that the hand did not cause, of hands that are "
-           "stopped, taken over, given back, limited, led and undone under, over the slew limit", "override", ("<=", 1.0), full=True),
+           "stopped, taken over, given back, limited, led and undone under at 0, 50 and 150 ms, on bone that stands and on a mount, "
+           "over the slew limit", "override", ("<=", 1.000001), baseline="on the mount", full=True),
     Figure("override_energy", "ratio", "most that one contact, or the pull of a leading hand, gave such a hand beyond what it "
-           "got, as a part of 0.01 mJ", "override", ("<=", 1.0), full=True),
+           "got, as a part of 0.01 mJ", "override", ("<=", 1.0), baseline="on the mount", full=True),
+    Figure("override_mount_made", "ratio", "most that a bone on its mount gave such a hand and another user, who pushes it "
+           "suddenly, beyond what both put in, over what they are allowed to, once", "override", ("<=", 1.0), full=True),
+    Figure("override_mount_carried", "mm", "way of such a bone under tools that touched it, least of the three delays", "override",
+           (">=", 50.0), full=True),
+    Figure("override_in_contact", "count", "times that each of these took hold of a tool on bone: the rarest, at the delay and on "
+           "the bone where it was rarest", "override", (">=", 5), full=True),
     # Closed doors.
     Figure("knocks", "count", "strangers at the door while a hand works: silent, in plain HTTP/2, noise, TLS without a "
            "certificate", "knocking", (">=", 100_000), full=True),
-    Figure("knocks_let_in", "count", "of them not hung up on", "knocking", ("==", 0), full=True),
+    Figure("knocks_let_in", "count", "of them answered but by a refusal, or not hung up on", "knocking", ("==", 0), full=True),
+    Figure("knocks_noticed", "count", "of 60 at a door without TLS, left open on purpose, those that this count says were let in",
+           "knocking", (">=", 50), full=True),
     Figure("knocks_memory", "mb", "what the server's memory grew by meanwhile", "knocking", ("<=", 64.0),
            baseline="its memory before", full=True),
-    Figure("knocks_logged", "count", "lines that its log says of them", "knocking", ("<=", 20), full=True),
+    Figure("knocks_logged", "count", "lines that its log says of them; of none of them it would be a failure", "knocking", ("<=", 20),
+           full=True),
     Figure("knocks_commit", "ms", "from a cut of the hand until it is confirmed, median, meanwhile", "knocking",
            baseline="before they came", full=True),
     Figure("knocks_differences", "count", "hands with another bone than the server's at the end", "knocking", ("==", 0), full=True),

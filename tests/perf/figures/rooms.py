@@ -209,7 +209,11 @@ def override(run):
                      after["max"], asked["p50"], asked["p99"], line["cuts_stopped"]))
     run.tables.append(("From an instructor's word until the hand cuts no more, less the way; hand and line are simulated", rows))
     touch = out["touch"]
-    run.tables.append(("What hands feel of it", [(name, value) for name, value in touch.items()]))
+    felt = ("mount", "one_way_ms", "step_over_slew", "contact_mj", "led_mj", "made_mj", "carried_mm", "touching_s", "cutting_s")
+    held = tuple(touch[0]["in_contact"])
+    run.tables.append(("What hands feel of it, and how often each took hold of a tool on bone",
+                       [felt + held] + [tuple(t[n] for n in felt) + tuple(t["in_contact"][n] for n in held) for t in touch]))
+    yielding = [t for t in touch if t["mount"]]
     whole = [line for line in out["lines"] if line["loss"] == 0]
     lossy = [line for line in out["lines"] if line["loss"] > 0]
 
@@ -221,8 +225,12 @@ def override(run):
         "freeze_p99": (worst(whole, "p99") / TWO_TICKS_MS, worst(whole, "p50") / TWO_TICKS_MS),
         "freeze_p99_loss": (worst(lossy, "p99") / TWO_TICKS_MS, worst(lossy, "p50") / TWO_TICKS_MS),
         "freeze_missing": (missing, None),
-        "override_force_step": (touch["step_over_slew"], None),
-        "override_energy": (max(touch["contact_mj"], touch["led_mj"]) / touch["budget_mj"], None),
+        "override_force_step": (max(t["step_over_slew"] for t in touch), max(t["step_over_slew"] for t in yielding)),
+        "override_energy": (max(max(t["contact_mj"], t["led_mj"]) / t["budget_mj"] for t in touch),
+                            max(max(t["contact_mj"], t["led_mj"]) / t["budget_mj"] for t in yielding)),
+        "override_mount_made": (max(t["made_mj"] / t["allowance_mj"] for t in yielding), None),
+        "override_mount_carried": (min(t["carried_mm"] for t in yielding), None),
+        "override_in_contact": (min(min(t["in_contact"].values()) for t in touch), None),
     }
 
 

@@ -279,8 +279,8 @@ TEST_P(OnAMount, IsOverruledAsGentlyAsOnBoneThatStands) {
   }
   const Crossed& crossed = hand.crossed();
   const osteon::test::InContact& held = crossed.in_contact;
-  std::printf("  %s, %d ms: step over slew %.3f, worst %.5f mJ, led %.5f mJ, made %.4f mJ, bone %.1f mm, cutting %lld; in contact: "
-              "stopped %d, taken %d, back %d, led %d, undone %d\n",
+  std::printf("  %s, %d ms: step over slew %.3f, worst %.5f mJ, led %.5f mJ, made %.4f mJ, bone %.1f mm, cutting %lld; in "
+              "contact: stopped %d, taken %d, back %d, led %d, undone %d\n",
               tool, delay_ms, crossed.step_over_slew, crossed.worst_mj, crossed.led_mj, crossed.made_mj, crossed.carried_mm,
               static_cast<long long>(crossed.cutting), held.stopped, held.taken, held.given_back, held.led, held.undone);
   EXPECT_LE(crossed.step_over_slew, 1.0 + 1e-6);
