@@ -12,11 +12,12 @@ tl::unexpected<Error> bad(const std::string& field, const std::string& what) {
   return failure(ErrorCode::invalid_input, field + " " + what);
 }
 
-bool all_finite(std::initializer_list<double> values) {
-  return std::ranges::all_of(values, [](double v) { return std::isfinite(v); });
+constexpr double kMostOfATool = 1e6;  // of its force in N, its speed in 1/min and so on: beyond it the steps of packets end
+bool all_of_a_tool(std::initializer_list<double> values) {
+  return std::ranges::all_of(values, [](double v) { return std::abs(v) <= kMostOfATool; });  // also not where it is no number
 }
 
-constexpr double kFurthestLook_mm = 1e5;
+constexpr double kFurthest_mm = 1e5;  // no bone is there, and beyond it the steps of packets end
 // Of what is up in a picture: how far its length may be from 1, and the sine of the least angle to the line of sight.
 constexpr double kUnitWithin = 1e-3, kLeastAcross = 0.01;
 
@@ -165,13 +166,15 @@ Result<CuttingState> from_wire(const v1::CuttingState& state) {
   if (!tool) return failure(ErrorCode::invalid_input, "pose_bone_tool." + tool.error().message);
   const auto device = from_wire(state.pose_bone_device());
   if (!device) return failure(ErrorCode::invalid_input, "pose_bone_device." + device.error().message);
+  if (tool->position_mm.norm() > kFurthest_mm) return bad("pose_bone_tool", "is no place near the bone");
+  if (device->position_mm.norm() > kFurthest_mm) return bad("pose_bone_device", "is no place near the bone");
   out.pose_bone_tool = *tool;
   out.pose_bone_device = *device;
   out.tool_name = state.tool_name();
   out.force_physical_N = from_wire(state.force_physical_n());
-  if (!all_finite({state.spindle_rpm(), state.feed_mm_per_s(), state.density_g_cm3(), state.engaged_fraction(),
-                   state.torque_n_mm(), state.depth_mm()}) || !out.force_physical_N.allFinite())
-    return bad("cutting state", "has a number that is not finite");
+  if (!all_of_a_tool({state.spindle_rpm(), state.feed_mm_per_s(), state.density_g_cm3(), state.engaged_fraction(), state.torque_n_mm(),
+                      state.depth_mm(), out.force_physical_N.norm()}))
+    return bad("cutting state", "has a number that is not finite, or that no tool has");
   out.spindle_rpm = state.spindle_rpm();
   out.feed_mm_per_s = state.feed_mm_per_s();
   out.density_g_cm3 = state.density_g_cm3();
@@ -273,7 +276,7 @@ Result<BlockKey> key_from_wire(const v1::MeshBlock& block) {
 
 Result<Look> from_wire(const v1::Look& look) {
   Look out{from_wire(look.eye_mm()), from_wire(look.target_mm()), look.pixel_rad(), look.view_rad()};
-  const auto placed = [](const Vec3& at) { return at.allFinite() && at.norm() <= kFurthestLook_mm; };
+  const auto placed = [](const Vec3& at) { return at.allFinite() && at.norm() <= kFurthest_mm; };
   if (!placed(out.eye_mm)) return bad("look.eye_mm", "is no place near the bone");
   if (!placed(out.target_mm)) return bad("look.target_mm", "is no place near the bone");
   if (!(out.pixel_rad > 0.0 && out.pixel_rad < 1.0)) return bad("look.pixel_rad", "must be between 0 and 1");

@@ -63,15 +63,19 @@ class Doorkeeper final : public grpc::AuthMetadataProcessor {
   grpc::Status Process(const InputMetadata& metadata, grpc::AuthContext* context, OutputMetadata*, OutputMetadata*) override {
     const auto pem = context->FindPropertyValues(GRPC_X509_PEM_CERT_PROPERTY_NAME);
     const auto ticket = only(metadata, "osteon-ticket"), room = only(metadata, "osteon-room-bin"), path = only(metadata, ":path");
-    if (pem.size() != 1) return {grpc::StatusCode::UNAUTHENTICATED, "no certificate came with the connection; give one with --certificates"};
+    if (pem.size() != 1) return refused(grpc::StatusCode::UNAUTHENTICATED, "certificate", "no certificate came with the connection; give one with --certificates");
     if (!ticket || !room || !path || path->empty())
-      return {grpc::StatusCode::INVALID_ARGUMENT, "the call says twice which ticket or room is meant"};
+      return refused(grpc::StatusCode::INVALID_ARGUMENT, "request", "the call says twice which ticket or room is meant");
     const auto caller = gate_.admit({{pem[0].data(), pem[0].size()}, *ticket, *room, *path});
     if (caller) return grpc::Status::OK;
     return {caller.error().is_known ? grpc::StatusCode::PERMISSION_DENIED : grpc::StatusCode::UNAUTHENTICATED, caller.error().sentence};
   }
 
  private:
+  grpc::Status refused(grpc::StatusCode code, const char* reason, const char* sentence) {
+    gate_.note_refused(reason, sentence);
+    return {code, sentence};
+  }
   Gate& gate_;
 };
 
@@ -211,18 +215,23 @@ tl::expected<Caller, Refusal> Gate::judge(const CallClaims& call) {
 
 tl::expected<Caller, Refusal> Gate::admit(const CallClaims& call) {
   auto caller = judge(call);
-  bool is_new = false;
   std::string who = "a certificate without a name";
   {
     const std::lock_guard lock(mutex_);
     ++(caller ? counts_.admitted : counts_.refused);
     if (caller) return caller;
     if (const Result<PersonCertificate> certificate = certificate_of(call.certificate_pem)) who = certificate->user;
-    is_new = log_.is_new(who, caller.error().sentence);
   }
-  refusals_.count(caller.error().reason);
-  if (is_new) log::warn("refused", {{"who", who}, {"reason", caller.error().reason}, {"said", caller.error().sentence}});
+  refusals_.note(caller.error().reason, who, caller.error().sentence);
   return caller;
+}
+
+void Gate::note_refused(std::string_view reason, std::string_view sentence) {
+  {
+    const std::lock_guard lock(mutex_);
+    ++counts_.refused;
+  }
+  refusals_.note(reason, "a stranger", sentence);
 }
 
 Result<void> Gate::check_resume(const Caller& caller, const std::string& room, int kind, AuthorId author) const {

@@ -23,7 +23,6 @@
 #include "common/access/ticket.hpp"
 #include "common/core/id.hpp"
 #include "server/net/person_certificate.hpp"
-#include "server/net/refusal_log.hpp"
 #include "server/net/refusals.hpp"
 
 namespace grpc {
@@ -92,6 +91,8 @@ class Gate {
   [[nodiscard]] tl::expected<Caller, Refusal> judge(const CallClaims& call);
   // The same, counted, and logged once for each person and reason.
   [[nodiscard]] tl::expected<Caller, Refusal> admit(const CallClaims& call);
+  // A call with which something is wrong before it can be judged: counted and logged likewise.
+  void note_refused(std::string_view reason, std::string_view sentence);
 
   // Who may be who in a room. `kind`: of client. Errors denied: the identity is another person's or of another role, or a newer
   // one of the same person took its place.
@@ -130,7 +131,6 @@ class Gate {
   std::string access_fault_;  // that was logged last
   std::unordered_map<std::string, PersonCertificate> certificates_;  // by PEM, of those seen lately
   std::unordered_map<std::string, Ticket> tickets_;            // by text, of those seen lately
-  RefusalLog log_;
   using Seat = std::tuple<std::string, std::string, int>;      // room, user, kind
   std::map<Seat, AuthorId> seats_;
   struct Member {

@@ -138,9 +138,9 @@ std::vector<MetricFamily> figures_of(RoomServer& server, const fs::path& certifi
   page.gauge("osteon_rooms", "Open rooms.", {}, static_cast<double>(rooms.size()));
   page.gauge("osteon_draining", "1 once the server lets nobody in any more.", {}, draining ? 1 : 0);
   auto refusals = server.rooms().refusals.counts();
-  for (const char* known : {"version", "request", "room", "draining"}) refusals.try_emplace(known, 0u);
+  for (const char* known : {"version", "request", "room", "draining", "tls"}) refusals.try_emplace(known, 0u);
   for (const auto& [reason, count] : refusals)
-    page.counter("osteon_refusals_total", "Callers turned away at the door.", {{"reason", reason}}, static_cast<double>(count));
+    page.counter("osteon_refusals_total", "Callers turned away at the door, and calls refused behind it.", {{"reason", reason}}, static_cast<double>(count));
   if (!certificate.empty())
     if (const Result<double> days = certificate_days_left(certificate))
       page.gauge("osteon_certificate_days_left", "Until the server's certificate is over.", {}, *days);

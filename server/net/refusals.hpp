@@ -1,4 +1,4 @@
-// Who was turned away, counted by reason: for the metrics.
+// Who and what was refused: counted by reason for the metrics, and logged.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -6,10 +6,12 @@
 #include <string>
 #include <string_view>
 
+#include "server/net/refusal_log.hpp"
+
 namespace osteon {
 
-// Any thread. A reason is a fixed word such as "version" or "ticket", never a caller's text: memory stays bounded, and what
-// comes after the first kMost different ones counts as "other".
+// Any thread. A reason is a fixed word such as "version" or "ticket", never a caller's text: memory stays bounded, and
+// what comes after the first kMost different ones counts as "other".
 class RefusalCounts {
  public:
   static constexpr std::size_t kMost = 32;
@@ -21,6 +23,8 @@ class RefusalCounts {
     else
       ++counts_[counts_.size() < kMost ? std::string(reason) : "other"];
   }
+  // Counts it, and logs it: once for each `who`, a person or an address, and reason, so that nobody fills the disk.
+  void note(std::string_view reason, std::string_view who, std::string_view said);
   [[nodiscard]] std::map<std::string, std::uint64_t, std::less<>> counts() const {
     const std::lock_guard lock(mutex_);
     return counts_;
@@ -29,6 +33,10 @@ class RefusalCounts {
  private:
   mutable std::mutex mutex_;
   std::map<std::string, std::uint64_t, std::less<>> counts_;
+  RefusalLog log_;
 };
+
+// "ipv4:10.0.0.7" of gRPC's "ipv4:10.0.0.7:50123": from one address strangers come by many ports.
+[[nodiscard]] std::string address_of(std::string_view peer);
 
 }  // namespace osteon

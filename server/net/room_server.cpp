@@ -1,6 +1,5 @@
 #include "server/net/room_server.hpp"
 
-#include <grpc/support/log.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/impl/service_type.h>
@@ -15,6 +14,7 @@
 #include "server/net/host_port.hpp"
 #include "server/net/link_server.hpp"
 #include "server/net/listener.hpp"
+#include "server/net/refused_calls.hpp"
 #include "server/net/services.hpp"
 
 namespace osteon {
@@ -59,6 +59,7 @@ constexpr std::chrono::milliseconds kComeAgainAfter{1000}, kDrainLook{20};
 
 struct RoomServer::Impl {
   std::unique_ptr<Rooms> rooms;
+  std::unique_ptr<HandshakeWatch> handshakes;
   std::unique_ptr<Gate> gate;          // null: plain text; outlives the streams
   std::unique_ptr<LinkServer> links;   // outlives the streams
   std::vector<std::unique_ptr<grpc::Service>> services;
@@ -97,11 +98,10 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
                                                       const DoorOptions& doors) {
   Result<std::unique_ptr<Listener>> listener = listen_on(listen, doors);
   if (!listener) return tl::unexpected(listener.error());
-  // What fails is told in one sentence by the caller, not in gRPC's own lines.
-  gpr_set_log_function([](gpr_log_func_args*) {});
-
   auto impl = std::make_unique<Impl>();
   impl->rooms = std::move(rooms);
+  // What fails is told in one sentence by the caller, not in gRPC's own lines.
+  impl->handshakes = std::make_unique<HandshakeWatch>(impl->rooms->refusals);
   impl->listener = std::move(*listener);
   std::shared_ptr<grpc::ServerCredentials> credentials = grpc::InsecureServerCredentials();  // shared with gRPC
   if (!doors.certificates.empty()) {
@@ -147,6 +147,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   builder.SetResourceQuota(quota);
   builder.SetMaxReceiveMessageSize(kMaxReceiveBytes);
   builder.SetMaxSendMessageSize(kMaxSendBytes);
+  builder.experimental().SetInterceptorCreators(refused_call_notes(impl->rooms->refusals));
   for (const auto& service : impl->services) builder.RegisterService(service.get());
   impl->server = builder.BuildAndStart();
   if (!impl->server) return tl::unexpected(cannot_listen(listen, "gRPC refused"));

@@ -115,8 +115,8 @@ class RoomServiceImpl final : public RoomBase {
                                  v1::JoinResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     if (Status status = judge(*request); !status.ok()) {
-      rooms_.refusals.count(status.error_code() == StatusCode::FAILED_PRECONDITION ? "version" : "request");
-      log::warn("join refused", {{"peer", context->peer()}, {"reason", status.error_message()}});
+      rooms_.refusals.note(status.error_code() == StatusCode::FAILED_PRECONDITION ? "version" : "request", address_of(context->peer()),
+                           status.error_message());
       return refuse(reactor, std::move(status));
     }
     if (const std::optional<std::string> why = rooms_.draining()) {
@@ -126,21 +126,20 @@ class RoomServiceImpl final : public RoomBase {
     const std::shared_ptr<OpenRoom> room = called(*context, reactor);
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!room || !caller) {
-      rooms_.refusals.count("room");
+      rooms_.refusals.note("room", address_of(context->peer()), caller ? "there is no such room" : caller.error().message);
       return room ? refuse(reactor, status_of(caller.error())) : reactor;
     }
     if (Result<void> may = may_join(*caller, *room, *request); !may) {
-      rooms_.refusals.count("role");
+      rooms_.refusals.note("role", address_of(context->peer()), may.error().message);
       return refuse(reactor, status_of(may.error()));
     }
-    room->host().run_slowly([this, room, reactor, request, response, caller = *caller] {
+    room->host().run_slowly([this, room, reactor, context, request, response, caller = *caller] {
       RoomHost& host = room->host();
       const Case& bone = host.bone();
       const Result<AuthorId> author =
           request->resume_author() != 0 ? come_back(host, *request, rooms_.gate ? std::optional(caller.role) : std::nullopt) : come(host, *request, *response, caller);
       if (!author) {
-        rooms_.refusals.count("room");
-        log::warn("join refused", {{"room", room->name}, {"reason", author.error().message}});
+        rooms_.refusals.note("room", address_of(context->peer()), author.error().message);
         return reactor->Finish(status_of(author.error()));
       }
       if (rooms_.gate) rooms_.gate->joined(caller, room->name, request->kind(), *author);

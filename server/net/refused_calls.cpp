@@ -1,0 +1,101 @@
+#include "server/net/refused_calls.hpp"
+
+#include <grpc/support/log.h>
+#include <grpcpp/grpcpp.h>
+#include <grpcpp/support/server_interceptor.h>
+
+#include <algorithm>
+#include <mutex>
+#include <string>
+#include <string_view>
+
+namespace osteon {
+namespace {
+
+using grpc::StatusCode;
+using grpc::experimental::InterceptionHookPoints;
+
+// gRPC's log has one function for the process, and no place for what belongs to it.
+std::mutex watches_mutex;
+std::vector<RefusalCounts*> watches;
+
+void hear(gpr_log_func_args* line) {
+  if (line->message == nullptr) return;
+  const std::string_view said(line->message);
+  if (!said.starts_with("Handshake failed")) return;
+  // Of OpenSSL's "error:0A00009C:SSL routines::http request": nothing in it is the stranger's own.
+  const std::size_t routine = said.rfind("::");
+  const std::string who =
+      "a stranger: " + std::string(routine == std::string_view::npos ? said : said.substr(routine + 2));
+  const std::lock_guard lock(watches_mutex);
+  for (RefusalCounts* refusals : watches) refusals->note("tls", who, said);
+}
+
+std::string_view reason_of(StatusCode code) {
+  switch (code) {
+    case StatusCode::INVALID_ARGUMENT:
+    case StatusCode::UNIMPLEMENTED:
+      return "request";  // gRPC's own word for a single request that it cannot read
+    case StatusCode::RESOURCE_EXHAUSTED:
+      return "quota";
+    case StatusCode::PERMISSION_DENIED:
+    case StatusCode::UNAUTHENTICATED:
+      return "denied";
+    default:
+      return {};
+  }
+}
+
+class CallNotes final : public grpc::experimental::Interceptor {
+ public:
+  CallNotes(RefusalCounts& refusals, grpc::experimental::ServerRpcInfo& call) : refusals_(refusals), call_(call) {}
+  void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
+    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_STATUS)) {
+      const grpc::Status status = methods->GetSendStatus();
+      if (const std::string_view reason = reason_of(status.error_code()); !reason.empty())
+        refusals_.note(reason, address_of(call_.server_context()->peer()),
+                       std::string(call_.method()) + ": " + status.error_message());
+    }
+    methods->Proceed();
+  }
+
+ private:
+  RefusalCounts& refusals_;
+  grpc::experimental::ServerRpcInfo& call_;
+};
+
+class CallNotesMaker final : public grpc::experimental::ServerInterceptorFactoryInterface {
+ public:
+  explicit CallNotesMaker(RefusalCounts& refusals) : refusals_(refusals) {}
+  grpc::experimental::Interceptor* CreateServerInterceptor(grpc::experimental::ServerRpcInfo* call) override {
+    if (std::string_view(call->method()) == "/osteon.v1.RoomService/Join") return nullptr;
+    return new CallNotes(refusals_, *call);  // gRPC deletes it
+  }
+
+ private:
+  RefusalCounts& refusals_;
+};
+
+}  // namespace
+
+HandshakeWatch::HandshakeWatch(RefusalCounts& refusals) : refusals_(refusals) {
+  {
+    const std::lock_guard lock(watches_mutex);
+    watches.push_back(&refusals_);
+  }
+  gpr_set_log_function(hear);
+}
+
+HandshakeWatch::~HandshakeWatch() {
+  const std::lock_guard lock(watches_mutex);
+  watches.erase(std::ranges::find(watches, &refusals_));
+}
+
+std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> refused_call_notes(
+    RefusalCounts& refusals) {
+  std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> makers;
+  makers.push_back(std::make_unique<CallNotesMaker>(refusals));
+  return makers;
+}
+
+}  // namespace osteon
