@@ -16,7 +16,11 @@ from together import ROOM, Doors
 
 ROOT = Path(__file__).resolve().parents[3]
 KNOCKS = 100_000
+OPEN_KNOCKS = 60
 QUIET_S = 8.0
+PATIENCE_S = 10.0   # the server's own with who does not show who they are is half of it
+SILENT_S = 0.002    # a door without TLS speaks first, and at once
+TLS_ALERT, MOST_ALERT_BYTES = 0x15, 16
 HTTP2 = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes([0, 0, 0, 4, 0, 0, 0, 0, 0])
 FUZZ_RUNS = 10_000_000
 FUZZ_CALLS = 300_000
@@ -26,11 +30,33 @@ def resident_mb(pid):
     return int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGESIZE") / 1e6
 
 
-def knock(address, kind):
-    """One stranger: who says nothing, speaks plain HTTP/2, sends noise, or begins TLS without a certificate."""
-    with socket.create_connection(address, timeout=10.0) as line:
+def is_refused(line, may_stay=False):
+    """Hung up on with nothing, or with one alert of TLS; with `may_stay` also who hears nothing as long as they wait."""
+    said = b""
+    try:
+        while more := line.recv(4096):
+            said += more
+            if said[0] != TLS_ALERT or len(said) > MOST_ALERT_BYTES:
+                return False
+    except ConnectionError:
+        pass
+    except TimeoutError:
+        return may_stay and said == b""
+    return True
+
+
+def knock(address, kind, waits=False):
+    """One stranger: who says nothing (0), speaks plain HTTP/2 (1), sends noise (2), or begins TLS without a certificate (3). True
+    when they were refused: whatever else is answered counts as let in, and so does a line that stays open behind what was said. Who
+    says nothing hears whether the door speaks first, and where it `waits`, that it hangs up at last.
+    """
+    with socket.create_connection(address, timeout=PATIENCE_S) as line:
         line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")  # no port stays occupied behind it
         try:
+            if kind == 0:
+                if not waits:
+                    line.settimeout(SILENT_S)
+                return is_refused(line, may_stay=not waits)
             if kind == 1:
                 line.sendall(HTTP2)
             elif kind == 2:
@@ -39,13 +65,32 @@ def knock(address, kind):
                 context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
                 context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
                 context.set_alpn_protocols(["h2"])
-                line.settimeout(10.0)
                 with context.wrap_socket(line) as sealed:
                     sealed.sendall(HTTP2)
-                    return not sealed.recv(1)
-        except OSError:
-            return True  # it was hung up on
-    return True
+                    return is_refused(sealed)
+        except TimeoutError:
+            return False
+        except (ConnectionError, ssl.SSLError):
+            return True
+        return is_refused(line)
+
+
+def knocks(address, count):
+    """How many of so many strangers of all kinds were refused."""
+    return sum(knock(address, 3 if i % 100 == 0 else i % 3, waits=i % 9999 == 3) for i in range(count))
+
+
+def open_door(run, household, out):
+    """Strangers at a door that was left open on purpose: how many of them are noticed to be let in."""
+    address_file = out / "logs" / "open-address"
+    address_file.unlink(missing_ok=True)
+    server = household.start("open-server", [run.programs / "osteon-server", "--case", run.phantom(), "--listen", "127.0.0.1:0", "--plain",
+                                             "--address-file", address_file])
+    host, port = household.wait_for_file(address_file, "osteon-server", 60.0).rsplit(":", 1)
+    refused = knocks((host, int(port)), OPEN_KNOCKS)
+    server.may_end = True
+    server.end()
+    return OPEN_KNOCKS - refused
 
 
 def knocking(run):
@@ -54,6 +99,7 @@ def knocking(run):
     (out / "logs").mkdir(parents=True, exist_ok=True)
     doors = Doors(run.programs, out)  # of a folder that is new with every run
     with Household(out / "logs") as household:
+        noticed = open_door(run, household, out)
         address_file = out / "logs" / "address"
         address_file.unlink(missing_ok=True)
         server = household.start("osteon-server", [run.programs / "osteon-server", "--case", run.phantom(), "--listen", "127.0.0.1:0",
@@ -71,7 +117,7 @@ def knocking(run):
         time.sleep(QUIET_S)
         pid = int(subprocess.run(["pgrep", "-f", str(address_file)], capture_output=True, text=True, check=True).stdout.split()[0])
         memory, began = resident_mb(pid), time.monotonic_ns()
-        refused = sum(knock((host, int(port)), 3 if i % 100 == 0 else i % 3) for i in range(KNOCKS))
+        refused = knocks((host, int(port)), KNOCKS)
         ended, after = time.monotonic_ns(), resident_mb(pid)
         if hand.exit_code is not None:
             raise Failure("the hand ended before the strangers did; its last lines:", hand.last_words())
@@ -86,6 +132,9 @@ def knocking(run):
     took = (cuts["confirmed_mono_ns"] - cuts["closed_mono_ns"]) / 1e6
     during = (cuts["closed_mono_ns"] >= began) & (cuts["closed_mono_ns"] <= ended) & (cuts["room_seq"] > 0)
     before = (cuts["closed_mono_ns"] < began) & (cuts["room_seq"] > 0)
+    said = [line for line in log if " refused who=" in line]
+    if not any("reason=tls" in line for line in said):
+        raise Failure("the server's log does not say that there were strangers; its last lines:", "\n".join(log[-5:]))
     same = record.read_json(out / "server.json")["field_hash"] == record.read_json(out / "hand.json")["field_hash"]
     run.tables.append(("Strangers at the door", [("seconds", round((ended - began) / 1e9, 1)), ("cuts meanwhile", int(during.sum())),
                                                 ("commit p99 before, ms", round(float(np.percentile(took[before], 99)), 2)),
@@ -95,8 +144,9 @@ def knocking(run):
     return {
         "knocks": (KNOCKS, None),
         "knocks_let_in": (KNOCKS - refused, None),
+        "knocks_noticed": (noticed, None),
         "knocks_memory": (max(0.0, after - memory), memory),
-        "knocks_logged": (len([line for line in log if "refus" in line or "turned away" in line]), None),
+        "knocks_logged": (len(said), None),
         "knocks_commit": (float(np.percentile(took[during], 50)), float(np.percentile(took[before], 50))),
         "knocks_differences": (0 if same else 1, None),
     }
