@@ -21,6 +21,7 @@
 #include "common/wire/room_client.hpp"
 #include "osteon/v1/people.grpc.pb.h"
 #include "osteon/v1/room.grpc.pb.h"
+#include "server/net/refused_calls.hpp"
 #include "server/net/room_server.hpp"
 #include "tests/support/doors/people.hpp"
 #include "tests/support/wait.hpp"
@@ -36,6 +37,11 @@ using testing::HasSubstr;
 
 constexpr int kTimes = 3;  // that each is tried
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+std::string content(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
 
 int count_of(const std::string& text, const std::string& what) {
   int count = 0;
@@ -146,6 +152,31 @@ TEST_F(Refused, ATicketIsItsOwnersAlone) {
   EXPECT_EQ(counted("request"), static_cast<std::uint64_t>(kTimes));
   const std::vector<std::string> lines = logged("refused who=");
   EXPECT_EQ(lines.size(), 3u) << "of Ben, of the stream that ended, of the call: " << testing::PrintToString(lines);
+}
+
+TEST_F(Refused, StrangersAreCountedAndLoggedOnce) {
+  // A client in this process has taken gRPC's log over since the server started.
+  RefusalCounts beside;
+  const HandshakeWatch again(beside);
+  const auto no_certificate = grpc::SslCredentials(
+      {.pem_root_certs = content(people_.server() / "ca.pem"), .pem_private_key = "", .pem_cert_chain = ""});
+  for (int i = 0; i < kTimes; ++i) {
+    // Plain text: one alert of TLS is all that may come, never a frame of HTTP/2.
+    const std::uint64_t before = counted("tls");
+    EXPECT_LE(knock(std::string("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\4\0\0\0\0\0", 33)).size(), 7u);
+    EXPECT_TRUE(test::wait_until([&] { return counted("tls") == before + 1; }, test::kPatience));
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + 5s);
+    v1::GetStatusResponse response;
+    grpc::ChannelArguments own;
+    own.SetInt("own", i);
+    const auto channel = grpc::CreateCustomChannel(address(), no_certificate, own);
+    EXPECT_EQ(v1::RoomService::NewStub(channel)->GetStatus(&context, {}, &response).error_code(),
+              StatusCode::UNAVAILABLE);
+    EXPECT_TRUE(test::wait_until([&] { return counted("tls") >= before + 2; }, test::kPatience));
+  }
+  const std::vector<std::string> lines = logged("reason=tls");
+  EXPECT_EQ(lines.size(), 4u) << "plain text, and no certificate, of either count: " << testing::PrintToString(lines);
 }
 
 TEST_F(Refused, JoinsAreLoggedOnceForEachKind) {
