@@ -308,13 +308,13 @@ double HapticLoop::meet(const LoopInput& input, double room_n, double slew_n, Lo
     partner_n_.setZero();
     return slew_n;
   }
-  // Whoever leads this hand, or holds its tool, is where it is.
+  // A hand whose tool is held by somebody has none that others could push: whoever holds it may do so from a console and have
+  // a hand of another number. And whoever leads this hand is where it is.
   std::array<PartnerTool, PartnerContact::kMost> others;
   std::size_t count = 0;
   const Oversight& oversight = overseer_.now();
   for (const PartnerTool& partner : partners_)
-    if (count < others.size() && partner.author != oversight.guide.value && partner.author != oversight.taken_by.value)
-      others[count++] = partner;
+    if (count < others.size() && !oversight.taken_by && partner.author != oversight.guide.value) others[count++] = partner;
   const PartnerForce felt = partner_contact_.step(touch_points_[static_cast<std::size_t>(tool_)], report.pose_bone_proxy,
                                                   std::span(others).first(count), params_.dt_s);
   if (felt.author != 0) report.events |= kPartnerTouched;

@@ -306,8 +306,17 @@ Console::Answer Console::free(const Words& words) {
 
 Console::Answer Console::take(const Words& words) {
   if (words.size() < 2 || words[1] == "all") return bad("");
+  // Who has a hand here themselves takes it into that one.
+  const std::vector<PersonSeen> all = room_.people();
+  const auto self = std::ranges::find(all, room_.self(), &PersonSeen::author);
+  const Result<PersonSeen> subject = find(words[1]);
+  AuthorId holder = room_.self();
+  for (const PersonSeen& one : all)
+    if (self != all.end() && !one.name.empty() && one.name == self->name && one.role == self->role && one.hand && one.here &&
+        (!subject || one.author != subject->author))
+      holder = one.author;
   return supervise(words[1], [&](Supervision& word) {
-    word.taken_by = room_.self();
+    word.taken_by = holder;
     word.words = joined(words, 2);
   });
 }

@@ -179,6 +179,17 @@ TEST_F(ConsoleTest, DecisionsAddUp) {
   EXPECT_EQ(say("guide Ben along Ada share 2").find("error"), 0u);
 }
 
+// Who has a hand here takes the tool into that one; not into one that is away, nor another's of the same name.
+TEST_F(ConsoleTest, ATakenToolIsInTheHandOfWhoTypes) {
+  desk.people_.push_back({.author = {7}, .name = "Ada", .role = Role::instructor, .hand = true});
+  desk.people_.push_back({.author = {8}, .name = "Ada", .role = Role::trainee, .here = true, .hand = true});
+  EXPECT_EQ(say("take Ben").find("ok"), 0u);
+  EXPECT_EQ(desk.asked_.back().second.taken_by, AuthorId{1});
+  desk.people_[6].here = true;
+  EXPECT_EQ(say("take Ben").find("ok"), 0u);
+  EXPECT_EQ(desk.asked_.back().second.taken_by, AuthorId{7});
+}
+
 TEST_F(ConsoleTest, AllAreDecidedAboutAtOnceUnlessMoreHoldsForOne) {
   EXPECT_EQ(say("freeze all"), "ok at 11");
   ASSERT_EQ(desk.asked_.size(), 1u);

@@ -234,7 +234,7 @@ TEST_P(LedAtTheBone, PullAndContactTogetherStayWithinTheLimits) {
   EXPECT_EQ(crossed.allocations, 0);
 }
 // Another's bur beside the own one pushes it aside, within the same limit together with all else; who leads the hand, or has its
-// tool, is where it is and pushes nothing.
+// tool, by whatever program and with whatever hand, is where it is and pushes nothing.
 TEST(PartnersTool, PushesTheHandUnlessItLeadsIt) {
   for (const bool weak : {false, true}) {
     OverseenHand hand({.weak = weak});
@@ -251,6 +251,7 @@ TEST(PartnersTool, PushesTheHandUnlessItLeadsIt) {
       led.guide = AuthorId{2};
       led.guide_share = 300;
       if (i == 6000) hand.decide(led);
+      if (i == 7500) hand.decide({.taken_by = AuthorId{77}});  // a console: of the person whose hand is 2
       const LoopReport now = hand.tick();
       most_n = std::max(most_n, now.partner_device_n.norm());
       if (i > 6001) { ASSERT_EQ(now.partner_device_n.norm(), 0.0) << i; }
