@@ -626,13 +626,19 @@ class Client {
 
   // What the plan has left on the bone goes into the room's scene; guides come back from there and guide the tool.
   void set_items() {
-    for (; items_set_ < items_left_ && link_ok_; ++items_set_) {
+    for (; items_set_ < items_left_ && link_ok_ && Clock::now() >= items_from_; ++items_set_) {
       const LeftItem& left = session_.left()[items_set_];
       SceneItem item;
       item.tool = session_.plan().steps[left.step].item.hash();
       item.pose_bone_item = left.pose_bone_item;
       item.turns = left.turns;
-      if (const Result<std::uint32_t> set = room_.set_item(item); !set) give_up(set.error());
+      const Result<std::uint32_t> set = room_.set_item(item);
+      if (!set && set.error().code == ErrorCode::denied) {  // who is stopped places nothing until they may go on
+        log::warn("an item waits", {{"because", set.error().message}});
+        items_from_ = Clock::now() + 2s;
+        return;
+      }
+      if (!set) give_up(set.error());
     }
   }
 
@@ -745,6 +751,7 @@ class Client {
   std::atomic<std::size_t> unconfirmed_{0};
   std::atomic<std::size_t> items_left_{0};  // by the plan
   std::size_t items_set_ = 0;               // in the room; reporter thread
+  Clock::time_point items_from_{};          // not before then; reporter thread
   std::atomic<bool> link_ok_{true}, realtime_refused_{false}, joined_{false}, touching_over_{false}, all_over_{false};
 
   // Haptic thread.

@@ -492,7 +492,9 @@ Result<std::uint32_t> RoomSession::set_item(const SceneItem& item) {
   context.set_deadline(std::chrono::system_clock::now() + 5s);
   const grpc::Status status = v1::RoomService::NewStub(impl_->room.channel)->SetSceneItem(&context, request, &response);
   if (status.ok()) return response.item();
-  return failure(status.error_code() == grpc::StatusCode::INVALID_ARGUMENT ? ErrorCode::invalid_input : ErrorCode::unavailable,
+  return failure(status.error_code() == grpc::StatusCode::INVALID_ARGUMENT    ? ErrorCode::invalid_input
+                 : status.error_code() == grpc::StatusCode::PERMISSION_DENIED ? ErrorCode::denied
+                                                                              : ErrorCode::unavailable,
                  "the server does not set the item: " + status.error_message());
 }
 

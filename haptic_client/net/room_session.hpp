@@ -58,7 +58,7 @@ class RoomSession {
   [[nodiscard]] const Case& bone() const;
   [[nodiscard]] const std::shared_ptr<ToolBox>& tools() const;  // that the room knows; grows with its events
   // Sets an item of the room's scene, id 0 for a new one, and returns its id. Waits for the answer. Errors:
-  // invalid_input, unavailable.
+  // invalid_input, denied (the hand is stopped, or its tool taken), unavailable.
   [[nodiscard]] Result<std::uint32_t> set_item(const SceneItem& item);
 
   // Opens the stream; once. From now on `events` are called.
