@@ -1,161 +1,312 @@
 #include "tests/fuzz/calls_target.hpp"
 
+#include <google/protobuf/descriptor.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/grpcpp.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
+#include <condition_variable>
+#include <csignal>
+#include <map>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "common/core/check.hpp"
-#include "osteon/v1/cases.grpc.pb.h"
 #include "osteon/v1/cutting.grpc.pb.h"
-#include "osteon/v1/people.grpc.pb.h"
-#include "osteon/v1/room.grpc.pb.h"
-#include "osteon/v1/rooms.grpc.pb.h"
-#include "osteon/v1/watch.grpc.pb.h"
 #include "server/net/room_server.hpp"
-#include "tests/support/scenes/bones.hpp"
+#include "server/net/services.hpp"
+#include "tests/fuzz/calls_messages.hpp"
 #include "tests/support/temp_dir.hpp"
 
 namespace osteon::fuzz {
 namespace {
 
-using google::protobuf::FieldDescriptor;
-using google::protobuf::Message;
 using google::protobuf::MethodDescriptor;
 
-constexpr const char* kRoom = "room";
 constexpr std::size_t kMostRooms = 3;
+constexpr std::size_t kUnderWay = 192;     // calls at once
+constexpr std::size_t kLines = 4;          // a connection takes 64 streams
+constexpr std::size_t kHands = 8;          // whose sessions are opened before the input comes
+constexpr std::uint64_t kRenewEvery = 10'000;  // what a room keeps of everything that happened in it is not for ever
+constexpr std::uint64_t kLookEvery = 16;
+constexpr const char* kSecret = "of a hand";
 
-std::vector<const MethodDescriptor*> methods() {
-  std::vector<const MethodDescriptor*> all;
-  for (const google::protobuf::FileDescriptor* file :
-       {v1::GetStatusRequest::descriptor()->file(), v1::SessionRequest::descriptor()->file(), v1::WatchMeshRequest::descriptor()->file(),
-        v1::ListRoomsRequest::descriptor()->file(), v1::SayRequest::descriptor()->file(), v1::UploadCaseRequest::descriptor()->file()})
-    for (int s = 0; s < file->service_count(); ++s)
-      for (int m = 0; m < file->service(s)->method_count(); ++m) all.push_back(file->service(s)->method(m));
-  return all;
+grpc::ByteBuffer buffer_of(const std::string& bytes) {
+  const grpc::Slice slice(bytes);
+  return {&slice, 1};
 }
 
-// A request with everything in it that there is: whose values are sound as far as their types say what is.
-void fill(Message& message, int depth = 0) {
-  const google::protobuf::Reflection& reflect = *message.GetReflection();
-  for (int i = 0; i < message.GetDescriptor()->field_count(); ++i) {
-    const FieldDescriptor* field = message.GetDescriptor()->field(i);
-    const bool many = field->is_repeated();
-    switch (field->cpp_type()) {
-      case FieldDescriptor::CPPTYPE_MESSAGE:
-        if (depth < 4) fill(many ? *reflect.AddMessage(&message, field) : *reflect.MutableMessage(&message, field), depth + 1);
-        break;
-      case FieldDescriptor::CPPTYPE_STRING: {
-        const std::string text = field->type() == FieldDescriptor::TYPE_BYTES ? std::string(32, '\1') : "room";
-        many ? reflect.AddString(&message, field, text) : reflect.SetString(&message, field, text);
-        break;
-      }
-      case FieldDescriptor::CPPTYPE_UINT64: many ? reflect.AddUInt64(&message, field, 1) : reflect.SetUInt64(&message, field, 1); break;
-      case FieldDescriptor::CPPTYPE_UINT32: many ? reflect.AddUInt32(&message, field, 1) : reflect.SetUInt32(&message, field, 1); break;
-      case FieldDescriptor::CPPTYPE_INT32:
-        for (int k = 0; k < (many ? 3 : 1); ++k) many ? reflect.AddInt32(&message, field, 1) : reflect.SetInt32(&message, field, 1);
-        break;
-      case FieldDescriptor::CPPTYPE_INT64: many ? reflect.AddInt64(&message, field, 1) : reflect.SetInt64(&message, field, 1); break;
-      case FieldDescriptor::CPPTYPE_DOUBLE: many ? reflect.AddDouble(&message, field, 1) : reflect.SetDouble(&message, field, 1); break;
-      case FieldDescriptor::CPPTYPE_FLOAT:
-        for (int k = 0; k < (many ? 4 : 1); ++k) many ? reflect.AddFloat(&message, field, 0.5f) : reflect.SetFloat(&message, field, 0.5f);
-        break;
-      case FieldDescriptor::CPPTYPE_BOOL: many ? reflect.AddBool(&message, field, false) : reflect.SetBool(&message, field, false); break;
-      case FieldDescriptor::CPPTYPE_ENUM: many ? reflect.AddEnumValue(&message, field, 1) : reflect.SetEnumValue(&message, field, 1); break;
+std::string hex_of(std::span<const std::uint8_t> bytes) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string text;
+  for (const std::uint8_t byte : bytes) text += {kDigits[byte >> 4], kDigits[byte & 15]};
+  return text;
+}
+
+// One call, from its beginning until its slot is free for another.
+struct Call {
+  enum class Step { free, unary, opening, opened, said, answered, ended };
+  Step step = Step::free;
+  Bytes input;
+  const MethodDescriptor* method = nullptr;
+  std::optional<grpc::ClientContext> context;
+  std::unique_ptr<grpc::GenericClientAsyncReaderWriter> line;
+  std::unique_ptr<grpc::GenericClientAsyncResponseReader> answer_of_one;
+  std::string request;
+  grpc::ByteBuffer answer;
+  grpc::Status status;
+  AuthorId hand;  // of a session that was opened before
+  bool answered = false;
+};
+
+std::array<Call, kUnderWay> slots;
+
+// What was under way when the process fell: one of them, with what came before, is why.
+void tell_calls(int signal) {
+  static std::atomic<bool> told = false;
+  if (!told.exchange(true))
+    for (const Call& call : slots) {
+      if (call.step == Call::Step::free) continue;
+      const std::string line = "under way: OSTEON_FUZZ_INPUT=" + hex_of(call.input) + "\n";
+      (void)!::write(STDERR_FILENO, line.data(), line.size());
     }
-  }
+  std::signal(signal, SIG_DFL);
+  std::raise(signal);
 }
 
-// A server in this process with a room, and somebody in it with a hand.
+// A server in this process with a room, somebody in it, and hands.
 class Server {
  public:
-  Server() : bone_(test::plain_block(6, 3, 0.5)), methods_(methods()) {
+  Server() : bone_(served_bone()) {
     OSTEON_CHECK(bone_.save(dir_ / "case").has_value());
-    auto rooms = std::make_unique<Rooms>(RoomsOptions{.cases = {{bone_, dir_ / "case"}}});
-    OSTEON_CHECK(rooms->create(kRoom, nullptr).has_value());
-    auto started = RoomServer::start(std::move(rooms), "127.0.0.1:0");
+    // No cases are taken: each upload would be looked through by a process of its own. The target upload gives any bytes to that.
+    RoomsOptions options{.cases = {{bone_, dir_ / "case"}}};
+    options.rates.tick = std::chrono::milliseconds(2);  // who waits for one waits less
+    auto started = RoomServer::start(std::make_unique<Rooms>(std::move(options)), "127.0.0.1:0");
     OSTEON_CHECK(started.has_value());
     server_ = std::move(*started);
-    stub_ = std::make_unique<grpc::GenericStub>(grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials()));
+    for (std::size_t i = 0; i < kLines; ++i) {
+      grpc::ChannelArguments own;
+      own.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+      stubs_.push_back(std::make_unique<grpc::GenericStub>(
+          grpc::CreateCustomChannel(server_->address(), grpc::InsecureChannelCredentials(), own)));
+    }
+    for (Call& call : slots) free_.push_back(&call);
+    for (const int fault : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL}) std::signal(fault, tell_calls);
+    renew();
+    reader_ = std::thread([this] { read_all(); });
   }
-
-  [[nodiscard]] std::size_t calls() const { return methods_.size(); }
-  [[nodiscard]] Bytes seed(std::size_t call) const {
-    const std::unique_ptr<Message> request(
-        google::protobuf::MessageFactory::generated_factory()->GetPrototype(methods_[call]->input_type())->New());
-    fill(*request);
-    const std::string text = request->SerializeAsString();
-    Bytes bytes{static_cast<std::uint8_t>(call)};
-    bytes.insert(bytes.end(), text.begin(), text.end());
-    return bytes;
+  ~Server() {
+    settle();
+    queue_.Shutdown();
+    reader_.join();
   }
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
 
-  // Whatever it is, it is answered: an open stream by its first message or its end, and the server goes on.
+  // Whatever it is, it is answered: an open stream by its first message or its end, and the server goes on. Returns while
+  // it is under way.
   void call(std::span<const std::uint8_t> data) {
     if (data.empty()) return;
-    look_after();
-    const MethodDescriptor& method = *methods_[data[0] % methods_.size()];
-    grpc::Slice slice(data.data() + 1, data.size() - 1);
-    const grpc::ByteBuffer request(&slice, 1);
-    grpc::ClientContext context;
-    context.AddMetadata("osteon-room-bin", kRoom);
-    context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(30));
-    grpc::CompletionQueue queue;
-    const auto line = stub_->PrepareCall(&context, "/" + method.service()->full_name() + "/" + method.name(), &queue);
-    const auto next = [&] {
-      void* tag = nullptr;
-      bool ok = false;
-      OSTEON_CHECK(queue.Next(&tag, &ok));
-      return ok;
-    };
-    line->StartCall(nullptr);
-    if (next()) {
-      line->WriteLast(request, {}, nullptr);
-      (void)next();
+    if (calls_++ % kRenewEvery == kRenewEvery - 1) {
+      settle();
+      renew();
     }
-    grpc::ByteBuffer answer;
-    line->Read(&answer, nullptr);
-    const bool answered = next();
-    if (answered && method.server_streaming()) context.TryCancel();
-    grpc::Status status;
-    line->Finish(&status, nullptr);
-    (void)next();
-    queue.Shutdown();
-    void* tag = nullptr;
-    bool ok = false;
-    while (queue.Next(&tag, &ok)) {
-    }
-    // Nothing that is sent is an accident of the server's, and none of it is waited for without end.
-    OSTEON_CHECK(status.error_code() != grpc::StatusCode::INTERNAL && status.error_code() != grpc::StatusCode::UNKNOWN &&
-                 status.error_code() != grpc::StatusCode::DEADLINE_EXCEEDED);
-    // Bytes that are no message at all are refused by gRPC itself, which says no more than that.
-    OSTEON_CHECK(status.ok() || answered || !status.error_message().empty() ||
-                 status.error_code() == grpc::StatusCode::UNIMPLEMENTED);
+    if (calls_ % kLookEvery == 0) look_after();
+    const bool in_session = is_in_session(data[0]);
+    const MethodDescriptor* method = &method_of(data[0]);
+    ++counts_[in_session ? "SessionRequest in a session" : method->input_type()->name()];
+    Call& call = take_slot(in_session);
+    call.method = method;
+    call.input.assign(data.begin(), data.end());
+    call.request.assign(data.begin() + 1, data.end());
+    call.answered = false;
+    call.status = grpc::Status();
+    call.context.emplace();
+    call.context->AddMetadata("osteon-room-bin", kRoom);
+    call.context->set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(60));
+    begin(call);
+  }
+
+  void settle() {
+    std::unique_lock lock(mutex_);
+    freed_.wait(lock, [&] { return free_.size() == kUnderWay; });
+  }
+
+  [[nodiscard]] std::string figures() {
+    settle();
+    const auto least = std::ranges::min_element(counts_, {}, &std::pair<const std::string, std::uint64_t>::second);
+    std::string text = std::to_string(calls_) + " calls of " + std::to_string(counts_.size()) + " kinds of request";
+    if (least != counts_.end()) text += ", the fewest " + std::to_string(least->second) + " of " + least->first;
+    for (const auto& [status, count] : statuses_) text += "; status " + std::to_string(status) + ": " + std::to_string(count);
+    return text;
   }
 
  private:
+  using Step = Call::Step;
+
+  Call& take_slot(bool with_hand) {
+    std::unique_lock lock(mutex_);
+    freed_.wait(lock, [&] { return !free_.empty() && (!with_hand || !hands_.empty()); });
+    Call& call = *free_.back();
+    free_.pop_back();
+    call.hand = {};
+    if (with_hand) {
+      call.hand = hands_.back();
+      hands_.pop_back();
+    }
+    return call;
+  }
+
+  void begin(Call& call) {
+    grpc::GenericStub& stub = *stubs_[calls_ % kLines];
+    const std::string name = "/" + call.method->service()->full_name() + "/" + call.method->name();
+    if (!call.method->client_streaming() && !call.method->server_streaming()) {
+      call.step = Step::unary;
+      call.answer_of_one = stub.PrepareUnaryCall(&*call.context, name, buffer_of(call.request), &queue_);
+      call.answer_of_one->StartCall();
+      call.answer_of_one->Finish(&call.answer, &call.status, &call);
+      return;
+    }
+    call.context->set_initial_metadata_corked(true);  // it goes with the first message
+    call.line = stub.PrepareCall(&*call.context, name, &queue_);
+    call.line->StartCall(nullptr);
+    call.step = call.hand ? Step::opening : Step::said;
+    if (!call.hand) return call.line->WriteLast(buffer_of(call.request), {}, &call);
+    v1::SessionRequest open;
+    open.mutable_open()->set_author(call.hand.value);
+    open.mutable_open()->set_server_epoch(epoch_);
+    open.mutable_open()->set_secret(kSecret);
+    call.line->Write(buffer_of(open.SerializeAsString()), &call);
+  }
+
+  // [reader] What the server has answered or taken, and what comes next.
+  void go_on(Call& call, bool ok) {
+    switch (call.step) {
+      case Step::opening:
+        call.step = Step::opened;
+        return call.line->Read(&call.answer, &call);
+      case Step::opened: {
+        if (!ok) return end(call);
+        v1::SessionResponse row;
+        OSTEON_CHECK(grpc::SerializationTraits<v1::SessionResponse>::Deserialize(&call.answer, &row).ok());
+        if (!row.has_complete()) return call.line->Read(&call.answer, &call);
+        call.step = Step::said;
+        return call.line->WriteLast(buffer_of(as_hand(call, row.complete())), {}, &call);
+      }
+      case Step::said:
+        call.step = Step::answered;
+        return call.line->Read(&call.answer, &call);
+      case Step::answered:
+        call.answered = call.answered || ok;
+        // A session tells all that there is to tell, since it was said that nothing follows.
+        if (ok && call.hand) return call.line->Read(&call.answer, &call);
+        if (ok && call.method->server_streaming()) call.context->TryCancel();
+        return end(call);
+      default: return done(call);
+    }
+  }
+  static void end(Call& call) {
+    call.step = Step::ended;
+    call.line->Finish(&call.status, &call);
+  }
+
+  // A cut or a state of author 1 is the hand's own, and its next.
+  static std::string as_hand(const Call& call, const v1::FieldComplete& told) {
+    v1::SessionRequest request;
+    if (!request.ParseFromString(call.request)) return call.request;
+    if (request.has_cut() && request.cut().author() == 1) {
+      v1::Cut& cut = *request.mutable_cut();
+      cut.set_author(call.hand.value);
+      if (cut.author_seq() == 1) cut.set_author_seq(told.decided_author_seq() + 1);
+      if (cut.lease_epoch() == 1) cut.set_lease_epoch(told.lease_epoch());
+    } else if (request.has_state() && request.state().author() == 1) {
+      request.mutable_state()->set_author(call.hand.value);
+    } else {
+      return call.request;
+    }
+    return request.SerializeAsString();
+  }
+
+  void done(Call& call) {
+    using grpc::StatusCode;
+    const StatusCode code = call.status.error_code();
+    // Nothing that is sent is an accident of the server's, and none of it is waited for without end.
+    const bool sound = code != StatusCode::INTERNAL && code != StatusCode::UNKNOWN && code != StatusCode::DEADLINE_EXCEEDED;
+    // Bytes that are no message at all are refused by gRPC itself, which says no more than that.
+    const bool told =
+        call.status.ok() || call.answered || !call.status.error_message().empty() || code == StatusCode::UNIMPLEMENTED;
+    if (!sound || !told) {
+      std::fprintf(stderr, "%s was answered with status %d, %s: OSTEON_FUZZ_INPUT=%s\n", call.method->full_name().c_str(), code,
+                   call.status.error_message().c_str(), hex_of(call.input).c_str());
+      OSTEON_CHECK(sound && told);
+    }
+    call.line.reset();
+    call.answer_of_one.reset();
+    call.context.reset();
+    call.answer.Clear();
+    const std::lock_guard lock(mutex_);
+    ++statuses_[code];
+    call.step = Step::free;
+    if (call.hand) hands_.push_back(call.hand);
+    free_.push_back(&call);
+    freed_.notify_one();
+  }
+
+  void read_all() {
+    void* tag = nullptr;
+    bool ok = false;
+    while (queue_.Next(&tag, &ok)) go_on(*static_cast<Call*>(tag), ok);
+  }
+
   // There is a room to call, and not one more for every input that made one.
   void look_after() {
     Rooms& rooms = server_->rooms();
-    if (!rooms.find(kRoom)) OSTEON_CHECK(rooms.create(kRoom, nullptr).has_value());
+    const auto room = rooms.find(kRoom);
+    if (!room || (*room)->server_epoch != epoch_) {
+      settle();
+      renew();
+    }
     const auto open = rooms.open_rooms();
-    if (open.size() > kMostRooms)
-      for (const auto& room : open)
-        if (room->name != kRoom) (void)rooms.remove(room->name, true);
-    RoomHost& host = (*rooms.find(kRoom))->host();
-    if (!host.knows(AuthorId{1})) OSTEON_CHECK(host.join(MemberKind::surgeon).has_value());
+    if (open.size() <= kMostRooms) return;
+    for (const auto& other : open)
+      if (other->name != kRoom && other->name != kSpare) (void)rooms.remove(other->name, true);
+  }
+
+  // Nothing is under way.
+  void renew() {
+    Rooms& rooms = server_->rooms();
+    for (const auto& room : rooms.open_rooms()) (void)rooms.remove(room->name, true);
+    const auto room = rooms.create(kRoom, nullptr);
+    OSTEON_CHECK(room.has_value() && rooms.create(kSpare, nullptr).has_value());
+    epoch_ = (*room)->server_epoch;
+    OSTEON_CHECK((*room)->host().join(MemberKind::surgeon) == AuthorId{1});
+    hands_.clear();
+    for (std::size_t i = 0; i < kHands; ++i)
+      hands_.push_back(*(*room)->host().join(MemberKind::surgeon, "hand", digest_of_secret(kSecret)));
   }
 
   test::TempDir dir_;
   Case bone_;
-  std::vector<const MethodDescriptor*> methods_;
   std::unique_ptr<RoomServer> server_;
-  std::unique_ptr<grpc::GenericStub> stub_;
+  std::vector<std::unique_ptr<grpc::GenericStub>> stubs_;
+  grpc::CompletionQueue queue_;
+  std::uint64_t calls_ = 0, epoch_ = 0;           // of the caller, as the next
+  std::map<std::string, std::uint64_t> counts_;  // by request
+  std::mutex mutex_;
+  std::condition_variable freed_;
+  std::vector<Call*> free_;                      // under mutex_, as the next two
+  std::vector<AuthorId> hands_;                  // that have no session
+  std::map<int, std::uint64_t> statuses_;
+  std::thread reader_;
 };
 
 Server& server() {
@@ -166,10 +317,11 @@ Server& server() {
 }  // namespace
 
 Target calls_target() {
-  Target target{"calls", [](std::span<const std::uint8_t> data) { server().call(data); }, {}};
-  const std::size_t count = methods().size();
-  for (std::size_t call = 0; call < count; ++call) target.seeds.push_back(server().seed(call));
-  target.mutations = 10;
+  Target target{"calls", [](std::span<const std::uint8_t> data) { server().call(data); }, request_inputs(true)};
+  target.mutations = 100;
+  target.change = change_request;
+  target.settle = [] { server().settle(); };
+  target.figures = [] { return server().figures(); };
   return target;
 }
 

@@ -59,6 +59,7 @@ int LLVMFuzzerInitialize(int* argc, char*** argv) {
 }
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   osteon::fuzz::chosen->run({data, size});
+  if (osteon::fuzz::chosen->settle) osteon::fuzz::chosen->settle();
   return 0;
 }
 std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t most, unsigned seed) {

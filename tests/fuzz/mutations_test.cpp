@@ -1,9 +1,15 @@
 // Every target on seeded mutations of its valid inputs; OSTEON_FUZZ_RUNS in the environment asks for more of them, in all of a
-// target's seeds together, and OSTEON_FUZZ_TARGET for one target alone.
+// target's seeds together, OSTEON_FUZZ_TARGET for one target alone, and OSTEON_FUZZ_INPUT, in hexadecimal digits, for nothing but
+// that input.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <random>
+#include <string>
+#include <string_view>
 
 #include "tests/fuzz/targets.hpp"
 
@@ -25,6 +31,28 @@ Bytes mutated(Bytes bytes, std::mt19937& random) {
   return bytes;
 }
 
+Bytes of_hex(std::string_view text) {
+  Bytes bytes;
+  for (std::size_t i = 0; i + 1 < text.size(); i += 2)
+    bytes.push_back(static_cast<std::uint8_t>(std::stoul(std::string(text.substr(i, 2)), nullptr, 16)));
+  return bytes;
+}
+
+double resident_mb() {
+  std::ifstream file("/proc/self/statm");
+  double all = 0, resident = 0;
+  file >> all >> resident;
+  return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1e6;
+}
+
+Bytes changed(const Target& target, const Bytes& seed, std::mt19937& random) {
+  // A few changes of form on top of each other, or changes of bytes.
+  if (!target.change || random() % 4 == 0) return mutated(seed, random);
+  Bytes input = seed;
+  for (std::size_t changes = 1 + random() % 6; changes > 0; --changes) target.change(input, random);
+  return input;
+}
+
 TEST(Fuzz, TargetsStandMutatedInputs) {
   const char *asked = std::getenv("OSTEON_FUZZ_RUNS"), *only = std::getenv("OSTEON_FUZZ_TARGET");
   bool any = false;
@@ -33,21 +61,29 @@ TEST(Fuzz, TargetsStandMutatedInputs) {
     any = true;
     SCOPED_TRACE(target.name);
     std::mt19937 random(1);
+    const auto settle = [&] {
+      if (target.settle) target.settle();
+    };
+    if (const char* input = std::getenv("OSTEON_FUZZ_INPUT")) {
+      target.run(of_hex(input));
+      settle();
+      continue;
+    }
+    for (const Bytes& seed : target.seeds) target.run(seed);
+    settle();
     const auto seeds = static_cast<long>(target.seeds.size());
     const long runs = asked ? (std::atol(asked) + seeds - 1) / seeds : target.mutations;
-    for (const Bytes& seed : target.seeds) {
-      target.run(seed);
-      for (long i = 0; i < runs; ++i) {
-        Bytes input = seed;
-        // A few changes of form on top of each other, or changes of bytes.
-        if (target.change && random() % 4) {
-          for (std::size_t changes = 1 + random() % 6; changes > 0; --changes) target.change(input, random);
-        } else {
-          input = mutated(std::move(input), random);
-        }
-        target.run(input);
-      }
+    double memory_mb = resident_mb();
+    // All seeds by turns, so that what they do meets.
+    for (long i = 0; i < runs; ++i) {
+      if (i == runs / 10) memory_mb = resident_mb();  // what a start takes is there by then
+      for (const Bytes& seed : target.seeds) target.run(changed(target, seed, random));
     }
+    settle();
+    if (!asked) continue;
+    std::printf("fuzzed: %s %ld inputs; memory after a tenth of them %.1f MB, at the end %.1f MB\n", target.name.c_str(), runs * seeds,
+                memory_mb, resident_mb());
+    if (target.figures) std::printf("fuzzed: %s\n", target.figures().c_str());
   }
   EXPECT_TRUE(any) << "there is no such target";
 }
@@ -61,6 +97,7 @@ TEST(Fuzz, TargetsStandNoiseAndNothing) {
       for (auto& byte : noise) byte = static_cast<std::uint8_t>(random());
       target.run(noise);
     }
+    if (target.settle) target.settle();
   }
 }
 

@@ -16,6 +16,8 @@
 #include "tests/fuzz/calls_target.hpp"
 #include "tests/fuzz/datagram_target.hpp"
 #include "tests/fuzz/journal_target.hpp"
+#include "tests/fuzz/requests_target.hpp"
+#include "tests/fuzz/samples.hpp"
 #include "tests/fuzz/ticket_target.hpp"
 #include "tests/fuzz/upload_target.hpp"
 
@@ -25,28 +27,6 @@ namespace {
 using namespace std::chrono_literals;
 
 Bytes bytes_of(const std::string& text) { return {text.begin(), text.end()}; }
-
-Cut a_cut() {
-  const Tool drill = builtin_tools()[0];
-  return {.author = {1}, .author_seq = 1, .lease_epoch = 1, .body = {}, .tool = drill.hash(), .level = 2,
-          .path = {quantise(pose_along({0, 0, 1}, {0, 0, -1})), quantise(pose_along({0, 0, -1}, {0, 0.1, -1}))}, .spindle_rpm = 1000};
-}
-
-SceneItem an_item() {
-  SceneItem item;
-  item.tool = builtin_tools()[0].hash();
-  item.pose_bone_item = pose_along({1, 2, 3}, {0, 0, -1});
-  return item;
-}
-
-Supervision a_supervision() {
-  return {.stopped = true, .taken_by = {2}, .guide = {3}, .guide_share = 500, .force_limit = 300, .zone = ZoneLimit{{1, 2, 3}, 1000},
-          .tools = {builtin_tools()[0].hash()}, .words = "wait"};
-}
-
-Annotation an_annotation() {
-  return {.id = 1, .author = {2}, .kind = AnnotationKind::line, .points = {{1, 2, 3}, {4, 5, 6}}, .words = "here", .colour = 0x00ff00};
-}
 
 // What is accepted must come back the same when it is sent on.
 template <class Message>
@@ -145,15 +125,6 @@ void as_down_packet(std::span<const std::uint8_t> plain) {
   OSTEON_CHECK(link.acknowledged() <= 1);
 }
 
-CuttingState a_state() {
-  CuttingState state;
-  state.author = {4};
-  state.state_seq = 3;
-  state.tool_name = "drill";
-  state.pose_bone_device.position_mm.z() = -0.5;
-  return state;
-}
-
 // Packets as the two ends make them, with everything in them that there is.
 Bytes an_up_packet() {
   SendWindow window;
@@ -204,7 +175,7 @@ std::vector<Target> targets() {
           {"tool_definition", parse_and_convert<v1::ToolDefinition>, {bytes_of(wire::to_wire(builtin_tools()[0]).SerializeAsString())}},
           {"look",
            parse_and_convert<v1::Look>,
-           {bytes_of(wire::to_wire(Look{{1, 2, 3}, {4, 5, 6}, 0.001, 0.3}).SerializeAsString())}},
+           {bytes_of(wire::to_wire(a_look()).SerializeAsString())}},
           named("up_packet", datagram_target(as_up_packet, {an_up_packet()})),
           named("down_packet", datagram_target(as_down_packet, {a_down_packet()})),
           {"mesh_block", decode_any_block, {a_block().bytes, a_seamed_block().bytes}},
@@ -217,6 +188,7 @@ std::vector<Target> targets() {
           journal_file_target(),
           {"supervision", parse_and_convert<v1::Supervision>, {bytes_of(wire::to_wire(a_supervision()).SerializeAsString())}},
           {"annotation", parse_and_convert<v1::Annotation>, {bytes_of(wire::to_wire(an_annotation()).SerializeAsString())}},
+          requests_target(),
           calls_target(),
           upload_target()};
 }

@@ -19,6 +19,10 @@ struct Target {
   long mutations = 2000;     // of each seed in a test run
   // Changes an input as only who knows its form can; none: bytes are changed.
   std::function<void(Bytes&, std::mt19937&)> change = nullptr;
+  // Waits for what run() has only begun; none: it has done all when it returns.
+  std::function<void()> settle = nullptr;
+  // A line for whoever looks on: what was run how often.
+  std::function<std::string()> figures = nullptr;
 };
 
 [[nodiscard]] std::vector<Target> targets();

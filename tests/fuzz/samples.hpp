@@ -1,0 +1,19 @@
+// Sound values of what travels, for targets to begin with.
+#pragma once
+#include "common/field/cut.hpp"
+#include "common/field/supervision.hpp"
+#include "common/mechanics/cutting_state.hpp"
+#include "common/surface/look.hpp"
+#include "common/tools/annotation.hpp"
+#include "common/tools/scene_item.hpp"
+
+namespace osteon::fuzz {
+
+[[nodiscard]] Cut a_cut();  // of author 1, the first, with a drill
+[[nodiscard]] SceneItem an_item();
+[[nodiscard]] Supervision a_supervision();
+[[nodiscard]] Annotation an_annotation();
+[[nodiscard]] CuttingState a_state();
+[[nodiscard]] Look a_look();
+
+}  // namespace osteon::fuzz
