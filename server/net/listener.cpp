@@ -50,6 +50,12 @@ int port_of(int socket) {
   return ntohs(at.ss_family == AF_INET6 ? reinterpret_cast<sockaddr_in6&>(at).sin6_port : reinterpret_cast<sockaddr_in&>(at).sin_port);
 }
 
+std::string numeric(const addrinfo& address) {
+  char text[NI_MAXHOST] = "";
+  (void)::getnameinfo(address.ai_addr, address.ai_addrlen, text, sizeof text, nullptr, 0, NI_NUMERICHOST);
+  return text;
+}
+
 std::optional<std::uint64_t> inode_of(int descriptor) {
   struct stat about {};
   if (::fstat(descriptor, &about) != 0) return {};
@@ -69,6 +75,7 @@ Result<std::unique_ptr<Listener>> Listener::open(const std::string& host, int po
   std::unique_ptr<Listener> listener(new Listener(most));
   listener->port_ = port;
   int lacking = EADDRNOTAVAIL;
+  bool has_ipv4 = false;
   for (const addrinfo* address = found; address; address = address->ai_next) {
     if (address->ai_family != AF_INET && address->ai_family != AF_INET6) continue;
     // All at one port: the first one's, where the system chooses.
@@ -76,6 +83,8 @@ Result<std::unique_ptr<Listener>> Listener::open(const std::string& host, int po
     if (socket >= 0) {
       listener->sockets_.push_back(socket);
       listener->port_ = port_of(socket);
+      if (listener->address_.empty() || (address->ai_family == AF_INET && !has_ipv4)) listener->address_ = numeric(*address);
+      has_ipv4 = has_ipv4 || address->ai_family == AF_INET;
     } else if (socket == -EADDRNOTAVAIL || socket == -EAFNOSUPPORT) {
       lacking = -socket;  // localhost has an address of each family, and a machine may lack one of them
     } else {

@@ -32,6 +32,9 @@ class Listener {
   Listener& operator=(const Listener&) = delete;
 
   [[nodiscard]] int port() const { return port_; }
+  // One that it listens on, in numbers and without brackets. Of a name that has several, of IPv4: whoever looks up the name for
+  // datagrams takes that.
+  [[nodiscard]] const std::string& address() const { return address_; }
   // From now on `take(listening, descriptor)` is called with every connection, which it owns; on a thread of the listener's own.
   void start(std::function<void(int listening, int descriptor)> take);
   void stop();  // accepts no more; once
@@ -47,6 +50,7 @@ class Listener {
   std::vector<int> sockets_;
   int wake_ = -1;  // an eventfd that ends the thread
   int port_ = 0;
+  std::string address_;
   std::function<void(int, int)> take_;
   // [thread] Connections handed on: descriptor and inode, by which one that was closed is told from another with its number.
   std::set<std::pair<int, std::uint64_t>> taken_;

@@ -36,12 +36,6 @@ Result<std::unique_ptr<Listener>> listen_on(const std::string& listen, const Doo
   return listener;
 }
 
-// Where datagrams are heard: the numeric address of `host`.
-std::string numeric(const std::string& host) {
-  if (host == "localhost") return "127.0.0.1";
-  return host == "[::1]" ? "::1" : host;
-}
-
 constexpr int kMaxReceiveBytes = 4 * 1024 * 1024;  // a cut of 64 knots is below 4 kB, a tool made from a mesh a few MB
 constexpr int kMaxSendBytes = 4 * 1024 * 1024;     // a piece of a case is 1 MiB
 constexpr int kKeepaliveMs = 10'000;               // a peer that answers no ping that long is gone
@@ -116,7 +110,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
     credentials = impl->gate->credentials();
   }
   // Beside the streams; without it all goes over them.
-  if (Result<std::unique_ptr<LinkServer>> links = LinkServer::open(numeric(parse_host_port(listen, "--listen")->host)); links)
+  if (Result<std::unique_ptr<LinkServer>> links = LinkServer::open(impl->listener->address()); links)
     impl->links = std::move(*links);
   else
     log::warn("no fast path", {{"reason", links.error().message}});
