@@ -17,7 +17,8 @@ namespace osteon {
 //   revoke certificate SERIAL     hexadecimal, as openssl x509 -serial says it
 //   revoke user NAME
 //   revoke ticket ID              hexadecimal, as osteon-server ticket says it
-//   role NAME ROLE [ROOM]         in that room, or in every room, whatever the ticket says
+//   role NAME ROLE [ROOM]         instead of the ticket's: in every room, or in that one alone. It opens no room that the ticket is
+//                                 not for, and what is about no room, as cases are, goes by the ticket or the line without a room
 class AccessList {
  public:
   // Error invalid_input: the line that is none of these. `name`: of the file, for the sentence.

@@ -186,6 +186,7 @@ Result<std::unique_ptr<Rooms>> open_rooms(const ServerConfig& options) {
   rooms_options.detail = options.detail;
   rooms_options.rates.mount = options.mount;
   rooms_options.retention_days = options.retention_days;
+  rooms_options.most_rooms = options.most_rooms;
   for (const std::filesystem::path& folder : options.case_folders) {
     Result<Case> bone = Case::load(folder);
     if (!bone) return tl::unexpected(bone.error());
@@ -304,6 +305,9 @@ int main(int argc, char** argv) {
   app.add_flag("--plain", options.plain, "Plain text, without certificates and tickets, for clients on this machine alone");
   app.add_option("--most-connections", options.most_connections, "Of everybody together; further ones are closed at once")
       ->check(CLI::Range(1, 65535))
+      ->capture_default_str();
+  app.add_option("--most-rooms", options.most_rooms, "Open and closed ones together; none is made, branched or shown again beyond")
+      ->check(CLI::Range(1, 65536))
       ->capture_default_str();
   app.add_option("--address-file", options.address_file, "Written with HOST:PORT when clients may come");
   app.add_option("--tools", options.tools_folder,

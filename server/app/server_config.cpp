@@ -118,6 +118,7 @@ const std::vector<Field>& fields() {
       {"listen", [](const Value& v, Config& c) { c.listen = host_port(v, "write HOST:PORT, such as 127.0.0.1:50000"); }},
       {"metrics", [](const Value& v, Config& c) { c.metrics = metrics_place(v); }},
       {"most_connections", [](const Value& v, Config& c) { c.most_connections = whole(v, 1, 65535); }},
+      {"most_rooms", [](const Value& v, Config& c) { c.most_rooms = whole(v, 1, 65536); }},
       {"mount", [](const Value& v, Config& c) { c.mount = yes_or_no(v); }},
       {"plain", [](const Value& v, Config& c) { c.plain = yes_or_no(v); }},
       {"resume", [](const Value& v, Config& c) { c.resume_file = path(v); }},

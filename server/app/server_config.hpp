@@ -6,6 +6,7 @@
 
 #include "common/core/result.hpp"
 #include "server/net/mesh_room.hpp"
+#include "server/net/rooms.hpp"
 #include "server/room/room.hpp"
 
 namespace osteon {
@@ -21,6 +22,7 @@ struct ServerConfig {
   std::filesystem::path certificates;   // folder, as Gate::open has it
   bool plain = false;                   // without: plain text, on this machine alone
   int most_connections = 512;           // of everybody together
+  int most_rooms = kMostRooms;          // open and closed ones together
   std::filesystem::path address_file, summary_file, tools_folder;
   std::filesystem::path save_file, resume_file, journal_file, rooms_folder, uploads_folder;
   int retention_days = 0;               // 0: nobody is forgotten

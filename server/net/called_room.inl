@@ -3,7 +3,9 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 
+#include "server/net/gate.hpp"
 #include "server/net/out_stream.inl"
 #include "server/net/rooms.hpp"
 
@@ -14,15 +16,30 @@ inline std::string metadata_of(const grpc::CallbackServerContext& context, const
   return named == context.client_metadata().end() ? std::string() : std::string(named->second.data(), named->second.size());
 }
 
+inline tl::expected<Caller, Refusal> judged(Gate& gate, const grpc::CallbackServerContext& context, const std::string& room,
+                                            std::string_view method) {
+  const auto pem = context.auth_context()->FindPropertyValues(GRPC_X509_PEM_CERT_PROPERTY_NAME);
+  const std::string ticket = metadata_of(context, "osteon-ticket");
+  const std::string_view certificate = pem.empty() ? std::string_view() : std::string_view(pem[0].data(), pem[0].size());
+  return gate.judge({.certificate_pem = certificate, .ticket = ticket, .room = room, .method = method});
+}
+
 // Who calls. Over plain text nobody says so: `user` is empty then, and the caller may do anything. Error denied: the caller's
 // right has ended since the call was let in.
 inline Result<Caller> caller_of(const Rooms& rooms, const grpc::CallbackServerContext& context) {
   if (!rooms.gate) return Caller{};
-  const auto pem = context.auth_context()->FindPropertyValues(GRPC_X509_PEM_CERT_PROPERTY_NAME);
-  const std::string ticket = metadata_of(context, "osteon-ticket"), room = metadata_of(context, "osteon-room-bin");
-  const std::string_view certificate = pem.empty() ? std::string_view() : std::string_view(pem[0].data(), pem[0].size());
-  auto caller = rooms.gate->judge({.certificate_pem = certificate, .ticket = ticket, .room = room, .method = {}});
+  auto caller = judged(*rooms.gate, context, metadata_of(context, "osteon-room-bin"), {});
   if (!caller) return failure(ErrorCode::denied, caller.error().sentence);
+  return std::move(*caller);
+}
+
+// The same, as whoever they are in `room`, which has a name: of a call whose message names rooms. They need not be the metadata's,
+// by which it was let in. Error denied: the ticket is not for that room, or the role there may not make the call `method`.
+inline Result<Caller> caller_in(const Rooms& rooms, const grpc::CallbackServerContext& context, const std::string& room,
+                                std::string_view method) {
+  if (!rooms.gate) return Caller{};
+  auto caller = judged(*rooms.gate, context, room, method);
+  if (!caller) return failure(ErrorCode::denied, "not in room " + room + ": " + caller.error().sentence);
   return std::move(*caller);
 }
 

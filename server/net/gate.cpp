@@ -19,6 +19,7 @@ namespace {
 
 constexpr std::size_t kMostRemembered = 4096;  // certificates, and tickets
 constexpr unsigned kCertificatesEverySeconds = 1;
+constexpr std::string_view kTooOften = "rate";
 
 UnixTime system_now() { return std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now()); }
 
@@ -68,6 +69,7 @@ class Doorkeeper final : public grpc::AuthMetadataProcessor {
       return refused(grpc::StatusCode::INVALID_ARGUMENT, "request", "the call says twice which ticket or room is meant");
     const auto caller = gate_.admit({{pem[0].data(), pem[0].size()}, *ticket, *room, *path});
     if (caller) return grpc::Status::OK;
+    if (caller.error().reason == kTooOften) return {grpc::StatusCode::RESOURCE_EXHAUSTED, caller.error().sentence};
     return {caller.error().is_known ? grpc::StatusCode::PERMISSION_DENIED : grpc::StatusCode::UNAUTHENTICATED, caller.error().sentence};
   }
 
@@ -136,6 +138,7 @@ Result<std::unique_ptr<Gate>> Gate::open(const std::filesystem::path& folder, Re
   std::unique_ptr<Gate> gate(new Gate(folder, *key, counts, std::move(now)));
   // A list that is wrong at the start would let in whom it is to keep out.
   if (const Result<bool> read = gate->access_.refresh(); !read) return tl::unexpected(read.error());
+  gate->access_list_ = gate->access_.list();
   gate->thread_ = std::thread([raw = gate.get()] { raw->run(); });
   return gate;
 }
@@ -172,12 +175,12 @@ Result<Ticket> Gate::ticket_of(std::string_view text) {
 std::optional<Refusal> Gate::judge_again(Caller& caller, const std::string& room, std::string_view method) const {
   const UnixTime now = now_();
   if (now >= caller.certificate_ends) return Refusal{"certificate", false, "the certificate has expired; ask for a new one"};
-  if (const auto revoked = access_.list().refuses(caller.serial, caller.user, caller.ticket_id)) return Refusal{"revoked", false, *revoked};
+  if (const auto revoked = access_list_.refuses(caller.serial, caller.user, caller.ticket_id)) return Refusal{"revoked", false, *revoked};
   Ticket ticket;
   ticket.expires = caller.ends;
   if (const Result<void> in_time = check_time(ticket, now); !in_time)
     return Refusal{"ticket", false, in_time.error().message};
-  caller.role = access_.list().role(caller.user, room, caller.ticket_role);
+  caller.role = access_list_.role(caller.user, room, caller.ticket_role);
   if (method.empty() || may_call(caller.role, method)) return {};
   if (!find_call(method)) return Refusal{"call", true, "this server has no such call"};
   return Refusal{"role", true, article(caller.role) + " may not call " + std::string(short_name(method)) +
@@ -218,6 +221,8 @@ tl::expected<Caller, Refusal> Gate::admit(const CallClaims& call) {
   std::string who = "a certificate without a name";
   {
     const std::lock_guard lock(mutex_);
+    if (caller && !rates_.take(caller->user, call.method, std::chrono::steady_clock::now()))
+      caller = tl::unexpected(Refusal{kTooOften, true, "that is called too often; wait a moment and try again"});
     ++(caller ? counts_.admitted : counts_.refused);
     if (caller) return caller;
     if (const Result<PersonCertificate> certificate = certificate_of(call.certificate_pem)) who = certificate->user;
@@ -236,6 +241,10 @@ void Gate::note_refused(std::string_view reason, std::string_view sentence) {
 
 Result<void> Gate::check_resume(const Caller& caller, const std::string& room, int kind, AuthorId author) const {
   const std::lock_guard lock(mutex_);
+  return check_resume_locked(caller, room, kind, author);
+}
+
+Result<void> Gate::check_resume_locked(const Caller& caller, const std::string& room, int kind, AuthorId author) const {
   const Seat seat{room, caller.user, kind};
   if (const auto known = authors_.find({room, author}); known != authors_.end()) {
     if (known->second.seat != seat) return failure(ErrorCode::denied, "author " + std::to_string(author.value) + " is another person's; join anew");
@@ -246,10 +255,12 @@ Result<void> Gate::check_resume(const Caller& caller, const std::string& room, i
   return {};
 }
 
-void Gate::joined(const Caller& caller, const std::string& room, int kind, AuthorId author) {
+Result<void> Gate::joined(const Caller& caller, const std::string& room, int kind, AuthorId author, Coming coming) {
   std::vector<std::shared_ptr<Watched>> held, displaced;  // let go of without the lock, which their end takes
   {
     const std::lock_guard lock(mutex_);
+    if (coming == Coming::again)
+      if (Result<void> may = check_resume_locked(caller, room, kind, author); !may) return may;
     const Seat seat{room, caller.user, kind};
     AuthorId& sitting = seats_[seat];
     if (sitting && sitting != author) {
@@ -267,6 +278,7 @@ void Gate::joined(const Caller& caller, const std::string& room, int kind, Autho
   }
   const Refusal why{"displaced", true, "a newer session of " + caller.user + " took the place of this one"};
   for (const std::shared_ptr<Watched>& stream : displaced) stream->end(why);
+  return {};
 }
 
 Result<void> Gate::check_author(const Caller& caller, const std::string& room, AuthorId author) const {
@@ -299,10 +311,16 @@ GateCounts Gate::counts() const {
   return counts;
 }
 
+// A disk that is slow lets no call wait: only the list that was read is put in under the lock that calls take.
 void Gate::refresh() {
+  const std::lock_guard reading(reading_);
   const Result<bool> read = access_.refresh();
   const std::string fault = read ? std::string() : read.error().message;
-  if (read && *read) log::info("access list", {{"entries", access_.list().size()}});
+  if (read && *read) {
+    log::info("access list", {{"entries", access_.list().size()}});
+    const std::lock_guard lock(mutex_);
+    access_list_ = access_.list();
+  }
   if (!fault.empty() && fault != access_fault_) log::error("access list", {{"fault", fault}});
   access_fault_ = fault;
 }
@@ -310,9 +328,9 @@ void Gate::refresh() {
 void Gate::look() {
   std::vector<std::pair<std::shared_ptr<Watched>, Refusal>> ending;
   std::vector<std::shared_ptr<Watched>> held;  // let go of without the lock, which their end takes
+  refresh();
   {
     const std::lock_guard lock(mutex_);
-    refresh();
     for (const std::weak_ptr<Watched>& weak : streams_) {
       std::shared_ptr<Watched> stream = weak.lock();
       if (!stream || stream->ended()) {

@@ -22,6 +22,7 @@
 #include "common/access/role_table.hpp"
 #include "common/access/ticket.hpp"
 #include "common/core/id.hpp"
+#include "server/net/call_rates.hpp"
 #include "server/net/person_certificate.hpp"
 #include "server/net/refusals.hpp"
 
@@ -98,7 +99,10 @@ class Gate {
   // one of the same person took its place.
   [[nodiscard]] Result<void> check_resume(const Caller& caller, const std::string& room, int kind, AuthorId author) const;
   // From now on this identity is the caller's. An earlier one of the same person, room and kind is nobody's, and its streams end.
-  void joined(const Caller& caller, const std::string& room, int kind, AuthorId author);
+  // Who comes `again` is checked as above in one step with it, and changes nothing where that fails: a newer one may have come
+  // since it was asked.
+  enum class Coming { anew, again };
+  Result<void> joined(const Caller& caller, const std::string& room, int kind, AuthorId author, Coming coming = Coming::anew);
   [[nodiscard]] Result<void> check_author(const Caller& caller, const std::string& room, AuthorId author) const;
   // A room that is closed: its identities mean nothing any more.
   void forget_room(const std::string& room);
@@ -116,6 +120,7 @@ class Gate {
   Gate(std::filesystem::path folder, TicketCheckKey key, RefusalCounts& counts, Now now);
   // Under mutex_. What changes while somebody is in: revocations, ends and roles. Sets the role that holds.
   [[nodiscard]] std::optional<Refusal> judge_again(Caller& caller, const std::string& room, std::string_view method) const;
+  [[nodiscard]] Result<void> check_resume_locked(const Caller& caller, const std::string& room, int kind, AuthorId author) const;
   [[nodiscard]] Result<PersonCertificate> certificate_of(std::string_view pem);  // under mutex_, as the next two
   [[nodiscard]] Result<Ticket> ticket_of(std::string_view text);
   void refresh();
@@ -126,10 +131,13 @@ class Gate {
   RefusalCounts& refusals_;
   const Now now_;
   std::function<std::string()> only_room_;
+  std::mutex reading_;         // taken before mutex_, never within it
+  AccessFile access_;          // under reading_, as the next
+  std::string access_fault_;   // that was logged last
   mutable std::mutex mutex_;
-  AccessFile access_;
-  std::string access_fault_;  // that was logged last
+  AccessList access_list_;
   std::unordered_map<std::string, PersonCertificate> certificates_;  // by PEM, of those seen lately
+  CallRates rates_;
   std::unordered_map<std::string, Ticket> tickets_;            // by text, of those seen lately
   using Seat = std::tuple<std::string, std::string, int>;      // room, user, kind
   std::map<Seat, AuthorId> seats_;

@@ -263,6 +263,7 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, co
     }
     open = sink.get();
     impl_->sessions.add(*sink);
+    if (!again) impl_->people.came(sink->author());  // before it can leave
     if (impl_->mount) impl_->mount->join(sink->author());
     sink->begin(impl_->room.room_seq(), std::move(before), serialised(complete));
     for (const ToolBox::Entry* entry : tools) sink->know_tool(impl_->number_of(entry->hash), entry->hash);
@@ -271,7 +272,6 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, co
     if (impl_->redial) sink->answer(impl_->redial);
     if (impl_->ended) impl_->may_return ? sink->replaced(*impl_->ended) : sink->end(*impl_->ended);
   }
-  if (!again) impl_->people.came(sink->author());
   impl_->read_leaves(leaves);
   if (!impl_->keeper) {
     sink->set_leaves(std::move(leaves));

@@ -1,6 +1,8 @@
 // How an open stream looks to gRPC. For the sources of the services alone: gRPC stays out of headers.
+#include <grpcpp/alarm.h>
 #include <grpcpp/grpcpp.h>
 
+#include <chrono>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -53,10 +55,16 @@ inline Status not_joined(const char* message, std::uint64_t author) {
 template <class Reactor>
 class OutStream : public Reactor {
  public:
-  // Hands the stream to gRPC, which holds it until OnDone; queued jobs and cuts may hold it longer.
+  // A reader who was told that it is over, and does not read that either.
+  static constexpr std::chrono::milliseconds kLetGoAfter{1000};
+
+  // Hands the stream to gRPC, which holds it until OnDone; queued jobs and cuts may hold it longer. `context`: of its call, which is
+  // cut off where the reader does not read; null: it is not.
   template <class Stream>
-  static Stream* launch(std::shared_ptr<Stream> stream) {
+  static Stream* launch(std::shared_ptr<Stream> stream, grpc::CallbackServerContext* context = nullptr) {
     Stream* raw = stream.get();
+    raw->context_ = context;
+    raw->can_let_go_ = context != nullptr;
     raw->self_ = std::move(stream);
     return raw;
   }
@@ -87,6 +95,11 @@ class OutStream : public Reactor {
     {
       const std::lock_guard lock(mutex_);
       done_ = true;
+      alarm_.reset();
+    }
+    {
+      const std::lock_guard lock(context_mutex_);
+      context_ = nullptr;  // gone after this
     }
     leave();
     watched_.reset();  // nobody asks it any more: what came beside the stream has ended too
@@ -98,10 +111,17 @@ class OutStream : public Reactor {
   // Fills the next message; false when nothing waits.
   virtual bool take(ByteBuffer& message) = 0;
   virtual void leave() = 0;
+  // It will not be sent any more.
+  virtual void drop_waiting() {}
 
-  // Ends the stream after the message in flight; an OK end sends what waits first.
+  // Ends the stream after the message in flight; an OK end sends what waits first, unless there comes a reason not to.
   void close_locked(Status status) {
-    if (!closing_) closing_ = std::move(status);
+    const bool cuts_off = !status.ok() && !finished_ && !failing();
+    if (!closing_ || cuts_off) closing_ = std::move(status);
+    if (cuts_off) {
+      drop_waiting();
+      let_go_later();
+    }
     pump();
   }
   void pump() {
@@ -119,12 +139,30 @@ class OutStream : public Reactor {
   // Whether its caller may be told that now.
   [[nodiscard]] bool may_receive(StreamContent content) const { return !watched_ || osteon::may_receive(watched_->role(), content); }
   [[nodiscard]] bool closing() const { return closing_.has_value(); }
+  [[nodiscard]] bool failing() const { return closing_ && !closing_->ok(); }  // nothing more is sent
   [[nodiscard]] bool done() const { return done_; }  // gRPC has let go of the stream
   [[nodiscard]] std::shared_ptr<void> self() const { return self_; }
 
   mutable std::mutex mutex_;
 
  private:
+  // Under mutex_. What is in flight, and the end itself, wait for a reader: for a moment.
+  void let_go_later() {
+    if (done_ || !can_let_go_) return;
+    alarm_ = std::make_unique<grpc::Alarm>();
+    alarm_->Set(std::chrono::system_clock::now() + kLetGoAfter, [this, weak = std::weak_ptr<void>(self_)](bool rang) {
+      if (const std::shared_ptr<void> keep = rang ? weak.lock() : nullptr) let_go();
+    });
+  }
+  void let_go() {
+    const std::lock_guard lock(context_mutex_);
+    if (context_) context_->TryCancel();
+  }
+
+  std::mutex context_mutex_;  // never held with another
+  grpc::CallbackServerContext* context_ = nullptr;
+  bool can_let_go_ = false;   // set before anybody else has the stream
+  std::unique_ptr<grpc::Alarm> alarm_;
   std::shared_ptr<void> self_;
   std::shared_ptr<OpenStream> watched_;  // shared with the gate while it ends the stream
   std::optional<Status> closing_;

@@ -68,7 +68,7 @@ class PeopleServiceImpl final : public PeopleBase {
     if (!(*room)->host().knows(author)) return refused(not_joined("WatchPeopleRequest", request->author()));
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused(status_of(caller.error()));
-    PeopleStream* stream = PeopleStream::launch(std::make_shared<PeopleStream>(*room, author));
+    PeopleStream* stream = PeopleStream::launch(std::make_shared<PeopleStream>(*room, author), context);
     stream->stand_under(rooms_.gate, *caller, (*room)->name, author, "/osteon.v1.PeopleService/WatchPeople");
     (*room)->host().people().came(author);
     (*room)->host().people().watch(*stream);
@@ -158,9 +158,9 @@ class PeopleServiceImpl final : public PeopleBase {
     // What was cut in another room is that room's.
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refuse(reactor, status_of(caller.error()));
-    if (!rooms_.is_for(*caller, request->room().empty() ? room->name : request->room()))
-      return refuse(reactor, {StatusCode::PERMISSION_DENIED, "the ticket is for room " + caller->ticket_room + " and not for " + request->room() +
-                                                                 "; ask for one for that room"});
+    if (!request->room().empty())
+      if (const Result<Caller> there = caller_in(rooms_, *context, request->room(), "/osteon.v1.PeopleService/Demonstrate"); !there)
+        return refuse(reactor, status_of(there.error()));
     // A journal is read, which takes a while.
     rooms_.files.run([this, room, reactor, request, response] {
       const Result<Shown> shown = room->demonstrations().begin(rooms_, *room, AuthorId{request->author()},

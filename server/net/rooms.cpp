@@ -245,10 +245,6 @@ std::vector<const ServedCase*> Rooms::cases() const {
   return all;
 }
 
-bool Rooms::is_for(const Caller& caller, const std::string& room) const {
-  return gate == nullptr || caller.ticket_room == kAnyRoom || caller.ticket_room == room;
-}
-
 void Rooms::add_case(ServedCase served) {
   const std::lock_guard lock(cases_mutex_);
   const bool known = std::ranges::any_of(cases_, [&](const ServedCase& one) { return one.bone.hash() == served.bone.hash(); });
@@ -261,6 +257,16 @@ Result<fs::path> Rooms::kept_file(const std::string& name) const {
   std::error_code ignored;
   if (is_name(name) && !options_.folder.empty() && fs::exists(journal_of(name), ignored)) return journal_of(name);
   return tl::unexpected(no_such_room(name));
+}
+
+std::size_t Rooms::count() const {
+  std::set<std::string> names;
+  for (const std::shared_ptr<OpenRoom>& room : open_rooms()) names.insert(room->name);
+  std::error_code ignored;
+  if (!options_.folder.empty())
+    for (const auto& entry : fs::directory_iterator(options_.folder, ignored))
+      if (entry.path().extension() == kEnding && is_name(entry.path().stem().string())) names.insert(entry.path().stem().string());
+  return names.size();
 }
 
 std::vector<RoomListing> Rooms::list() const {
@@ -307,7 +313,11 @@ std::vector<RoomListing> Rooms::list() const {
 Result<void> Rooms::check_new(const std::string& name) const {
   if (!is_name(name))
     return failure(ErrorCode::invalid_input, "\"" + name + "\" is no name of a room; use letters, digits, - and _, at most 64");
-  return check_free(name);
+  if (Result<void> free = check_free(name); !free) return free;
+  // Each open one holds a bone and threads, each closed one a journal.
+  if (count() < static_cast<std::size_t>(options_.most_rooms)) return {};
+  return failure(ErrorCode::exhausted, "there are " + std::to_string(options_.most_rooms) +
+                                           " rooms, open and closed, as many as there may be; delete some, or start the server with a larger --most-rooms");
 }
 
 Result<void> Rooms::check_free(const std::string& name) const {
@@ -512,7 +522,8 @@ Result<RoomGenesis> Rooms::read(const std::string& name, RoomSeq to, const std::
   return genesis;
 }
 
-Result<std::vector<std::string>> Rooms::remove(const std::string& name, bool with_branches) {
+Result<std::vector<std::string>> Rooms::remove(const std::string& name, bool with_branches,
+                                               const std::function<Result<void>(const std::string& room)>& may) {
   std::vector<std::string> names{name};
   if (const Result<fs::path> file = kept_file(name)) {
     // Only a room's own keeper can look into a journal that is in use.
@@ -536,6 +547,8 @@ Result<std::vector<std::string>> Rooms::remove(const std::string& name, bool wit
   } else if ((*room)->keeper()) {
     return tl::unexpected(kept_elsewhere(**room));
   }
+  for (const std::string& one : names)
+    if (const Result<void> allowed = may ? may(one) : Result<void>{}; !allowed) return tl::unexpected(allowed.error());
   std::vector<std::string> deleted;
   // Those that hang on others first: where this is interrupted, what is left is still known as a branch.
   for (auto one = names.rbegin(); one != names.rend(); ++one) {

@@ -48,6 +48,8 @@ struct ServedCase {
   std::filesystem::path folder;  // that clients are sent
 };
 
+inline constexpr int kMostRooms = 256;  // unless somebody says otherwise
+
 struct RoomsOptions {
   std::vector<ServedCase> cases;      // at least one
   std::filesystem::path folder{};     // of the journals NAME.journal; empty: rooms made here end with the process
@@ -57,6 +59,7 @@ struct RoomsOptions {
   Detail detail = Detail::automatic;
   int retention_days = 0;             // after which it is forgotten who somebody was; 0: never
   std::shared_ptr<CaseStore> store{};  // where uploaded cases are kept, shared with uploads under way; null: none are taken
+  int most_rooms = kMostRooms;        // open and closed ones together; none is made beyond
 };
 
 // A room that is open. Streams and calls hold it, so that it is there until the last of them is over.
@@ -110,8 +113,8 @@ struct RoomListing {
 };
 
 // Any thread. What makes, opens, closes, copies or deletes takes long and runs one at a time. Errors: not_found (no such
-// room), exists (there is one of that name), invalid_input (not a name; a place that the room has not reached), unavailable
-// (closed, or not kept), and those of RoomKeeper.
+// room), exists (there is one of that name), exhausted (there are as many as there may be), invalid_input (not a name; a place that
+// the room has not reached), unavailable (closed, or not kept), and those of RoomKeeper.
 class Rooms {
  public:
   explicit Rooms(RoomsOptions options);
@@ -147,8 +150,10 @@ class Rooms {
   // The rows of a kept room, open or closed, from its first to `to`, null for all, until `take` returns false; and what it
   // began as.
   Result<RoomGenesis> read(const std::string& name, RoomSeq to, const std::function<bool(const RoomRow&)>& take);
-  // The names of those that are gone. Error unavailable: it has branches, and they are not to go too; it is kept elsewhere.
-  Result<std::vector<std::string>> remove(const std::string& name, bool with_branches);
+  // The names of those that are gone. `may` is asked of it and of each branch that would go too, before any does; its error is the
+  // result. Error unavailable: it has branches, and they are not to go too; it is kept elsewhere.
+  Result<std::vector<std::string>> remove(const std::string& name, bool with_branches,
+                                          const std::function<Result<void>(const std::string& room)>& may = {});
   // Of an open room, while it is cut.
   Result<RoomReport> verify(const std::string& name);
   Result<JournalHead> back_up(const std::string& name, const std::string& file_name, std::filesystem::path& file);
@@ -164,14 +169,13 @@ class Rooms {
   JobThread jobs;   // whatever changes the rooms
   JobThread files;  // what only reads a case's files
   RefusalCounts refusals;  // of all doors
-  // Whether a caller's ticket is for that room; over plain text everybody's is for every room.
-  [[nodiscard]] bool is_for(const Caller& caller, const std::string& room) const;
   Gate* gate = nullptr;    // before every call; null: plain text, and everybody may do anything. It outlives the rooms' calls
 
  private:
   [[nodiscard]] std::filesystem::path journal_of(const std::string& name) const;
-  [[nodiscard]] Result<void> check_new(const std::string& name) const;
+  [[nodiscard]] Result<void> check_new(const std::string& name) const;  // with changing_
   [[nodiscard]] Result<void> check_free(const std::string& name) const;
+  [[nodiscard]] std::size_t count() const;  // of open and of kept ones
   [[nodiscard]] Result<std::filesystem::path> kept_file(const std::string& name) const;
   Result<std::shared_ptr<OpenRoom>> open(const std::string& name, const ServedCase& served, bool is_new,
                                          const std::function<void(double)>& progress);

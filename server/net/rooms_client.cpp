@@ -33,6 +33,9 @@ Result<Response> ask(const std::shared_ptr<grpc::Channel>& channel,
                      grpc::Status (v1::RoomsService::Stub::*call)(grpc::ClientContext*, const Request&, Response*),
                      const Request& request) {
   grpc::ClientContext context;
+  // By the role in that room it is let in, too, which may be more than the ticket's.
+  if constexpr (requires { request.name(); })
+    if (!request.name().empty()) context.AddMetadata("osteon-room-bin", request.name());
   Response response;
   const auto stub = v1::RoomsService::NewStub(channel);
   const grpc::Status status = (stub.get()->*call)(&context, request, &response);

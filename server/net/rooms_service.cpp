@@ -43,15 +43,15 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
       reactor->Finish(status_of(caller.error()));
       return reactor;
     }
-    rooms_.files.run([this, reactor, response, caller = *caller] {
+    rooms_.files.run([this, reactor, context, response] {
       for (const RoomListing& listing : rooms_.list())
-        if (rooms_.is_for(caller, listing.name)) *response->add_rooms() = to_wire(listing);
+        if (caller_in(rooms_, *context, listing.name, method("ListRooms"))) *response->add_rooms() = to_wire(listing);
       reactor->Finish(Status::OK);
     });
     return reactor;
   }
   Reactor* CreateRoom(Context* context, const v1::CreateRoomRequest* request, v1::CreateRoomResponse* response) override {
-    return slowly(context, request->name(), [this, request, response] {
+    return slowly(context, "CreateRoom", request->name(), [this, request, response] {
       std::optional<Digest> hash;
       if (!request->case_hash().empty()) {
         const Result<Digest> named = wire::digest_from_wire(request->case_hash());
@@ -62,7 +62,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     });
   }
   Reactor* CloseRoom(Context* context, const v1::CloseRoomRequest* request, v1::CloseRoomResponse* response) override {
-    return slowly(context, request->name(), [this, request, response] {
+    return slowly(context, "CloseRoom", request->name(), [this, request, response] {
       const Result<RoomSummary> closed = rooms_.close(request->name());
       if (!closed) return status_of(closed.error());
       if (rooms_.gate) rooms_.gate->forget_room(request->name());
@@ -74,16 +74,21 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     });
   }
   Reactor* ResumeRoom(Context* context, const v1::ResumeRoomRequest* request, v1::ResumeRoomResponse* response) override {
-    return slowly(context, request->name(), [this, request, response] { return told(rooms_.resume(request->name()), response->mutable_room()); });
+    return slowly(context, "ResumeRoom", request->name(), [this, request, response] { return told(rooms_.resume(request->name()), response->mutable_room()); });
   }
   Reactor* BranchRoom(Context* context, const v1::BranchRoomRequest* request, v1::BranchRoomResponse* response) override {
-    return slowly(context, request->name(), [this, request, response] {
+    return slowly(context, "BranchRoom", request->name(), [this, request, response] {
       return told(rooms_.branch(request->name(), request->new_name(), RoomSeq{request->room_seq()}), response->mutable_room());
     });
   }
   Reactor* DeleteRoom(Context* context, const v1::DeleteRoomRequest* request, v1::DeleteRoomResponse* response) override {
-    return slowly(context, request->name(), [this, request, response] {
-      const Result<std::vector<std::string>> gone = rooms_.remove(request->name(), request->with_branches());
+    return slowly(context, "DeleteRoom", request->name(), [this, context, request, response] {
+      // Of every branch too it is asked whether the caller may.
+      const auto may = [&](const std::string& room) -> Result<void> {
+        const Result<Caller> caller = caller_in(rooms_, *context, room, method("DeleteRoom"));
+        return caller ? Result<void>{} : tl::unexpected(caller.error());
+      };
+      const Result<std::vector<std::string>> gone = rooms_.remove(request->name(), request->with_branches(), may);
       if (!gone) return status_of(gone.error());
       for (const std::string& name : *gone) {
         if (rooms_.gate) rooms_.gate->forget_room(name);
@@ -93,7 +98,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     });
   }
   Reactor* VerifyRoom(Context* context, const v1::VerifyRoomRequest* request, v1::VerifyRoomResponse* response) override {
-    return slowly(context, request->name(), [this, request, response] {
+    return slowly(context, "VerifyRoom", request->name(), [this, request, response] {
       const auto report = rooms_.verify(request->name());
       if (!report) return status_of(report.error());
       response->set_room_seq(report->head.place.value);
@@ -105,7 +110,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     });
   }
   Reactor* BackUpRoom(Context* context, const v1::BackUpRoomRequest* request, v1::BackUpRoomResponse* response) override {
-    return slowly(context, request->name(), [this, request, response] {
+    return slowly(context, "BackUpRoom", request->name(), [this, request, response] {
       std::filesystem::path file;
       const Result<JournalHead> copied = rooms_.back_up(request->name(), request->file_name(), file);
       if (!copied) return status_of(copied.error());
@@ -116,7 +121,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     });
   }
   Reactor* ReplayRoom(Context* context, const v1::ReplayRoomRequest* request, v1::ReplayRoomResponse* response) override {
-    return slowly(context, request->name(), [this, request, response] {
+    return slowly(context, "ReplayRoom", request->name(), [this, request, response] {
       return told(rooms_.replay(request->name(), request->new_name(), RoomSeq{request->from_room_seq()},
                                 RoomSeq{request->to_room_seq()}, request->speed()),
                   response->mutable_room());
@@ -124,16 +129,25 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
   }
 
  private:
-  Reactor* slowly(Context* context, const std::string& room, std::function<Status()> work) {
+  static std::string method(const char* name) { return std::string("/osteon.v1.RoomsService/") + name; }
+
+  // Judged by the room that the message names, at once and again when its turn comes: others may take minutes before it.
+  Reactor* slowly(Context* context, const char* name, const std::string& room, std::function<Status()> work) {
     Reactor* reactor = context->DefaultReactor();
-    const Result<Caller> caller = caller_of(rooms_, *context);
-    if (!caller || !rooms_.is_for(*caller, room)) {
-      reactor->Finish(caller ? Status(StatusCode::PERMISSION_DENIED, "the ticket is for room " + caller->ticket_room + " and not for " + room +
-                                                                         "; ask for one for that room")
-                             : status_of(caller.error()));
+    const auto refusal = [this, context, name, room]() -> std::optional<Status> {
+      const Result<Caller> caller = caller_in(rooms_, *context, room, method(name));
+      return caller ? std::nullopt : std::optional(status_of(caller.error()));
+    };
+    // A call that names none would be about the only one that is open, whichever that is when its turn comes.
+    std::optional<Status> refused = room.empty() ? std::optional(invalid("the request names no room")) : refusal();
+    if (refused) {
+      reactor->Finish(std::move(*refused));
       return reactor;
     }
-    rooms_.jobs.run([reactor, work = std::move(work)] { reactor->Finish(work()); });
+    rooms_.jobs.run([reactor, refusal, work = std::move(work)] {
+      std::optional<Status> refused_now = refusal();
+      reactor->Finish(refused_now ? std::move(*refused_now) : work());
+    });
     return reactor;
   }
   Status told(const Result<std::shared_ptr<OpenRoom>>& room, v1::RoomInfo* info) {

@@ -136,13 +136,18 @@ class RoomServiceImpl final : public RoomBase {
     room->host().run_slowly([this, room, reactor, context, request, response, caller = *caller] {
       RoomHost& host = room->host();
       const Case& bone = host.bone();
+      const Gate::Coming coming = request->resume_author() != 0 ? Gate::Coming::again : Gate::Coming::anew;
+      // Others may have come while this waited for its turn: who was displaced meanwhile leaves the room as it is.
+      if (const Result<void> still = may_join(caller, *room, *request); !still) return reactor->Finish(status_of(still.error()));
       const Result<AuthorId> author =
           request->resume_author() != 0 ? come_back(host, *request, rooms_.gate ? std::optional(caller.role) : std::nullopt) : come(host, *request, *response, caller);
       if (!author) {
         rooms_.refusals.note("room", address_of(context->peer()), author.error().message);
         return reactor->Finish(status_of(author.error()));
       }
-      if (rooms_.gate) rooms_.gate->joined(caller, room->name, request->kind(), *author);
+      if (rooms_.gate)
+        if (const Result<void> seated = rooms_.gate->joined(caller, room->name, request->kind(), *author, coming); !seated)
+          return reactor->Finish(status_of(seated.error()));
       room->note_version(*author, request->protocol_version());
       log::info("joined", {{"room", room->name},
                            {"author", author->value},
@@ -217,7 +222,7 @@ class RoomServiceImpl final : public RoomBase {
         return refused({StatusCode::PERMISSION_DENIED, "case " + to_hex(*hash) + " is not that of room " + (*room)->name});
       of_room = (*room)->name;
     }
-    CaseStream* stream = CaseStream::launch(std::make_shared<CaseStream>(rooms_.files, served->folder));
+    CaseStream* stream = CaseStream::launch(std::make_shared<CaseStream>(rooms_.files, served->folder), context);
     stream->stand_under(rooms_.gate, *caller, of_room, {}, "/osteon.v1.RoomService/GetCase");
     stream->start();
     return stream;

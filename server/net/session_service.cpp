@@ -42,19 +42,23 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     (void)said.ParseFromString(*complete);
     const std::uint64_t decided = said.complete().decided_author_seq();
     if (links_) {
-      link_ = links_->add(author_, decided + 1, *this);
+      std::shared_ptr<SessionLink> link = links_->add(author_, decided + 1, *this);
+      const std::lock_guard lock(mutex_);
+      link_ = std::move(link);
       before.insert(before.begin(), link_row(link_->keys(), links_->port()));
     }
     for (Bytes& row : before) row = in_its_version(row_for_role(RoomSeq{}, row));
     std::erase(before, nullptr);
     const std::lock_guard lock(mutex_);
     taken_ = decided;
+    if (failing()) return;
     outbox_.begin(contained, std::move(before), std::move(complete));
     pump();
   }
   void set_leaves(std::vector<FieldLeaf> leaves) override {
     if (!may_receive(StreamContent::field)) leaves.clear();
     const std::lock_guard lock(mutex_);
+    if (failing()) return;
     outbox_.set_leaves(std::move(leaves));
     pump();
   }
@@ -80,9 +84,10 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     if (link_) link_->tell(index, goes ? fast : wire::SessionRow{.room_seq = place, .kind = wire::SessionRowKind::streamed});
   }
   void hold(const wire::SessionRow& supervised) override {
-    if (link_ && may_carry(DatagramContent::supervision)) link_->tell(0, supervised);
+    if (link_ && !is_closing() && may_carry(DatagramContent::supervision)) link_->tell(0, supervised);
   }
   bool show_partners(const std::vector<CuttingState>& states) override {
+    if (is_closing()) return false;  // nor are they told by datagram
     std::vector<CuttingState> others;
     std::ranges::copy_if(states, std::back_inserter(others), [&](const CuttingState& state) { return state.author != author_; });
     const bool by_link = link_ && may_carry(DatagramContent::partners) && link_->set_partners(others);
@@ -93,7 +98,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     return partners_.waits();
   }
   void show_bone(const BoneSeen& seen) override {
-    if (!may_carry(DatagramContent::bone_seen)) return;
+    if (is_closing() || !may_carry(DatagramContent::bone_seen)) return;
     const bool by_link = link_ && link_->set_bone(seen);
     const std::lock_guard lock(mutex_);
     const auto now = PartnerOutbox::Clock::now();
@@ -297,6 +302,15 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
       close_locked({StatusCode::RESOURCE_EXHAUSTED, "the reader is more than " + std::to_string(SessionOutbox::kMaxRows) +
                                                         " events behind the room; join again"});
   }
+  [[nodiscard]] bool is_closing() const {
+    const std::lock_guard lock(mutex_);
+    return closing();
+  }
+  void drop_waiting() override {
+    outbox_ = {};
+    partners_ = {};
+    bone_.reset();
+  }
   bool take(ByteBuffer& message) override {
     MessageParts parts = outbox_.take();
     if (parts.empty() && outbox_.begun() && bone_) {
@@ -315,7 +329,12 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   void leave() override {
     host_.leave(*this);
     if (opened_) log::info("session over", {{"room", room_->name}, {"author", author_.value}});
-    if (link_) links_->remove(link_);
+    // The reader may go while the session is being opened.
+    const auto link = [&] {
+      const std::lock_guard lock(mutex_);
+      return link_;
+    }();
+    if (link) links_->remove(link);
   }
 
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
@@ -347,7 +366,7 @@ class CuttingServiceImpl final : public v1::CuttingService::WithRawCallbackMetho
     Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused<BidiReactor>(status_of(caller.error()));
     SessionStream* stream =
-        SessionStream::launch(std::make_shared<SessionStream>(std::move(*room), links_, rooms_.gate, std::move(*caller)));
+        SessionStream::launch(std::make_shared<SessionStream>(std::move(*room), links_, rooms_.gate, std::move(*caller)), context);
     stream->start();
     return stream;
   }

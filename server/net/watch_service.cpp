@@ -22,6 +22,7 @@ class MeshStream final : public OutStream<WriteReactor>, public MeshSink {
   AuthorId author() const override { return author_; }
   void begin(MeshUpdate whole_surface) override {
     const std::lock_guard lock(mutex_);
+    if (failing()) return;
     outbox_.emplace(std::move(whole_surface));
     pump();
   }
@@ -47,6 +48,7 @@ class MeshStream final : public OutStream<WriteReactor>, public MeshSink {
     if (!parts.empty()) message = buffer_of(parts);
     return !parts.empty();
   }
+  void drop_waiting() override { outbox_.reset(); }
   void leave() override { room_->host().leave(*this); }
 
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
@@ -113,7 +115,7 @@ class WatchServiceImpl final : public WatchBase {
     }
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused(status_of(caller.error()));
-    MeshStream* stream = MeshStream::launch(std::make_shared<MeshStream>(*room, AuthorId{request->author()}));
+    MeshStream* stream = MeshStream::launch(std::make_shared<MeshStream>(*room, AuthorId{request->author()}), context);
     stream->stand_under(rooms_.gate, *caller, (*room)->name, AuthorId{request->author()}, "/osteon.v1.WatchService/WatchMesh");
     (*room)->host().watch_mesh(*stream, look);
     return stream;
@@ -146,7 +148,7 @@ class WatchServiceImpl final : public WatchBase {
     const std::chrono::nanoseconds apart{request->most_hz() == 0 ? 0 : 1'000'000'000 / request->most_hz()};
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused(status_of(caller.error()));
-    CuttingStream* stream = CuttingStream::launch(std::make_shared<CuttingStream>(*room, AuthorId{request->author()}, apart));
+    CuttingStream* stream = CuttingStream::launch(std::make_shared<CuttingStream>(*room, AuthorId{request->author()}, apart), context);
     stream->stand_under(rooms_.gate, *caller, (*room)->name, AuthorId{request->author()}, "/osteon.v1.WatchService/WatchCutting");
     (*room)->host().watch_cutting(*stream);
     return stream;

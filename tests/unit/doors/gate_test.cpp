@@ -143,9 +143,9 @@ TEST_F(GateTest, NamesTheFileThatIsWrong) {
 
 TEST_F(GateTest, KeepsAuthorsToTheirPeople) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
-  gate_->joined(anna, "ward", 1, AuthorId{1});
-  gate_->joined(anna, "ward", 2, AuthorId{2});
-  gate_->joined(ben, "ward", 1, AuthorId{3});
+  (void)gate_->joined(anna, "ward", 1, AuthorId{1});
+  (void)gate_->joined(anna, "ward", 2, AuthorId{2});
+  (void)gate_->joined(ben, "ward", 1, AuthorId{3});
   EXPECT_TRUE(gate_->check_author(anna, "ward", AuthorId{1}));
   EXPECT_TRUE(gate_->check_author(anna, "ward", AuthorId{2}));
   EXPECT_TRUE(gate_->check_author(ben, "ward", AuthorId{3}));
@@ -165,33 +165,90 @@ TEST_F(GateTest, KeepsAuthorsToTheirPeople) {
 
 TEST_F(GateTest, ANewerSessionTakesThePlaceOfAnOlderOne) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
-  gate_->joined(anna, "ward", 1, AuthorId{1});
-  gate_->joined(ben, "ward", 1, AuthorId{2});
+  (void)gate_->joined(anna, "ward", 1, AuthorId{1});
+  (void)gate_->joined(ben, "ward", 1, AuthorId{2});
   std::string ended, bystander;
   const auto older = gate_->enter(anna, "ward", AuthorId{1}, kWatch, [&](const Refusal& why) { ended += why.sentence; });
   const auto others = gate_->enter(ben, "ward", AuthorId{2}, kWatch, [&](const Refusal& why) { bystander += why.sentence; });
-  gate_->joined(anna, "ward", 2, AuthorId{3});
-  gate_->joined(anna, "other", 1, AuthorId{1});
+  (void)gate_->joined(anna, "ward", 2, AuthorId{3});
+  (void)gate_->joined(anna, "other", 1, AuthorId{1});
   EXPECT_EQ(ended, "") << "another kind of program, another room";
-  gate_->joined(anna, "ward", 1, AuthorId{4});
+  (void)gate_->joined(anna, "ward", 1, AuthorId{4});
   EXPECT_THAT(ended, HasSubstr("newer session of anna"));
   EXPECT_EQ(bystander, "");
   EXPECT_FALSE(gate_->check_author(anna, "ward", AuthorId{1}));
   EXPECT_TRUE(gate_->check_author(anna, "ward", AuthorId{4}));
   EXPECT_FALSE(gate_->check_resume(anna, "ward", 1, AuthorId{1})) << "or they would push out each other for ever";
   EXPECT_EQ(gate_->counts().displaced, 1u);
-  gate_->joined(anna, "ward", 1, AuthorId{4});
+  (void)gate_->joined(anna, "ward", 1, AuthorId{4});
   EXPECT_EQ(gate_->counts().displaced, 1u);
+}
+
+TEST_F(GateTest, WhoComesAgainTooLateTakesNoPlace) {
+  const Caller anna = let_in("anna", Role::trainee);
+  ASSERT_TRUE(gate_->joined(anna, "ward", 1, AuthorId{1}));
+  EXPECT_TRUE(gate_->joined(anna, "ward", 1, AuthorId{1}, Gate::Coming::again));
+  ASSERT_TRUE(gate_->check_resume(anna, "ward", 1, AuthorId{1}));
+  // A newer program comes between the question and the answer.
+  ASSERT_TRUE(gate_->joined(anna, "ward", 1, AuthorId{2}));
+  std::string ended;
+  const auto newer = gate_->enter(anna, "ward", AuthorId{2}, kWatch, [&](const Refusal& why) { ended += why.sentence; });
+  const auto late = gate_->joined(anna, "ward", 1, AuthorId{1}, Gate::Coming::again);
+  ASSERT_FALSE(late);
+  EXPECT_THAT(late.error().message, HasSubstr("newer session of anna"));
+  EXPECT_EQ(ended, "");
+  EXPECT_TRUE(gate_->check_author(anna, "ward", AuthorId{2}));
+  EXPECT_FALSE(gate_->check_author(anna, "ward", AuthorId{1}));
+}
+
+TEST_F(GateTest, StopsWhoCallsMoreOftenThanAnybodyDoesByHand) {
+  constexpr const char* kSay = "/osteon.v1.PeopleService/Say";
+  const std::string annas = ticket("anna", "ward", Role::trainee), bens = ticket("ben", "ward", Role::trainee);
+  std::string said;
+  int let_in = 0;
+  for (; let_in < 100'000 && said.empty(); ++let_in) said = refused("anna", annas, "ward", kSay, true);
+  EXPECT_THAT(said, HasSubstr("rate: that is called too often"));
+  EXPECT_GT(let_in, 20) << "a script may say much at once";
+  EXPECT_EQ(refused("anna", annas, "ward", kWatch, true), "") << "another call";
+  EXPECT_EQ(refused("ben", bens, "ward", kSay, true), "") << "another person";
+  EXPECT_GE(refusals_.counts().at("rate"), 1u);
+  // In a while again.
+  EXPECT_TRUE(test::wait_until([&] { return refused("anna", annas, "ward", kSay, true).empty(); }, 10s));
+}
+
+// Between the question whose an identity is and the beginning of its stream there is no moment in which it is lost unseen.
+TEST_F(GateTest, LooksAgainWhoItIsWhenAStreamBegins) {
+  const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
+  ASSERT_TRUE(gate_->joined(anna, "ward", 1, AuthorId{1}) && gate_->joined(ben, "ward", 1, AuthorId{2}));
+  ASSERT_TRUE(gate_->check_author(anna, "ward", AuthorId{1}));
+  const auto enter = [&](const Caller& who, AuthorId as) {
+    const auto entered = gate_->enter(who, "ward", as, kWatch, [](const Refusal&) {});
+    return entered ? std::string() : entered.error().sentence;
+  };
+  EXPECT_EQ(enter(anna, AuthorId{1}), "");
+  EXPECT_THAT(enter(anna, AuthorId{2}), HasSubstr("author 2 is not yours"));
+  ASSERT_TRUE(gate_->joined(anna, "ward", 1, AuthorId{3}));
+  EXPECT_THAT(enter(anna, AuthorId{1}), HasSubstr("author 1 is not yours in this room, or no more")) << "a newer session took its place";
+  EXPECT_EQ(enter(anna, AuthorId{3}), "");
+  EXPECT_EQ(enter(anna, {}), "") << "as nobody";
+  people_->append_access("role anna observer");
+  gate_->look();
+  EXPECT_THAT(enter(anna, AuthorId{3}), HasSubstr("your role has changed to observer"));
+  EXPECT_THAT(enter(anna, {}), HasSubstr("your role has changed to observer"));
+  people_->append_access("revoke user ben");
+  gate_->look();
+  EXPECT_THAT(enter(ben, AuthorId{2}), HasSubstr("revoked"));
+  EXPECT_EQ(gate_->counts().streams, 0u);
 }
 
 TEST_F(GateTest, ARoomThatIsMadeAnewLeavesItsNewPeopleAlone) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
-  gate_->joined(anna, "ward", 1, AuthorId{1});
+  (void)gate_->joined(anna, "ward", 1, AuthorId{1});
   // Deleted and made again behind the gate's back: its authors are counted anew.
-  gate_->joined(ben, "ward", 1, AuthorId{1});
+  (void)gate_->joined(ben, "ward", 1, AuthorId{1});
   std::string ended;
   const auto bens = gate_->enter(ben, "ward", AuthorId{1}, kWatch, [&](const Refusal& why) { ended += why.sentence; });
-  gate_->joined(anna, "ward", 1, AuthorId{2});
+  (void)gate_->joined(anna, "ward", 1, AuthorId{2});
   EXPECT_EQ(ended, "");
   EXPECT_TRUE(gate_->check_author(ben, "ward", AuthorId{1}));
   EXPECT_TRUE(gate_->check_author(anna, "ward", AuthorId{2}));
@@ -210,6 +267,7 @@ TEST_F(GateTest, KnowsWhichRoomIsMeantThatIsNotNamed) {
 
 TEST_F(GateTest, EndsStreamsOfWhoMayHaveThemNoMore) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
+  ASSERT_TRUE(gate_->joined(anna, "ward", 1, AuthorId{1}) && gate_->joined(ben, "ward", 1, AuthorId{2}));
   std::optional<Refusal> ended[3];
   std::atomic<int> calls = 0;
   const auto into = [&](int i) { return [&, i](const Refusal& why) { ended[i] = why, ++calls; }; };
@@ -235,13 +293,56 @@ TEST_F(GateTest, EndsStreamsOfWhoMayHaveThemNoMore) {
 
 TEST_F(GateTest, KnowsAPersonWhoseRoleHasChangedOnlyAfterAnotherJoin) {
   const Caller before = let_in("anna", Role::collaborator);
-  gate_->joined(before, "ward", 1, AuthorId{1});
+  (void)gate_->joined(before, "ward", 1, AuthorId{1});
   people_->append_access("role anna trainee");
   gate_->look();
   const Caller after = let_in("anna", Role::collaborator);
   EXPECT_EQ(after.role, Role::trainee);
   EXPECT_THAT(gate_->check_author(after, "ward", AuthorId{1}).error().message, HasSubstr("role has changed"));
   EXPECT_THAT(gate_->check_resume(after, "ward", 1, AuthorId{1}).error().message, HasSubstr("role has changed"));
+}
+
+TEST(CallRates, LetThroughAsManyAsTheTimeAllows) {
+  constexpr const char* kJoin = "/osteon.v1.RoomService/Join";
+  CallRates rates;
+  CallRates::Time now{};
+  const auto through = [&](const std::string& user, std::chrono::milliseconds every, std::chrono::seconds length) {
+    int count = 0;
+    for (const auto end = now + length; now < end; now += every) count += rates.take(user, kJoin, now) ? 1 : 0;
+    return count;
+  };
+  // Whoever tries a thousand times a second for an hour is let through as often as the rate and one rest say.
+  const int in_an_hour = through("eve", 1ms, 3600s);
+  EXPECT_GT(in_an_hour, 3600);
+  EXPECT_LT(in_an_hour, 5 * 3600);
+  // As somebody may who has a bad line for a minute.
+  EXPECT_EQ(through("anna", 500ms, 60s), 120);
+  for (int i = 0; i < 1000; ++i) EXPECT_TRUE(rates.take("anna", "/osteon.v1.WatchService/LookFrom", now)) << "what costs nothing is not counted";
+  // Time that goes back gives nothing.
+  while (rates.take("eve", kJoin, now)) {}
+  EXPECT_FALSE(rates.take("eve", kJoin, now - 10s));
+  EXPECT_FALSE(rates.take("eve", kJoin, now));
+}
+
+TEST(CallRates, RememberNoMorePeopleThanTheirLimit) {
+  CallRates rates;
+  CallRates::Time now{};
+  for (std::size_t i = 0; i < 3 * CallRates::kMost; ++i) {
+    EXPECT_TRUE(rates.take(std::to_string(i), "/osteon.v1.RoomService/Join", now));
+    EXPECT_LE(rates.size(), CallRates::kMost);
+    now += 10ms;
+  }
+}
+
+TEST(CallRates, AreThoseOfCallsThatThereAre) {
+  int limited = 0;
+  for (const CallRow& row : call_rows()) limited += find_call_rate(row.method) != nullptr ? 1 : 0;
+  EXPECT_EQ(limited, 21);
+  // All that makes a row of the journal.
+  for (const char* method : {"Join", "Mark", "Undo", "Redo", "AddTool", "RemoveBody", "SetSceneItem", "RemoveSceneItem"})
+    EXPECT_NE(find_call_rate(std::string("/osteon.v1.RoomService/") + method), nullptr) << method;
+  for (const char* method : {"Say", "Annotate", "Supervise", "Demonstrate"})
+    EXPECT_NE(find_call_rate(std::string("/osteon.v1.PeopleService/") + method), nullptr) << method;
 }
 
 TEST(RefusalLog, SaysEachOnceAndRemembersNoMoreThanItsLimit) {

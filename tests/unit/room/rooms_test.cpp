@@ -89,6 +89,27 @@ TEST_F(RoomsTest, WhoIsInOneHearsNothingOfAnother) {
   EXPECT_EQ(listed(true), (std::vector<std::string>{"anna", "berta"}));
 }
 
+// Open ones hold bones and threads, closed ones journals: both are of those that there may be.
+TEST_F(RoomsTest, NoMoreAreMadeThanThereMayBe) {
+  client_.reset();
+  server_.reset();
+  Rooms rooms({.cases = {{test_block(), dir_ / "case"}}, .folder = dir_ / "rooms", .most_rooms = 3});
+  ASSERT_TRUE(rooms.create("anna", nullptr));
+  ASSERT_TRUE(rooms.create("berta", nullptr));
+  ASSERT_TRUE(rooms.branch("anna", "carla", RoomSeq{}));
+  ASSERT_TRUE(rooms.close("berta"));
+  const auto made = rooms.create("dora", nullptr), branched = rooms.branch("anna", "dora", RoomSeq{}),
+             shown = rooms.replay("anna", "dora", RoomSeq{}, RoomSeq{}, 1);
+  for (const auto* refused : {&made, &branched, &shown}) {
+    ASSERT_FALSE(*refused);
+    EXPECT_EQ(refused->error().code, ErrorCode::exhausted) << refused->error().message;
+  }
+  EXPECT_FALSE(fs::exists(dir_ / "rooms" / "dora.journal"));
+  EXPECT_TRUE(rooms.resume("berta")) << "those that there are may be opened";
+  ASSERT_TRUE(rooms.remove("carla", false));
+  EXPECT_TRUE(rooms.create("dora", nullptr));
+}
+
 TEST_F(RoomsTest, ACallWithoutANameIsToTheOnlyRoom) {
   EXPECT_NE(refusal_of("").find("no room is open"), std::string::npos);
   ASSERT_TRUE(client_->create("anna", ""));

@@ -49,6 +49,7 @@ detail: near
 certificates: certs
 plain: true
 most_connections: 40
+most_rooms: 12
 mount: true
 metrics: 9464
 drain_seconds: 7
@@ -79,6 +80,7 @@ limits:
   EXPECT_EQ(c.certificates, dir_ / "certs");
   EXPECT_TRUE(c.plain);
   EXPECT_EQ(c.most_connections, 40);
+  EXPECT_EQ(c.most_rooms, 12);
   EXPECT_TRUE(c.mount);
   EXPECT_EQ(c.metrics, "9464");
   EXPECT_EQ(c.drain_seconds, 7);
@@ -116,6 +118,7 @@ const std::multimap<std::string, std::pair<std::string, std::string>> kWrong{
     {"metrics", {"0.0.0.0:9464", "this machine alone"}},
     {"metrics", {"port", "write a port"}},
     {"most_connections", {"0", "from 1 to 65535"}},
+    {"most_rooms", {"0", "from 1 to 65536"}},
     {"mount", {"soft", "true or false"}},
     {"plain", {"yes please", "true or false"}},
     {"resume", {"''", "write a path"}},
