@@ -70,7 +70,7 @@ struct RoomHost::Impl {
     wire::SessionRow fast;
     [[nodiscard]] bool is_for(AuthorId author) const { return row && (!to || to == author); }
   };
-  [[nodiscard]] static Personal personal_row(const RoomEvent& event);
+  [[nodiscard]] Personal personal_row(const RoomEvent& event);
   // [tick] In a room that nobody keeps; 0: without a name.
   [[nodiscard]] std::uint32_t person_of(const std::string& name) {
     return name.empty() ? 0 : persons.emplace(name, static_cast<std::uint32_t>(persons.size() + 1)).first->second;

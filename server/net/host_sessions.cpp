@@ -155,10 +155,12 @@ MessageParts RoomHost::Impl::rows_of(const RoomEvent& event) {
 }
 
 RoomHost::Impl::Personal RoomHost::Impl::personal_row(const RoomEvent& event) {
-  if (const auto* decided = std::get_if<SuperviseRow>(&event.people))
-    return {decided->subject, supervised_row(event.room_seq, decided->supervision, event.lease_epoch),
+  if (const auto* decided = std::get_if<SuperviseRow>(&event.people)) {
+    const Decider by{event.author, people.name_of(event.author)};
+    return {decided->subject, supervised_row(event.room_seq, decided->supervision, event.lease_epoch, by),
             {.room_seq = event.room_seq, .kind = wire::SessionRowKind::supervised, .lease_epoch = event.lease_epoch,
-             .supervision = decided->supervision}};
+             .supervision = decided->supervision, .by = by}};
+  }
   if (const auto* said = std::get_if<WordsRow>(&event.people))
     return {said->to, said_row(event.room_seq, event.author, *said), {.room_seq = event.room_seq}};
   return {};
@@ -245,7 +247,8 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, co
     // Whatever holds for the hand, it knows before it could cut; also that nothing does any more.
     const People::Supervised& held = impl_->room.people().supervised(sink->author());
     const std::uint64_t lease_epoch = impl_->room.lease_epoch(sink->author());
-    if (held.place) before.push_back(supervised_row(RoomSeq{}, held.supervision, lease_epoch));
+    const Decider by{held.by, impl_->people.name_of(held.by)};
+    if (held.place) before.push_back(supervised_row(RoomSeq{}, held.supervision, lease_epoch, by));
     v1::SessionResponse complete;
     complete.mutable_complete()->set_room_seq(impl_->room.room_seq().value);
     complete.mutable_complete()->set_lease_epoch(lease_epoch);
@@ -268,7 +271,7 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, co
     sink->begin(impl_->room.room_seq(), std::move(before), serialised(complete));
     for (const ToolBox::Entry* entry : tools) sink->know_tool(impl_->number_of(entry->hash), entry->hash);
     if (held.place)
-      sink->hold({.room_seq = {}, .kind = wire::SessionRowKind::supervised, .lease_epoch = lease_epoch, .supervision = held.supervision});
+      sink->hold({.room_seq = {}, .kind = wire::SessionRowKind::supervised, .lease_epoch = lease_epoch, .supervision = held.supervision, .by = by});
     if (impl_->redial) sink->answer(impl_->redial);
     if (impl_->ended) impl_->may_return ? sink->replaced(*impl_->ended) : sink->end(*impl_->ended);
   }

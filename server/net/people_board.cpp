@@ -22,6 +22,7 @@ PeopleBoard::PeopleBoard(const Room& room, const std::map<std::uint32_t, std::st
     entry.hand = room.may_cut(id);
     entry.supervision = room.people().supervised(id).supervision;
     entry.decided = room.people().supervised(id).place;
+    entry.decided_by = room.people().supervised(id).by;
     entry.last_here = author;
   }
   for (const auto& [id, drawn] : room.people().annotations()) annotations_[id] = {revision_, drawn};
@@ -62,6 +63,7 @@ void PeopleBoard::take(const RoomEvent& event) {
     if (Entry* entry = change(decided->subject)) {
       entry->supervision = decided->supervision;
       entry->decided = event.room_seq;
+      entry->decided_by = event.author;
     }
   } else if (const auto* drawn = std::get_if<AnnotationRow>(&event.people)) {
     ++revision_;
@@ -104,6 +106,12 @@ RoomSeq PeopleBoard::heard_of(AuthorId author) const {
   const std::lock_guard lock(mutex_);
   const auto found = people_.find(author);
   return found == people_.end() ? RoomSeq{} : found->second.heard;
+}
+
+std::string PeopleBoard::name_of(AuthorId author) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = people_.find(author);
+  return found == people_.end() ? std::string() : found->second.name;
 }
 
 void PeopleBoard::watch(PeopleSink& sink) {
@@ -168,6 +176,7 @@ Bytes PeopleBoard::news(PeopleCursor& cursor, AuthorId reader, const PeopleRight
     if (!(author == reader ? rights.own_supervision : rights.others_supervision)) continue;
     if (entry.decided) *person.mutable_supervision() = wire::to_wire(entry.supervision);
     person.set_decided_room_seq(entry.decided.value);
+    person.set_decided_by(entry.decided_by.value);
     person.set_heard_room_seq(entry.heard.value);
   }
   std::set<std::uint32_t> drawn;

@@ -59,6 +59,7 @@ class PeopleBoard {
   // Of those who have a hand, here or not, and may be overseen together: instructors are not among them.
   [[nodiscard]] std::vector<AuthorId> hands_overseen() const;
   [[nodiscard]] RoomSeq heard_of(AuthorId author) const;
+  [[nodiscard]] std::string name_of(AuthorId author) const;  // empty: nobody's, or not known any more
 
   // The sink hears of every change until it leaves or all streams end.
   void watch(PeopleSink& sink);
@@ -81,6 +82,7 @@ class PeopleBoard {
     int streams = 0;
     Supervision supervision;
     RoomSeq decided, heard;
+    AuthorId decided_by;
     std::optional<Look> look;
     std::uint32_t cuts = 0;
     std::uint64_t last_here = 0;  // revision

@@ -89,11 +89,13 @@ Bytes scene_row(RoomSeq place, const std::vector<SceneItem>& items) {
   return serialised(response);
 }
 
-Bytes supervised_row(RoomSeq place, const Supervision& supervision, std::uint64_t lease_epoch) {
+Bytes supervised_row(RoomSeq place, const Supervision& supervision, std::uint64_t lease_epoch, const Decider& by) {
   v1::SessionResponse response;
   response.mutable_supervised()->set_room_seq(place.value);
   *response.mutable_supervised()->mutable_supervision() = wire::to_wire(supervision);
   response.mutable_supervised()->set_lease_epoch(lease_epoch);
+  response.mutable_supervised()->set_decided_by(by.author.value);
+  response.mutable_supervised()->set_decided_by_name(by.name);
   return serialised(response);
 }
 

@@ -25,8 +25,8 @@ namespace osteon {
 [[nodiscard]] Bytes redial_row(std::chrono::milliseconds after, const std::string& why);
 [[nodiscard]] Bytes tool_row(RoomSeq place, const Tool& tool, std::uint32_t number);
 [[nodiscard]] Bytes scene_row(RoomSeq place, const std::vector<SceneItem>& items);
-// What an instructor has decided; `place` null: what held before.
-[[nodiscard]] Bytes supervised_row(RoomSeq place, const Supervision& supervision, std::uint64_t lease_epoch);
+// What an instructor has decided; `place` null: what held before. `by`: who, as far as it is known.
+[[nodiscard]] Bytes supervised_row(RoomSeq place, const Supervision& supervision, std::uint64_t lease_epoch, const Decider& by);
 [[nodiscard]] Bytes said_row(RoomSeq place, AuthorId from, const WordsRow& words);
 [[nodiscard]] Bytes partner_row(const CuttingState& state);
 [[nodiscard]] Bytes bone_row(const BoneSeen& seen);

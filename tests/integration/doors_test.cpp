@@ -13,6 +13,7 @@
 #include "tests/integration/stage.hpp"
 #include "tests/support/doors/people.hpp"
 #include "tests/support/wait.hpp"
+#include "tests/support/xvfb.hpp"
 
 namespace osteon::test {
 namespace {
@@ -119,6 +120,37 @@ TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
   const std::string log = stage_.server().err();
   EXPECT_THAT(log, HasSubstr("who=eve reason=person"));
   EXPECT_THAT(log, HasSubstr("who=ben reason=revoked"));
+}
+
+// An instructor oversees by their console what they see in their window, both with one certificate.
+TEST_F(DoorsOfPrograms, AConsoleAndAWindowOfOnePersonStayBesideEachOther) {
+  const auto screen = Xvfb::start();
+  ASSERT_TRUE(screen) << "Xvfb, of Debian's package xvfb, did not start";
+  const auto ida = door("ida", ticket("ida", "instructor"));
+  ScriptedViewer window(stage_.address(), *screen, ida);
+  ASSERT_TRUE(window.tell("wait surface")) << window.process().err();
+  const auto start = [&] { return stage_.start("osteon-viewer", plus({"--console", "--server", stage_.address()}, ida)); };
+  const auto ask = [](Process& console, const std::string& command) {
+    console.write(command + "\n");
+    return console.read_line(60s).value_or("");
+  };
+  Process first = start();
+  EXPECT_TRUE(ask(first, "people").starts_with("ok 2 people")) << first.err();
+  EXPECT_EQ(ask(first, "draw 0 0 0 1 0 0"), "ok drawing 1");
+  EXPECT_TRUE(window.tell("wait drawn 1"));
+
+  // A second console takes the place of the first, not of the window.
+  Process second = start();
+  EXPECT_TRUE(ask(second, "people").starts_with("ok 3 people")) << second.err();
+  const auto ended = first.wait(20s);
+  ASSERT_TRUE(ended.has_value());
+  EXPECT_NE(*ended, 0);
+  EXPECT_THAT(first.err(), HasSubstr("newer session of ida"));
+  EXPECT_TRUE(window.tell("label 1 2 0 here")) << window.process().err();
+  EXPECT_TRUE(wait_until([&] { return ask(second, "drawn").starts_with("ok 2 drawings"); }, 20s)) << second.err();
+  EXPECT_TRUE(window.process().running());
+  EXPECT_EQ(ask(second, "quit"), "ok");
+  EXPECT_EQ(second.wait(10s), 0) << second.err();
 }
 
 }  // namespace

@@ -150,7 +150,7 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   // One is stopped and the other goes on.
   const std::uint64_t frozen_at = console.decide("freeze #2 look at me");
   EXPECT_TRUE(console.ask("wait heard #2 10").starts_with("ok"));
-  EXPECT_NE(console.person(kFirst).find("frozen words \"look at me\" heard"), std::string::npos)
+  EXPECT_NE(console.person(kFirst).find("frozen words \"look at me\" heard decided by #1"), std::string::npos)
       << console.person(kFirst);
   const std::uint64_t cut_by_first = console.cuts(kFirst), cut_by_second = console.cuts(kSecond);
   ASSERT_TRUE(wait_until([&] { return console.cuts(kSecond) >= cut_by_second + 20; }, 60s));
@@ -231,6 +231,16 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   EXPECT_EQ(of_second.at("field_hash"), hash[1].str());
   EXPECT_NE(of_first.at("words").dump().find("the drill wanders"), std::string::npos);
   EXPECT_EQ(of_second.at("words").dump().find("the drill wanders"), std::string::npos) << "said to the other";
+  // Each hand knows whose word it was.
+  for (const json* of : {&of_first, &of_second}) {
+    std::size_t told = 0;
+    for (const json& note : of->at("oversight")) {
+      if (!note.contains("room_seq")) continue;
+      ++told;
+      EXPECT_EQ(note.value("by", ""), "Ada Instructor") << note;
+    }
+    EXPECT_GE(told, 1u);
+  }
   ASSERT_EQ(stage.server().terminate(), 0) << stage.server().err();
   EXPECT_EQ(read_json(stage / "server.json").at("field_hash"), hash[1].str());
 

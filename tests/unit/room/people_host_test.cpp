@@ -159,10 +159,13 @@ TEST(PeopleHost, AWordGoesToItsHandAndLeavesNoGapForOthers) {
   EXPECT_EQ(own.back().supervised().room_seq(), frozen->room_seq.value);
   EXPECT_TRUE(own.back().supervised().supervision().stopped());
   EXPECT_EQ(own.back().supervised().lease_epoch(), lesson.host.lease_epoch(lesson.trainee));
+  EXPECT_EQ(own.back().supervised().decided_by(), lesson.instructor.value);
+  EXPECT_EQ(own.back().supervised().decided_by_name(), "Ada");
   const wire::SessionRow fast = lesson.sessions[lesson.trainee]->fast().back();
   EXPECT_EQ(fast.kind, wire::SessionRowKind::supervised);
   EXPECT_TRUE(fast.supervision.stopped);
   EXPECT_EQ(fast.lease_epoch, lesson.host.lease_epoch(lesson.trainee));
+  EXPECT_EQ(fast.by, (Decider{lesson.instructor, "Ada"})) << "as the stream says it";
   ASSERT_TRUE(others.back().has_noted());
   EXPECT_EQ(others.back().noted().room_seq(), frozen->room_seq.value);
 
@@ -196,6 +199,8 @@ TEST(PeopleHost, WhoComesIsToldFirstWhatHolds) {
   EXPECT_EQ(told->supervised().room_seq(), 0u);
   EXPECT_EQ(told->supervised().supervision().taken_by(), lesson.instructor.value);
   EXPECT_EQ(told->supervised().lease_epoch(), first->complete_.complete().lease_epoch());
+  EXPECT_EQ(told->supervised().decided_by(), lesson.instructor.value);
+  EXPECT_EQ(told->supervised().decided_by_name(), "Ada");
   ASSERT_TRUE(first->held_) << "and its link, for the flag";
   EXPECT_FALSE(first->held_->supervision.may_cut());
   lesson.host.leave(*first);
@@ -229,6 +234,7 @@ TEST(PeopleHost, WhatIsDecidedIsPendingUntilItIsHeard) {
   EXPECT_FALSE(next.complete());
   ASSERT_EQ(next.people_size(), 1) << "nobody else has changed";
   EXPECT_EQ(next.people(0).decided_room_seq(), place.value);
+  EXPECT_EQ(next.people(0).decided_by(), lesson.instructor.value);
   EXPECT_LT(next.people(0).heard_room_seq(), place.value);
   EXPECT_TRUE(next.people(0).supervision().stopped());
   EXPECT_EQ(lesson.host.people().news(cursor, lesson.instructor, {}), nullptr) << "all is told";

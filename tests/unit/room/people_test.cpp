@@ -60,6 +60,7 @@ TEST(Supervise, AFrozenHandCutsNothingUntilItIsFreed) {
   EXPECT_EQ(all.room.lease_epoch(all.other), others) << "nobody else's lease";
   EXPECT_EQ(all.room.people().supervised(all.trainee).place, frozen->room_seq);
   EXPECT_EQ(all.room.people().supervised(all.trainee).supervision.words, "look here");
+  EXPECT_EQ(all.room.people().supervised(all.trainee).by, all.instructor);
 
   EXPECT_EQ(all.cut(all.trainee, before).rejection, Rejection::lease) << "what was under way falls as such";
   EXPECT_EQ(all.cut(all.trainee).rejection, Rejection::frozen);
@@ -145,6 +146,61 @@ TEST(TakeBack, ATraineeTakesBackOnlyTheirOwn) {
   const auto any = all.room.undo_last(all.collaborator, 1, {});
   ASSERT_TRUE(any);
   EXPECT_EQ(any->places, std::vector{others});
+}
+
+// However it is asked for, and whatever they have done themselves.
+TEST(TakeBack, ACollaboratorTakesBackAnyonesButNeverAllThatTheOthersDid) {
+  Class all;
+  const RoomSeq first = all.cut(all.trainee).room_seq;
+  const RoomSeq own = all.cut(all.collaborator).room_seq;
+  const RoomSeq second = all.cut(all.other).room_seq;
+  const Digest bone = all.room.field_hash();
+  const RoomSeq both[] = {first, second}, one[] = {second}, all_three[] = {first, own, second};
+  const AuthorId by = all.collaborator;
+  const auto refused = [&](const Result<RoomEvent>& undo) {
+    EXPECT_EQ(all.refused(undo), ErrorCode::denied);
+    EXPECT_NE(undo.error().message.find("only an instructor"), std::string::npos) << undo.error().message;
+  };
+  refused(all.room.undo_last(by, 1'000'000, {}));
+  refused(all.room.undo_last(by, 3, {}));
+  refused(all.room.undo_since(by, 0s));
+  refused(all.room.undo_to(by, RoomSeq{}));
+  refused(all.room.undo_to(by, RoomSeq{first.value - 1}));
+  refused(all.room.undo(by, both));
+  refused(all.room.undo(by, all_three));
+  EXPECT_EQ(all.room.field_hash(), bone);
+  // One of them, and then the other is all that there is of others.
+  ASSERT_TRUE(all.room.undo(by, one));
+  refused(all.room.undo_last(by, 1, all.trainee));
+  refused(all.room.undo_last(by, 1'000'000, {}));
+  // Their own at any count.
+  const auto undone = all.room.undo_last(by, 1'000'000, by);
+  ASSERT_TRUE(undone) << undone.error().message;
+  EXPECT_EQ(undone->places, std::vector{own});
+  ASSERT_TRUE(all.room.redo_last(by, 2)) << "what a collaborator took back, and others'";
+  EXPECT_EQ(all.room.field_hash(), bone);
+
+  // An instructor takes all back, and gives it back.
+  ASSERT_TRUE(all.room.undo_last(all.instructor, 1'000'000, {}));
+  EXPECT_EQ(all.room.field_hash(), Room(test_block()).field_hash());
+  refused(all.room.redo_last(by, 1));
+  refused(all.room.redo_last(by, 1'000'000));
+  ASSERT_TRUE(all.room.redo_last(all.instructor, 1));
+  EXPECT_EQ(all.room.field_hash(), bone);
+  // A part of it anybody who takes back anyone's.
+  ASSERT_TRUE(all.room.undo_last(all.instructor, 1, {}));
+  EXPECT_TRUE(all.room.redo_last(by, 1));
+}
+
+// By who they are, not by which of their programs it was: rooms in which a collaborator alone has worked are theirs.
+TEST(TakeBack, ACollaboratorTakesBackAllOfTheirOwnAlsoOfAnEarlierJoin) {
+  Class all;
+  ASSERT_TRUE(all.cut(all.collaborator).committed());
+  const AuthorId anew = all.room.join(MemberKind::surgeon, 2, {}, Role::collaborator);
+  const auto undone = all.room.undo_last(anew, 100, {});
+  ASSERT_TRUE(undone) << undone.error().message;
+  EXPECT_EQ(undone->places.size(), 1u);
+  EXPECT_TRUE(all.room.redo_last(anew, 100));
 }
 
 TEST(TakeBack, WhatWasDoneSinceATime) {
