@@ -20,8 +20,10 @@
 #include <string>
 #include <thread>
 
+#include "common/wire/convert.hpp"
 #include "common/wire/room_client.hpp"
 #include "osteon/v1/people.grpc.pb.h"
+#include "osteon/v1/room.grpc.pb.h"
 #include "osteon/v1/rooms.grpc.pb.h"
 #include "server/net/room_server.hpp"
 #include "server/net/rooms_client.hpp"
@@ -329,6 +331,102 @@ TEST_F(Doors, KeepRoomsApart) {
   EXPECT_TRUE(all->remove("third", false));
 }
 
+// Which room a call is about says its message; the metadata, by which it was let in, may name another.
+TEST_F(Doors, JudgeCallsAboutRoomsByTheRoomsThatTheyName) {
+  const auto asked = [&](const wire::Door& door, const std::string& in, const std::string& about) {
+    grpc::ClientContext context;
+    context.AddMetadata("osteon-ticket", wire::ticket_text(door));
+    if (!in.empty()) context.AddMetadata("osteon-room-bin", in);
+    v1::DeleteRoomRequest request;
+    request.set_name(about);
+    v1::DeleteRoomResponse response;
+    return v1::RoomsService::NewStub(channel(door))->DeleteRoom(&context, request, &response);
+  };
+  const auto is_there = [&](const std::string& name) { return server_->rooms().find(name).has_value(); };
+  // More in one room than elsewhere.
+  ASSERT_TRUE(server_->rooms().create("annex", nullptr));
+  people_.append_access("role bob operator annex");
+  people_.append_access("role otto observer ward");
+  server_->rooms().gate->look();
+  const wire::Door bob = people_.door("bob", Role::observer, "*");
+  EXPECT_EQ(asked(bob, "annex", "ward").error_code(), StatusCode::PERMISSION_DENIED);
+  EXPECT_TRUE(is_there("ward"));
+  EXPECT_TRUE(asked(bob, "annex", "annex").ok());
+  EXPECT_FALSE(is_there("annex"));
+  // Less in one room than elsewhere.
+  const wire::Door otto = people_.door("otto", Role::operator_, "*");
+  for (const char* in : {"", "ward", "theatre"}) EXPECT_EQ(asked(otto, in, "ward").error_code(), StatusCode::PERMISSION_DENIED) << in;
+  EXPECT_TRUE(is_there("ward"));
+  auto rooms = RoomsClient::reach(address(), 5s, {}, otto);
+  ASSERT_TRUE(rooms.has_value());
+  EXPECT_EQ(rooms->close("ward").error().code, ErrorCode::denied);
+  // Such a room is not in the list either.
+  const auto all = rooms->list();
+  ASSERT_TRUE(all.has_value()) << all.error().message;
+  ASSERT_EQ(all->size(), 1u);
+  EXPECT_EQ(all->front().name, "theatre");
+  EXPECT_TRUE(rooms->close("theatre"));
+  // And no name is not the name of the only one.
+  EXPECT_EQ(asked(otto, "theatre", "").error_code(), StatusCode::INVALID_ARGUMENT);
+}
+
+TEST_F(Doors, DeleteNoBranchThatATicketIsNotFor) {
+  ASSERT_TRUE(server_->rooms().branch("ward", "annex", RoomSeq{0}));
+  auto own = RoomsClient::reach(address(), 5s, {}, people_.door("otto", Role::operator_, "ward"));
+  ASSERT_TRUE(own.has_value());
+  const auto refused = own->remove("ward", true);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::denied) << refused.error().message;
+  EXPECT_THAT(refused.error().message, HasSubstr("annex"));
+  for (const char* name : {"ward", "annex"}) EXPECT_TRUE(server_->rooms().find(name)) << name;
+  auto any = RoomsClient::reach(address(), 5s, {}, people_.door("olga", Role::operator_, "*"));
+  ASSERT_TRUE(any.has_value());
+  EXPECT_EQ(any->remove("ward", true).value_or(std::vector<std::string>()).size(), 2u);
+}
+
+TEST_F(Doors, ShowNothingOfARoomInWhichOneIsNoInstructor) {
+  people_.append_access("role ina trainee theatre");
+  server_->rooms().gate->look();
+  const auto ina = join(people_.door("ina", Role::instructor, "*"));
+  ASSERT_TRUE(ina.has_value()) << ina.error().message;
+  v1::DemonstrateRequest shown;
+  shown.set_author(ina->author.value);
+  shown.set_room("theatre");
+  shown.set_speed(1);
+  v1::DemonstrateResponse response;
+  grpc::ClientContext context;
+  const grpc::Status status = v1::PeopleService::NewStub(ina->channel)->Demonstrate(&context, shown, &response);
+  EXPECT_EQ(status.error_code(), StatusCode::PERMISSION_DENIED) << status.error_message();
+  EXPECT_THAT(status.error_message(), HasSubstr("a trainee may not call PeopleService/Demonstrate"));
+}
+
+// Datagrams go to where the connections come in, however that was written.
+TEST(DoorsSomewhere, HaveTheFastPathWhereverTheServerListens) {
+  test::People people;
+  people.certs({"server", "127.0.0.1", "::1", "localhost"});
+  const test::TempDir dir;
+  const Case bone = test::test_block();
+  ASSERT_TRUE(bone.save(dir / "case"));
+  int heard = 0;
+  for (const std::string host : {"127.0.0.1", "localhost", "127.1", "[::1]", "[0:0:0:0:0:0:0:1]"}) {
+    auto rooms = std::make_unique<Rooms>(RoomsOptions{.cases = {{bone, dir / "case"}}});
+    ASSERT_TRUE(rooms->create("ward", nullptr));
+    const auto server = RoomServer::start(std::move(rooms), host + ":0", {.certificates = people.server()});
+    if (!server) {
+      EXPECT_EQ(host.front(), '[') << "a machine may lack IPv6: " << server.error().message;
+      continue;
+    }
+    EXPECT_NE((*server)->link_port(), 0) << host;
+    // By the names that are in the certificate.
+    const std::string name = host == "localhost" ? host : host.front() == '[' ? "[::1]" : "127.0.0.1";
+    const std::string at = name + (*server)->address().substr((*server)->address().rfind(':'));
+    test::Surgeon surgeon(at, dir / "cache", "", "ward", people.door("sue", Role::trainee, "ward"));
+    EXPECT_TRUE(test::wait_until([&] { return surgeon.session().fast_path().alive; }, test::kPatience)) << host;
+    ++heard;
+  }
+  EXPECT_GE(heard, 3);
+}
+
 // A surgeon of the ward at work, and somebody beside who is in trouble.
 class DoorsAtWork : public Doors {
  protected:
@@ -383,6 +481,54 @@ TEST_F(DoorsAtWork, EndTheStreamsOfSomebodyWhoIsRevoked) {
   EXPECT_THAT(end.error_message(), HasSubstr("revoked"));
   EXPECT_THAT(refusal(people_.door("ben", Role::observer, "ward")), HasSubstr("revoked"));
   expect_undisturbed();
+}
+
+// Who does not read hears no reason, and is gone all the same: also what is on its way to nobody.
+TEST_F(DoorsAtWork, EndTheStreamsOfSomebodyWhoDoesNotRead) {
+  auto ben = join(people_.door("ben", Role::observer, "ward"));
+  ASSERT_TRUE(ben.has_value()) << ben.error().message;
+  const std::size_t others = server_->door_health().gate.streams;
+  std::filesystem::resize_file(dir_ / "case" / "bone.vdb", 32 << 20);  // more than any line holds by itself
+  grpc::ClientContext context;
+  v1::GetCaseRequest request;
+  request.set_case_hash(wire::to_wire(test::test_block().hash()));
+  const auto unread = v1::RoomService::NewStub(ben->channel)->GetCase(&context, request);
+  ASSERT_TRUE(test::wait_until([&] { return server_->door_health().gate.streams == others + 1; }, test::kPatience));
+  EXPECT_FALSE(test::wait_until([&] { return server_->door_health().gate.streams == others; }, 2s)) << "by itself it goes on";
+  people_.certs({"revoke", "ben"});
+  EXPECT_TRUE(test::wait_until([&] { return server_->door_health().gate.streams == others; }, 10s));
+  context.TryCancel();
+  expect_undisturbed();
+}
+
+// A newer program of the same person, and the older one coming again behind it: whoever is in the queue, the newer one stays.
+TEST_F(Doors, GiveThePlaceToTheNewestAlsoInAQueue) {
+  const wire::Door door = people_.door("ben", Role::observer, "ward");
+  const auto older = join(door);
+  ASSERT_TRUE(older.has_value()) << older.error().message;
+  std::promise<void> go_on, held;
+  (*server_->rooms().find("ward"))->host().run_slowly([&, wait = go_on.get_future().share()] {
+    held.set_value();
+    wait.wait();
+  });
+  held.get_future().wait();
+  const auto admitted = [&] { return server_->door_health().gate.admitted; };
+  const auto queue = [&](auto ask) {
+    const std::uint64_t before = admitted();
+    auto answer = std::async(std::launch::async, std::move(ask));
+    EXPECT_TRUE(test::wait_until([&] { return admitted() > before; }, test::kPatience));
+    std::this_thread::sleep_for(200ms);  // from the gate into the queue
+    return answer;
+  };
+  auto newer = queue([&] { return join(door); });
+  auto again = queue([&] { return wire::join_again(*older, wire::ClientKind::viewer, {}); });
+  go_on.set_value();
+  const auto newest = newer.get();
+  ASSERT_TRUE(newest.has_value()) << newest.error().message;
+  const auto late = again.get();
+  ASSERT_FALSE(late);
+  EXPECT_EQ(late.error().code, ErrorCode::denied) << late.error().message;
+  EXPECT_TRUE(wire::join_again(*newest, wire::ClientKind::viewer, {}));
 }
 
 TEST_F(DoorsAtWork, EndTheSessionOfSomebodyWhoseRoleIsTakenAway) {
