@@ -2,6 +2,7 @@
 
 #include <sqlite3.h>
 
+#include <cerrno>
 #include <cstring>
 #include <system_error>
 
@@ -14,17 +15,21 @@ namespace {
 Error error_of(sqlite3* connection, const std::string& file) {
   const int code = sqlite3_errcode(connection) & 0xff;  // without what the extended code adds
   const bool of_system = code == SQLITE_IOERR || code == SQLITE_FULL || code == SQLITE_CANTOPEN;
+  const int reason = of_system ? sqlite3_system_errno(connection) : 0;
   std::string message = file + ": " + sqlite3_errmsg(connection);
-  if (const int reason = sqlite3_system_errno(connection); of_system && reason != 0)
-    message += " (" + std::generic_category().message(reason) + ")";
+  if (reason != 0) message += " (" + std::generic_category().message(reason) + ")";
   switch (code) {
     case SQLITE_BUSY:
-    case SQLITE_LOCKED: return {ErrorCode::exists, message};
+    case SQLITE_LOCKED: return {ErrorCode::exists, message + "; close it in the program that has it open"};
     case SQLITE_CORRUPT:
-    case SQLITE_NOTADB:
-    case SQLITE_FORMAT: return {ErrorCode::invalid_input, message};
-    case SQLITE_CANTOPEN: return {ErrorCode::not_found, message};
-    default: return {ErrorCode::internal, message};
+    case SQLITE_FORMAT: return {ErrorCode::invalid_input, message + "; recover it into a new journal, or go on from a backup"};
+    // Files that never were a journal are told apart before SQLite sees them.
+    case SQLITE_NOTADB: return {ErrorCode::invalid_input, file + ": its first page is damaged; go on from a backup"};
+    case SQLITE_READONLY: return {ErrorCode::internal, message + "; see to its permissions"};
+    case SQLITE_FULL: return {ErrorCode::internal, message + std::string(remedy_of(ENOSPC))};
+    case SQLITE_CANTOPEN:
+      return {reason == ENOENT ? ErrorCode::not_found : ErrorCode::internal, message + std::string(remedy_of(reason))};
+    default: return {ErrorCode::internal, message + std::string(remedy_of(reason))};
   }
 }
 
@@ -115,6 +120,10 @@ Result<Database> Database::open(const std::filesystem::path& file, const Disk& d
                     SQLITE_OPEN_EXRESCODE | (options.create ? SQLITE_OPEN_CREATE : 0);
   const int code = sqlite3_open_v2(uri.c_str(), &connection.handle, flags, vfs.empty() ? nullptr : vfs.c_str());
   if (code != SQLITE_OK) return tl::unexpected(error_of(connection.handle, connection.file));
+  // SQLite then opens it to be read, and fails later for a reason of its own.
+  if (!options.peek && sqlite3_db_readonly(connection.handle, "main") == 1)
+    return failure(ErrorCode::internal,
+                   connection.file + " cannot be written to; see to its permissions, or copy it to another place");
   sqlite3_db_config(connection.handle, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   sqlite3_db_config(connection.handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
   sqlite3_wal_hook(
@@ -184,6 +193,8 @@ Result<void> Database::carry_log(bool emptied) {
   connection_->log_pages = static_cast<std::uint64_t>(in_log - carried);
   return {};
 }
+
+void Database::forget_pages() { sqlite3_db_release_memory(connection_->handle); }
 
 bool Database::read_only() const { return sqlite3_db_readonly(connection_->handle, "main") != 0; }
 

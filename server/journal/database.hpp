@@ -63,6 +63,8 @@ class Database {
 
   // Copies the log into the file, both synced; `emptied`: and cuts the log to nothing.
   [[nodiscard]] Result<void> carry_log(bool emptied);
+  // What is read next comes from the disk, not from the pages that SQLite still has in memory.
+  void forget_pages();
   [[nodiscard]] bool read_only() const;  // known once something was read
   [[nodiscard]] std::uint64_t log_bytes() const;  // not yet carried into the file
 

@@ -17,8 +17,18 @@ namespace fs = std::filesystem;
 constexpr std::size_t kPiece = std::size_t{1} << 20;
 
 tl::unexpected<Error> cannot(const char* what, const fs::path& file, int reason) {
-  return failure(reason == ENOENT ? ErrorCode::not_found : ErrorCode::internal,
-                 "cannot " + std::string(what) + " " + file.string() + ": " + std::generic_category().message(reason));
+  const ErrorCode code = reason == ENOENT                         ? ErrorCode::not_found
+                         : reason == EISDIR || reason == ENOTDIR ? ErrorCode::invalid_input
+                                                                 : ErrorCode::internal;
+  return failure(code, "cannot " + std::string(what) + " " + file.string() + ": " + std::generic_category().message(reason) +
+                           std::string(remedy_of(reason)));
+}
+
+// A file that was to be made is missing only because its folder is.
+tl::unexpected<Error> cannot_make(const char* what, const fs::path& file, int reason) {
+  if (reason != ENOENT) return cannot(what, file, reason);
+  return failure(ErrorCode::not_found,
+                 "there is no folder " + folder_of(file).string() + " for " + file.string() + "; make it first");
 }
 
 class Descriptor {
@@ -71,7 +81,7 @@ class SystemDisk final : public Disk {
  public:
   Result<std::unique_ptr<DiskFile>> create(const fs::path& file) override {
     const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-    if (fd < 0) return cannot("create", file, errno);
+    if (fd < 0) return cannot_make("create", file, errno);
     return std::make_unique<SystemFile>(file, fd);
   }
 
@@ -120,6 +130,8 @@ class SystemDisk final : public Disk {
     std::error_code error;
     for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
       names.push_back(entry->path().filename().string());
+    if (error.value() == ENOENT)
+      return failure(ErrorCode::not_found, "there is no folder " + folder.string() + "; make it first");
     if (error) return cannot("list", folder, error.value());
     return names;
   }
@@ -129,7 +141,7 @@ class SystemDisk final : public Disk {
   Result<std::unique_ptr<DiskLock>> lock(const fs::path& file) override {
     for (;;) {
       const int fd = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-      if (fd < 0) return cannot("open", file, errno);
+      if (fd < 0) return cannot_make("open", file, errno);
       auto held = std::make_unique<SystemLock>(fd);
       if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
         if (errno != EWOULDBLOCK) return cannot("lock", file, errno);
@@ -153,6 +165,19 @@ fs::path partial_of(const fs::path& file) {
 Disk& system_disk() {
   static SystemDisk disk;
   return disk;
+}
+
+std::string_view remedy_of(int reason) {
+  switch (reason) {
+    case EACCES:
+    case EPERM: return "; see to the permissions, or choose another place";
+    case EROFS: return "; choose a place that can be written to";
+    case ENOSPC:
+    case EDQUOT: return "; make room on the disk";
+    case EISDIR: return "; name a file, not a folder";
+    case ENOTDIR: return "; name a file in a folder";
+    default: return {};
+  }
 }
 
 fs::path folder_of(const fs::path& file) {

@@ -29,7 +29,8 @@ class DiskLock {
 };
 
 // What is written stays after a power failure only once the file was synced; what is made, renamed or removed, once its
-// folder was. Any thread. Errors name the file and the system's reason: not_found, exists (a lock), internal.
+// folder was. Any thread. Errors name the file and the system's reason: not_found, exists (a lock), invalid_input (a folder where
+// a file should be, or a file where a folder), internal.
 class Disk {
  public:
   virtual ~Disk() = default;
@@ -80,6 +81,9 @@ class DurableFile {
   Hasher hasher_;
   std::uint64_t size_ = 0;
 };
+
+// What a user can do about a reason of the system's (an errno value), as the end of a sentence; empty: nothing is known.
+[[nodiscard]] std::string_view remedy_of(int reason);
 
 // The end of the name of a file that is still being written.
 inline constexpr std::string_view kPartial = ".partial";

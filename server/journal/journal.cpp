@@ -59,10 +59,10 @@ Result<std::unique_ptr<DiskLock>> take_lock(Disk& disk, const fs::path& file) {
 Result<void> check_nothing_left(Disk& disk, const fs::path& file) {
   const auto names = disk.list(folder_of(file));
   if (!names) return tl::unexpected(names.error());
+  if (std::ranges::find(*names, file.filename().string()) != names->end())
+    return failure(ErrorCode::exists, "there is " + file.string() + " already; give the new journal another name");
   for (const std::string& name : *names) {
     const fs::path other = folder_of(file) / name;
-    if (name == file.filename())
-      return failure(ErrorCode::exists, "there is a journal " + file.string() + "; open it, or give the new one another name");
     if (name == log_of(file).filename() || name == failed_of(file).filename() || parse_checkpoint_file(file, name))
       return failure(ErrorCode::exists, other.string() + " belonged to an earlier journal " + file.string() +
                                             "; move it away, or give the new one another name");
@@ -107,10 +107,8 @@ Result<Journal> Journal::create(const fs::path& file, std::string_view genesis, 
 
 Result<Journal> Journal::open(const fs::path& file, JournalOptions options) {
   Disk& disk = disk_of(options);
-  // First, so that no lock file is made for a journal that is not there.
-  const auto size = disk.size(file);
-  if (!size) return tl::unexpected(size.error());
-  if (!*size) return failure(ErrorCode::not_found, "there is no journal " + file.string());
+  // First, so that no lock file is made for a journal that is not there, or beside another program's file.
+  if (Result<void> may_be = check_is_journal(file, disk); !may_be) return tl::unexpected(may_be.error());
   auto lock = take_lock(disk, file);
   if (!lock) return tl::unexpected(lock.error());
   return open_locked(file, options, std::move(*lock));
@@ -202,7 +200,8 @@ Result<void> Journal::append(std::span<const JournalRow> rows) {
   if (!done) return done;
   state.head = head;
   // The rows are safe whatever becomes of this.
-  if (state.file.database().log_bytes() > state.options.most_log_bytes) static_cast<void>(tidy());
+  if (state.file.database().log_bytes() > state.options.most_log_bytes)
+    static_cast<void>(write([&] { return state.file.database().carry_log(false); }));
   return {};
 }
 
@@ -372,7 +371,7 @@ Result<std::size_t> Journal::forget_people_before(std::int32_t day) {
 
 Result<void> Journal::tidy() {
   if (state_->file.database().log_bytes() < std::min(kTidyBytes, state_->options.most_log_bytes)) return {};
-  return write([&] { return state_->file.database().carry_log(false); });
+  return write([&] { return state_->file.database().carry_log(true); });
 }
 
 Result<void> Journal::close() {

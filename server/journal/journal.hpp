@@ -101,7 +101,8 @@ class Journal {
   [[nodiscard]] Result<std::size_t> forget_person(std::string_view pseudonym);
   [[nodiscard]] Result<std::size_t> forget_people_before(std::int32_t day);  // who joined before it
 
-  // Carries the log into the file, if it has grown: a few milliseconds and two syncs, for when the room is idle.
+  // Carries the log into the file and cuts it to nothing, if it has grown beyond 1 MiB: for when the room is idle, since it
+  // takes as long as writing the log did, and a few syncs. An error closes the journal to rows.
   [[nodiscard]] Result<void> tidy();
   // Vouches for the head in a footer and carries the log into the file; of a journal that is closed to rows, nothing. The
   // journal must not be used afterwards.

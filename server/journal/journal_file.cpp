@@ -80,18 +80,6 @@ Digest seal_of(std::string_view name, std::string_view value) {
   return hasher.finish();
 }
 
-// SQLite takes an empty file for a new database, and throws away the log beside it. Any other first page is for SQLite to
-// judge: when the power failed while the log was being carried into the file, the log still has what is torn there.
-Result<void> check_not_empty(const fs::path& file, Disk& disk) {
-  constexpr std::uint64_t kSmallestPage = 512;
-  const auto size = disk.size(file);
-  if (!size) return tl::unexpected(size.error());
-  if (!*size) return failure(ErrorCode::not_found, "there is no journal " + file.string());
-  if (**size >= kSmallestPage) return {};
-  return failure(ErrorCode::invalid_input,
-                 file.string() + " has been cut to " + std::to_string(**size) + " bytes, less than a page; go on from a backup");
-}
-
 }  // namespace
 
 fs::path log_of(const fs::path& journal) { return journal.string() + "-wal"; }
@@ -121,6 +109,31 @@ bool is_partial_of(const fs::path& journal, std::string_view name) {
   name.remove_suffix(kPartial.size());
   return name == journal.filename() || name == log_of(journal).filename() || name == failed_of(journal).filename() ||
          parse_checkpoint_file(journal, name);
+}
+
+// SQLite takes an empty file for a new database, and throws away the log beside it. When the power failed while the log was
+// being carried into the file, the first page may be lost, and the log still has it: then SQLite has to judge.
+Result<void> check_is_journal(const fs::path& file, Disk& disk) {
+  constexpr std::size_t kSmallestPage = 512, kLooked = std::size_t{64} << 10, kApplicationAt = 68;
+  constexpr std::string_view kMagic("SQLite format 3\0", 16), kOwn("OstJ"), kRows("CREATE TABLE rows(place INTEGER PRIMARY KEY");
+  const auto size = disk.size(file);
+  if (!size) return tl::unexpected(size.error());
+  if (!*size) return failure(ErrorCode::not_found, "there is no journal " + file.string());
+  const auto start = disk.read(file, 0, kLooked);
+  if (!start) return tl::unexpected(start.error());
+  const auto is_not = [&](const std::string& what) { return failure(ErrorCode::invalid_input, file.string() + what); };
+  if (start->empty()) return is_not(" is empty, which no journal is; go on from a backup, or name another file");
+
+  const std::string_view page(*start);
+  const bool of_sqlite = page.starts_with(kMagic) || kMagic.starts_with(page);
+  if (of_sqlite && page.size() < kSmallestPage)
+    return is_not(" has been cut to " + std::to_string(page.size()) + " bytes, less than a page; go on from a backup");
+  if (page.find(kRows) != page.npos || (of_sqlite && page.substr(kApplicationAt, kOwn.size()) == kOwn)) return {};
+  if (of_sqlite) return is_not(" is a database of another program, no journal; name a journal");
+  const auto log = disk.size(log_of(file));
+  if (!log) return tl::unexpected(log.error());
+  if (*log && **log > 0 && page.size() >= kSmallestPage) return {};
+  return is_not(" is no journal; name a file that osteon-server keeps a room in, or, where it was one, go on from a backup");
 }
 
 bool belongs_to(const fs::path& journal, std::string_view name) {
@@ -176,7 +189,7 @@ Result<void> JournalFile::make(const fs::path& file, std::string_view genesis, D
 }
 
 Result<JournalFile> JournalFile::open(const fs::path& file, Disk& disk, const DatabaseOptions& options) {
-  if (Result<void> something = check_not_empty(file, disk); !something) return tl::unexpected(something.error());
+  if (Result<void> may_be = check_is_journal(file, disk); !may_be) return tl::unexpected(may_be.error());
   auto database = Database::open(file, disk, options);
   if (!database) return tl::unexpected(database.error());
   JournalFile opened(file, disk, std::move(*database));
@@ -190,7 +203,7 @@ Result<JournalFile> JournalFile::open(const fs::path& file, Disk& disk, const Da
 }
 
 Result<JournalFile> JournalFile::peek(const fs::path& file, Disk& disk) {
-  if (Result<void> something = check_not_empty(file, disk); !something) return tl::unexpected(something.error());
+  if (Result<void> may_be = check_is_journal(file, disk); !may_be) return tl::unexpected(may_be.error());
   auto database = Database::open(file, disk, {.peek = true});
   if (!database) return tl::unexpected(database.error());
   const Result<std::int64_t> application = database->integer("PRAGMA application_id");

@@ -28,6 +28,11 @@ namespace osteon {
 // Whether it is the journal itself or anything that was made beside it, its lock too.
 [[nodiscard]] bool belongs_to(const std::filesystem::path& journal, std::string_view name);
 
+// Tells a file that cannot be a journal before anything is made beside it: one of another program, a folder, one that is cut
+// short. What SQLite has to judge, a first page that the log may still have, is well. Errors: not_found; invalid_input; those
+// of reading it.
+[[nodiscard]] Result<void> check_is_journal(const std::filesystem::path& file, Disk& disk);
+
 // What a file says of itself.
 struct Inspection {
   JournalHead head;                  // of the last row that the chain confirms

@@ -24,9 +24,7 @@ fs::path growing_copy(const fs::path& to) { return to.string() + ".copying"; }
 class Source {
  public:
   static Result<Source> open(const fs::path& file, Disk& disk) {
-    const auto size = disk.size(file);
-    if (!size) return tl::unexpected(size.error());
-    if (!*size) return failure(ErrorCode::not_found, "there is no journal " + file.string());
+    if (Result<void> may_be = check_is_journal(file, disk); !may_be) return tl::unexpected(may_be.error());
     auto lock = take_lock(disk, file);
     if (!lock) return tl::unexpected(lock.error());
     const auto log = disk.size(log_of(file));
@@ -74,13 +72,18 @@ Result<VerifyReport> verify_journal(const fs::path& file, Disk* disk) {
 
 std::vector<std::string> verify_beside(Journal& journal) {
   auto& state = JournalInside::of(journal);
+  state.file.database().forget_pages();
   Inspection found;
   found.head = state.head;
   state.file.inspect_beside(false, found);
   return std::move(found.faults);
 }
 
-Result<VerifyReport> verify_journal(Journal& journal) { return report_of(JournalInside::of(journal).file); }
+Result<VerifyReport> verify_journal(Journal& journal) {
+  auto& state = JournalInside::of(journal);
+  state.file.database().forget_pages();
+  return report_of(state.file);
+}
 
 // The copy grows under a name of its own beside its place, and gets its name when it is whole.
 struct JournalCopy::State {

@@ -23,11 +23,12 @@ struct VerifyReport {
 // Everything: pages, chain, footer, checkpoints and their files. Of any version. Errors: not_found; exists (in use: then the
 // program that uses it has to verify it); invalid_input (nothing of it can be read).
 [[nodiscard]] Result<VerifyReport> verify_journal(const std::filesystem::path& file, Disk* disk = nullptr);
-// Of one in use. It takes as long as reading the whole file.
+// Of one in use, as the disk has it. It takes as long as reading the whole file.
 [[nodiscard]] Result<VerifyReport> verify_journal(Journal& journal);
 
 // Of one in use, without its pages, its rows and the bytes of its checkpoints, which are read bit by bit: what vouches for
-// places, and what is kept beside the rows. A few milliseconds. One sentence for each fault.
+// places, and what is kept beside the rows. A few milliseconds. One sentence for each fault. From here on rows, too, are read
+// from the disk and not from SQLite's memory.
 [[nodiscard]] std::vector<std::string> verify_beside(Journal& journal);
 
 // A copy of a journal in use up to its head at begin(), made in slices so that rows can be appended between them. The copy

@@ -29,10 +29,20 @@ Result<RoomGenesis> peek_genesis(const fs::path& file, Disk* disk) {
   return genesis;
 }
 
+Result<void> check_whole(const Journal& journal, const std::string& option) {
+  const Error* closed = journal.closed_because();
+  if (closed == nullptr) return {};
+  const std::string last = std::to_string(journal.head().place.value);
+  return failure(closed->code, closed->message + " (its events are confirmed up to " + last +
+                                   (journal.head().place ? ", and " + option + " " + last + " takes these)" : ")"));
+}
+
 Result<JournalCopy> begin_branch(Journal& from, const fs::path& to, RoomSeq place, const std::string& name) {
   Result<RoomGenesis> genesis = genesis_from_bytes(from.genesis());
   if (!genesis) return tl::unexpected(genesis.error());
   const JournalHead& head = from.head();
+  if (!place)
+    if (const Result<void> whole = check_whole(from, "--at"); !whole) return tl::unexpected(whole.error());
   if (place > head.place)
     return failure(ErrorCode::invalid_input, "a branch at event " + std::to_string(place.value) +
                                                  " lies beyond the last one of the room " + genesis->room + ", " +

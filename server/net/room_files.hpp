@@ -24,7 +24,8 @@ struct UpkeepCalls {
 
 // A room of its own, in `to`, that begins with all that another one was up to a place, null for all of it: rows and
 // checkpoints. It knows numbers of people, not who they are. The journal must not be in use: else RoomKeeper::branch. Errors:
-// not_found; exists (in use, or there is something in `to`); invalid_input (no such place, damaged); cancelled.
+// not_found; exists (in use, or there is something in `to`); invalid_input (no such place, damaged); unavailable (all of it,
+// and it is closed to rows); cancelled.
 [[nodiscard]] Result<JournalHead> branch_journal(const std::filesystem::path& from, const std::filesystem::path& to,
                                                  RoomSeq place, const std::string& name, const UpkeepCalls& calls = {},
                                                  Disk* disk = nullptr);
@@ -47,6 +48,10 @@ struct RoomFile {
 // are. Errors: those of delete_journals() and branches_of().
 [[nodiscard]] Result<std::vector<std::filesystem::path>> delete_room(const std::filesystem::path& file, bool branches,
                                                                      Disk* disk = nullptr);
+
+// Error: the journal is closed to rows, so that nobody can say that these are all it had. `option` is how a place is asked for
+// instead, up to which it is confirmed.
+[[nodiscard]] Result<void> check_whole(const Journal& journal, const std::string& option);
 
 // As branch_journal(), of a journal that somebody uses, step by step.
 [[nodiscard]] Result<JournalCopy> begin_branch(Journal& from, const std::filesystem::path& to, RoomSeq place,

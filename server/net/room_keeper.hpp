@@ -132,6 +132,8 @@ class RoomKeeper {
   [[nodiscard]] Result<void> checkpoint(RoomSeq place, std::span<const FieldLeaf> leaves, const UpkeepCalls& calls = {});
   // Rows since the newest checkpoint that the next opening would have to evaluate: for CheckpointPolicy.
   [[nodiscard]] std::uint64_t changes_since_checkpoint() const;
+  // Carries the journal's log into its file where no row has come since this was asked the last time: for every few seconds.
+  [[nodiscard]] Result<void> tidy_if_idle();
   // Clean; what takes long is given up, and a checkpoint that is being written waited for.
   [[nodiscard]] Result<void> close();
 
@@ -173,6 +175,7 @@ class RoomKeeper {
   int retention_days_ = 0;
   std::function<std::int32_t()> today_;
   std::vector<RoomSeq> changes_;    // since the newest checkpoint
+  std::optional<RoomSeq> idle_at_;  // its head when tidy_if_idle() looked
   std::uint64_t server_epoch_ = 0, evaluated_ = 0;
 };
 

@@ -200,6 +200,16 @@ Result<void> RoomKeeper::export_person(std::uint32_t person, const std::function
   return read;
 }
 
+Result<void> RoomKeeper::tidy_if_idle() {
+  return with_journal([&](Journal& journal) -> Result<void> {
+    const RoomSeq now = journal.head().place;
+    const bool idle = idle_at_ == now;
+    idle_at_ = now;
+    if (!idle || journal.closed_because() != nullptr) return {};
+    return journal.tidy();
+  });
+}
+
 Result<bool> RoomKeeper::has_head(const JournalHead& head) {
   return with_journal([&](Journal& journal) -> Result<bool> {
     if (head.place > journal.head().place) return false;

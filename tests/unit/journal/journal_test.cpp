@@ -2,6 +2,10 @@
 #include "server/journal/journal.hpp"
 
 #include <gmock/gmock.h>
+#include <linux/capability.h>
+#include <sqlite3.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
@@ -19,6 +23,8 @@ namespace {
 
 using test::MemoryDisk;
 using test::plain_head;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
@@ -75,6 +81,8 @@ TEST_F(JournalTest, IsMadeOnceAndOpenedOnlyWhereItIs) {
   const auto again = Journal::create(kFile, "bone", options());
   ASSERT_FALSE(again);
   EXPECT_EQ(again.error().code, ErrorCode::exists);
+
+  EXPECT_THAT(again.error().message, HasSubstr("there is /room/journal already; give the new journal another name"));
 
   // A log that belonged to another journal of that name would be read as the new one's.
   ASSERT_TRUE(disk_.remove(kFile));
@@ -280,6 +288,7 @@ TEST_F(JournalTest, SaysThatTheDiskIsFull) {
   const Result<void> failed = journal.append({&row, 1});
   ASSERT_FALSE(failed);
   EXPECT_THAT(failed.error().message, HasSubstr("disk is full"));
+  EXPECT_THAT(failed.error().message, HasSubstr("make room on the disk"));
 }
 
 TEST_F(JournalTest, KeepsItsLogShort) {
@@ -294,6 +303,45 @@ TEST_F(JournalTest, KeepsItsLogShort) {
   }
   EXPECT_LT(longest, 3u * (64 << 10)) << "the limit, filled up to sectors, and one append";
   EXPECT_GT(longest, std::uint64_t{32} << 10);
+}
+
+TEST_F(JournalTest, CutsItsLogWhenItIsTidied) {
+  const std::vector<JournalRow> rows = some_rows(9, 300, 10'000);
+  {
+    Journal journal = create();
+    append(journal, rows, 0, 4);
+    ASSERT_TRUE(journal.tidy());
+    EXPECT_GT(disk_.size("/room/journal-wal").value().value(), 0u) << "a few rows can wait";
+    append(journal, rows, 4, 290);
+    ASSERT_GT(disk_.size("/room/journal-wal").value().value(), std::uint64_t{1} << 20);
+    ASSERT_TRUE(journal.tidy());
+    EXPECT_EQ(disk_.size("/room/journal-wal").value(), 0u);
+    append(journal, rows, 290, 300);
+    EXPECT_TRUE(equal(rows_of(journal), rows));
+  }
+  Journal journal = reopen();
+  EXPECT_EQ(journal.closed_because(), nullptr);
+  EXPECT_TRUE(equal(rows_of(journal), rows));
+}
+
+// Of a journal whose rows SQLite has in memory.
+TEST_F(JournalTest, AVerifyOfOneInUseReadsTheDisk) {
+  const std::vector<JournalRow> rows = some_rows(11, 30);
+  {
+    Journal journal = create();
+    append(journal, rows, 0, 30);
+    ASSERT_TRUE(journal.close());
+  }
+  Journal journal = reopen();
+  ASSERT_TRUE(verify_journal(journal)->sound());
+  ASSERT_GT(rows[19].bytes.size(), 8u);
+  const std::size_t at = disk_.image().at(kFile).find(rows[19].bytes);
+  ASSERT_NE(at, std::string::npos);
+  disk_.flip_bit(kFile, 8 * at + 3);
+  const auto report = verify_journal(journal);
+  ASSERT_TRUE(report);
+  EXPECT_EQ(report->first_bad, RoomSeq{20});
+  EXPECT_FALSE(report->sound());
 }
 
 // A name in the middle of many: some moved from page to page as the table grew, one was given another name.
@@ -398,15 +446,105 @@ TEST(JournalOnDisk, HasOneUserAtATime) {
   EXPECT_TRUE(Journal::open(file));
 }
 
+std::vector<std::string> names_in(const std::filesystem::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) names.push_back(entry.path().filename().string());
+  return names;
+}
+
 TEST(JournalOnDisk, IsNotTakenFromAnyFile) {
   const test::TempDir folder;
-  for (const std::string& content : {std::string(), std::string("short"), std::string(5000, 'x')}) {
+  const std::string magic("SQLite format 3\0", 16);
+  const std::pair<std::string, const char*> cases[]{{"", "is empty"},
+                                                    {"short", "is no journal; name a file"},
+                                                    {"{\"case\": \"" + std::string(170, 'x') + "\"}", "is no journal; name a file"},
+                                                    {std::string(5000, 'x'), "is no journal; name a file"},
+                                                    {magic.substr(0, 9), "has been cut to 9 bytes"},
+                                                    {magic + std::string(300, '\1'), "has been cut to 316 bytes"}};
+  for (const auto& [content, why] : cases) {
     std::ofstream(folder / "file", std::ios::binary | std::ios::trunc) << content;
     const auto opened = Journal::open(folder / "file");
     ASSERT_FALSE(opened);
     EXPECT_EQ(opened.error().code, ErrorCode::invalid_input) << opened.error().message;
-    EXPECT_THAT(opened.error().message, HasSubstr((folder / "file").string()));
+    EXPECT_THAT(opened.error().message, HasSubstr((folder / "file").string() + " " + why));
+    EXPECT_EQ(verify_journal(folder / "file").error().message, opened.error().message);
+    EXPECT_THAT(names_in(folder.path()), ElementsAre("file")) << "nothing is made beside it";
   }
+}
+
+// While the other program has it open for itself.
+TEST(JournalOnDisk, IsNotTakenFromAnotherProgramsDatabase) {
+  const test::TempDir folder;
+  sqlite3* other = nullptr;
+  ASSERT_EQ(sqlite3_open((folder / "file").c_str(), &other), SQLITE_OK);
+  ASSERT_EQ(sqlite3_exec(other, "CREATE TABLE songs(name TEXT); BEGIN EXCLUSIVE", nullptr, nullptr, nullptr), SQLITE_OK);
+  const auto opened = Journal::open(folder / "file");
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().code, ErrorCode::invalid_input);
+  EXPECT_THAT(opened.error().message, HasSubstr("is a database of another program, no journal"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "file.lock"));
+  EXPECT_EQ(sqlite3_close(other), SQLITE_OK);
+}
+
+// Beside the name of a journal that is there, what belongs to it is not what is in the way.
+TEST(JournalOnDisk, NamesTheJournalThatIsInTheWay) {
+  const test::TempDir folder;
+  for (int i = 0; i < 16; ++i) {
+    const std::string name = "journal" + std::to_string(i);
+    for (const std::string& end : {std::string("-wal"), "-7-" + std::string(64, 'a') + ".checkpoint", std::string()})
+      std::ofstream(folder / (name + end)) << "x";
+    const auto made = Journal::create(folder / name, "bone");
+    ASSERT_FALSE(made);
+    EXPECT_EQ(made.error().message, "there is " + (folder / name).string() + " already; give the new journal another name");
+  }
+}
+
+// For as long as it lives, this thread is bound by permissions as anybody is.
+class WithoutPrivileges {
+ public:
+  WithoutPrivileges() {
+    EXPECT_EQ(::syscall(SYS_capget, &header_, before_), 0);
+    __user_cap_data_struct none[2] = {before_[0], before_[1]};
+    none[0].effective = none[1].effective = 0;
+    EXPECT_EQ(::syscall(SYS_capset, &header_, none), 0);
+  }
+  ~WithoutPrivileges() { EXPECT_EQ(::syscall(SYS_capset, &header_, before_), 0); }
+  WithoutPrivileges(const WithoutPrivileges&) = delete;
+  WithoutPrivileges& operator=(const WithoutPrivileges&) = delete;
+
+ private:
+  __user_cap_header_struct header_{_LINUX_CAPABILITY_VERSION_3, 0};
+  __user_cap_data_struct before_[2]{};
+};
+
+TEST(JournalOnDisk, SaysWhatItMayNotDoAndWhatToDoAboutIt) {
+  using std::filesystem::perms;
+  const test::TempDir folder;
+  const auto file = folder / "journal", sub = folder / "sub";
+  ASSERT_TRUE(Journal::create(file, "bone")->close());
+  std::filesystem::remove(folder / "journal.lock");
+  std::filesystem::create_directory(sub);
+  const auto why = [](const Result<Journal>& journal) { return journal ? std::string() : journal.error().message; };
+  const auto code = [](const Result<Journal>& journal) { return journal ? ErrorCode::cancelled : journal.error().code; };
+
+  EXPECT_EQ(code(Journal::open(sub)), ErrorCode::invalid_input) << "and so nobody makes a new one there";
+  EXPECT_THAT(why(Journal::open(sub)), AllOf(HasSubstr(sub.string()), HasSubstr("name a file, not a folder")));
+  EXPECT_FALSE(std::filesystem::exists(folder / "sub.lock"));
+  EXPECT_EQ(why(Journal::create(folder / "none" / "journal", "bone")),
+            "there is no folder " + (folder / "none").string() + " for " + (folder / "none" / "journal.lock").string() +
+                "; make it first");
+  EXPECT_THAT(why(Journal::open(file / "journal")), HasSubstr("name a file in a folder"));
+
+  const WithoutPrivileges anybody;
+  std::filesystem::permissions(file, perms::none);
+  EXPECT_THAT(why(Journal::open(file)), AllOf(HasSubstr(file.string()), HasSubstr("see to the permissions")));
+  EXPECT_NE(code(Journal::open(file)), ErrorCode::not_found) << "and so nobody makes a new one there";
+  EXPECT_FALSE(std::filesystem::exists(folder / "journal.lock"));
+  std::filesystem::permissions(file, perms::owner_read);
+  EXPECT_THAT(why(Journal::open(file)), HasSubstr(file.string() + " cannot be written to; see to its permissions, or copy it"));
+  std::filesystem::permissions(sub, perms::owner_read | perms::owner_exec);
+  EXPECT_THAT(why(Journal::create(sub / "journal", "bone")), HasSubstr("see to the permissions, or choose another place"));
+  std::filesystem::permissions(sub, perms::owner_all);
 }
 
 }  // namespace

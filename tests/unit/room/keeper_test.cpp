@@ -214,6 +214,47 @@ TEST_F(KeeperTest, DamageUnderAnOpenJournalIsFound) {
   EXPECT_TRUE(kept.keeper->branch(kTo, RoomSeq{99}, "b")) << "which the damage does not reach";
 }
 
+// Also where SQLite has the rows in memory, from when they were written.
+TEST_F(KeeperTest, DamageUnderRowsThatWereJustWrittenIsFound) {
+  KeptCuts kept(kFile, &disk_, "femur");
+  kept.cut(3);
+  const RoomSeq before = kept.keeper->head().place;
+  ASSERT_TRUE(kept.keeper->write(plain_rows(before, 20)));
+  ASSERT_TRUE(kept.keeper->verify(test_block(), std::nullopt)->sound());
+  const std::string log = std::string(kFile) + "-wal", row = std::to_string(before.value + 7) + "." + std::string(20, 'x');
+  const std::size_t at = disk_.image().at(log).rfind(row);
+  ASSERT_NE(at, std::string::npos);
+  disk_.flip_bit(log, 8 * (at + 10) + 1);
+  const Result<RoomReport> report = kept.keeper->verify(test_block(), std::nullopt);
+  ASSERT_TRUE(report);
+  EXPECT_EQ(report->first_bad, RoomSeq{before.value + 7});
+  EXPECT_FALSE(report->sound());
+}
+
+TEST_F(KeeperTest, AnIdleRoomsLogIsCut) {
+  KeptCuts kept(kFile, &disk_, "femur");
+  const std::string log = std::string(kFile) + "-wal";
+  kept.keep();
+  const auto log_bytes = [&] { return disk_.size(log).value().value(); };
+  ASSERT_TRUE(kept.keeper->tidy_if_idle());
+  ASSERT_TRUE(kept.keeper->write(plain_rows(kept.keeper->head().place, 200, 20'000)));
+  const std::uint64_t busy = log_bytes();
+  ASSERT_GT(busy, 200u * 20'000);
+  ASSERT_TRUE(kept.keeper->tidy_if_idle());
+  EXPECT_EQ(log_bytes(), busy) << "rows have come since it was asked";
+  ASSERT_TRUE(kept.keeper->tidy_if_idle());
+  EXPECT_EQ(log_bytes(), 0u);
+  ASSERT_TRUE(kept.keeper->write(plain_rows(kept.keeper->head().place, 3)));
+  EXPECT_TRUE(kept.keeper->verify(test_block(), std::nullopt)->sound());
+
+  // One that takes no rows is left alone, and nobody is told of that every few seconds.
+  disk_.fail_write_at(1, EIO);
+  ASSERT_FALSE(kept.keeper->write(plain_rows(kept.keeper->head().place, 200, 20'000)));
+  const MemoryDisk::Image failed = disk_.image();
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(kept.keeper->tidy_if_idle());
+  EXPECT_EQ(disk_.image(), failed);
+}
+
 // On the computer's disk, and each waits for the other: so rows get through between any two slices of a check or a copy.
 TEST(KeeperThreads, RowsAreWrittenWhileAJournalIsCheckedAndCopied) {
   const test::TempDir folder;

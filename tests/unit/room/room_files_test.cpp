@@ -230,6 +230,30 @@ TEST_F(FamilyTest, AloneItLeavesItsBranchesWhole) {
   EXPECT_TRUE(disk_.size("/rooms/b2").value());
 }
 
+// A journal that has lost its end gives what is confirmed to who asks for that, and never less than was asked for.
+TEST_F(RoomFilesTest, ABranchOfAllIsNotMadeOfADamagedJournal) {
+  RoomSeq last;
+  {
+    KeptCuts kept(kFile, &disk_, "femur");
+    kept.keep();
+    ASSERT_TRUE(kept.keeper->write(test::plain_rows(kept.keeper->head().place, 40)));
+    last = kept.keeper->head().place;
+    ASSERT_TRUE(kept.keeper->close());
+  }
+  const std::size_t at = disk_.image().at(kFile).find("30." + std::string(20, 'x'));
+  ASSERT_NE(at, std::string::npos);
+  disk_.flip_bit(kFile, 8 * (at + 6) + 1);
+  const auto all = branch_journal(kFile, "/rooms/b", {}, "b", {}, &disk_);
+  ASSERT_FALSE(all);
+  EXPECT_EQ(all.error().code, ErrorCode::unavailable);
+  EXPECT_THAT(all.error().message, AllOf(HasSubstr("row 30 does not fit the chain"), HasSubstr("--at 29 takes these")));
+  EXPECT_EQ(branch_journal(kFile, "/rooms/b", last, "b", {}, &disk_).error().code, ErrorCode::invalid_input);
+  EXPECT_FALSE(disk_.size("/rooms/b").value());
+  const auto confirmed = branch_journal(kFile, "/rooms/b", RoomSeq{29}, "b", {}, &disk_);
+  ASSERT_TRUE(confirmed) << confirmed.error().message;
+  EXPECT_EQ(confirmed->place, RoomSeq{29});
+}
+
 // Not closed, so that its last rows are only in its log; the power fails at every write and sync of the deletion in turn.
 TEST_F(RoomFilesTest, CutShortADeletionLeavesAWholeRoomOrNone) {
   RoomSeq head;
