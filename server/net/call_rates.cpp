@@ -12,8 +12,8 @@ constexpr CallRate kComing{4.0, 60.0};
 constexpr CallRate kSaying{5.0, 40.0};
 // The same, as of a tool that is dragged, or a script.
 constexpr CallRate kChanging{20.0, 100.0};
-// These take the bone or the case in hand.
-constexpr CallRate kLookingUp{10.0, 100.0};
+// Takes the bone in hand, and is what programs ask over and over while they wait.
+constexpr CallRate kLookingUp{100.0, 1000.0};
 
 struct Row {
   std::string_view method;
@@ -38,7 +38,7 @@ constexpr std::array kRates{
     Row{"/osteon.v1.RoomService/RemoveSceneItem", kChanging},
     Row{"/osteon.v1.RoomService/SaveFields", kSaying},
     Row{"/osteon.v1.RoomService/GetStatus", kLookingUp},
-    Row{"/osteon.v1.RoomService/GetCase", kLookingUp},
+    Row{"/osteon.v1.RoomService/GetCase", kComing},
     Row{"/osteon.v1.RoomsService/BranchRoom", kSaying},
     Row{"/osteon.v1.RoomsService/ReplayRoom", kSaying},
 };
