@@ -1,21 +1,26 @@
 #include "server/app/journal_commands.hpp"
 
 #include <CLI/CLI.hpp>
+#include <fcntl.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
+#include <utility>
 #include <vector>
 
 #include "common/field/kernel.hpp"
 #include "common/runtime/progress.hpp"
 #include "common/volume/case.hpp"
 #include "common/volume/field_file.hpp"
+#include "server/journal/journal_file.hpp"
 #include "server/journal/upkeep.hpp"
 #include "server/net/journal_rows.hpp"
 #include "server/net/room_files.hpp"
@@ -37,32 +42,123 @@ void say(const std::string& what, const std::string& value) { std::printf("%-12s
 
 std::string text_of(const JournalHead& head) { return std::to_string(head.place.value) + ", chain " + to_hex(head.chain).substr(0, 16); }
 
-// Makes the room again up to a place, 0 for all of it.
-Result<Room> replayed(const fs::path& file, const fs::path& case_folder, std::uint64_t to) {
-  const Result<Case> bone = Case::load(case_folder);
-  if (!bone) return tl::unexpected(bone.error());
+// Opens a journal, does something with it and closes it, also after an error: so that it still vouches for its end.
+template <class Do>
+auto with_journal(const fs::path& file, const Do& what) -> decltype(what(std::declval<Journal&>())) {
   Result<Journal> journal = Journal::open(file);
   if (!journal) return tl::unexpected(journal.error());
-  const Result<RoomGenesis> genesis = genesis_from_bytes(journal->genesis());
-  if (!genesis) return tl::unexpected(genesis.error());
-  Result<Room> room = begin_room(*bone, *genesis, {});
-  if (!room) return room;
-  const std::uint64_t last = to == 0 ? journal->head().place.value : to;
-  if (last > journal->head().place.value)
-    return failure(ErrorCode::invalid_input, "--to " + std::to_string(last) + " lies beyond the last event of " + file.string() + ", " +
-                                                 std::to_string(journal->head().place.value));
-  Progress progress("replay");
-  Result<void> outcome;
-  const Result<void> read = journal->read(RoomSeq{1}, [&](const JournalRow& one) {
-    if (one.place.value > last) return false;
-    const Result<RoomRow> row = row_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
-    outcome = row ? room->replay(*row) : Result<void>(tl::unexpected(row.error()));
-    progress.update(static_cast<double>(one.place.value) / static_cast<double>(last));
-    return outcome.has_value();
+  auto done = what(*journal);
+  const Result<void> closed = journal->close();
+  if (done && !closed) return tl::unexpected(closed.error());
+  return done;
+}
+
+// The last event that is meant: what --to says, or, of a journal that confirms all of its own, the last of them.
+Result<RoomSeq> last_of(const Journal& journal, const Arguments& given) {
+  const RoomSeq head = journal.head().place;
+  if (given.at == 0) return check_whole(journal, "--to").map([&] { return head; });
+  const Error* closed = journal.closed_because();
+  if (given.at > head.value)
+    return failure(ErrorCode::invalid_input,
+                   "--to " + std::to_string(given.at) + " lies beyond the last event of " + given.file.string() +
+                       (closed != nullptr ? " that is confirmed, " : ", ") + std::to_string(head.value) +
+                       (closed != nullptr ? ": " + closed->message : ""));
+  if (closed != nullptr) say("fault", closed->message);
+  return RoomSeq{given.at};
+}
+
+// What a file of another name is never to become: a part of the journal, as the next opening would take it.
+Result<void> check_apart(const fs::path& journal, const fs::path& to) {
+  std::error_code ignored;
+  if (!fs::equivalent(folder_of(journal), folder_of(to), ignored) || !belongs_to(journal, to.filename().string())) return {};
+  return failure(ErrorCode::exists,
+                 to.string() + " would belong to the journal " + journal.string() + " itself; give another name");
+}
+
+Error cannot_write(const fs::path& file, int reason) {
+  return {ErrorCode::internal, "cannot write " + file.string() + ": " + std::generic_category().message(reason) +
+                                   std::string(remedy_of(reason))};
+}
+
+// A file whose name nothing has yet. It grows beside its place and gets its name when it is whole; dropped before, it leaves
+// nothing.
+class NewFile {
+ public:
+  static Result<NewFile> begin(const fs::path& file) {
+    NewFile made(file);
+    if (made.is_taken()) return made.taken();
+    const int fd = ::open(made.partial_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+    if (fd < 0 && errno == EEXIST)
+      return failure(ErrorCode::exists, "there is " + made.partial_.string() + ", which an export that was cut short may have "
+                                            "left; remove it, or give another name than " + file.string());
+    if (fd < 0 && errno == ENOENT)
+      return failure(ErrorCode::not_found, "there is no folder " + folder_of(file).string() + "; make it first");
+    if (fd < 0) return tl::unexpected(cannot_write(file, errno));
+    made.out_ = ::fdopen(fd, "w");
+    return made;
+  }
+  NewFile(NewFile&& from) noexcept
+      : file_(std::move(from.file_)), partial_(std::move(from.partial_)), out_(std::exchange(from.out_, nullptr)) {}
+  NewFile& operator=(NewFile&&) = delete;
+  ~NewFile() {
+    if (out_ == nullptr) return;
+    std::fclose(out_);
+    ::unlink(partial_.c_str());
+  }
+
+  [[nodiscard]] bool write(const std::string& line) {
+    return std::fwrite(line.data(), 1, line.size(), out_) == line.size() && std::fputc('\n', out_) != EOF;
+  }
+  [[nodiscard]] Error failed() const { return cannot_write(file_, errno); }
+
+  Result<void> finish() {
+    if (std::fflush(out_) != 0 || ::fsync(::fileno(out_)) != 0) return tl::unexpected(failed());
+    bool named = ::renameat2(AT_FDCWD, partial_.c_str(), AT_FDCWD, file_.c_str(), RENAME_NOREPLACE) == 0;
+    // Some file systems know only the older way to replace nothing.
+    if (!named && errno == EINVAL) named = ::link(partial_.c_str(), file_.c_str()) == 0 && ::unlink(partial_.c_str()) == 0;
+    if (!named && errno == EEXIST) return taken();
+    if (!named) return tl::unexpected(failed());
+    std::fclose(std::exchange(out_, nullptr));
+    return {};
+  }
+
+ private:
+  explicit NewFile(const fs::path& file) : file_(file), partial_(file.string() + std::string(kPartial)) {}
+  [[nodiscard]] bool is_taken() const {
+    std::error_code ignored;
+    return fs::exists(fs::symlink_status(file_, ignored));
+  }
+  [[nodiscard]] tl::unexpected<Error> taken() const {
+    return failure(ErrorCode::exists, "there is " + file_.string() + " already; give another name");
+  }
+  fs::path file_, partial_;
+  std::FILE* out_ = nullptr;
+};
+
+// Makes the room again up to the place that --to says, or all of it.
+Result<Room> replayed(const Arguments& given) {
+  const Result<Case> bone = Case::load(given.case_folder);
+  if (!bone) return tl::unexpected(bone.error());
+  return with_journal(given.file, [&](Journal& journal) -> Result<Room> {
+    const Result<RoomGenesis> genesis = genesis_from_bytes(journal.genesis());
+    if (!genesis) return tl::unexpected(genesis.error());
+    const Result<RoomSeq> last = last_of(journal, given);
+    if (!last) return tl::unexpected(last.error());
+    Result<Room> room = begin_room(*bone, *genesis, {});
+    if (!room) return room;
+    Progress progress("replay");
+    Result<void> outcome;
+    const Result<void> read = journal.read(RoomSeq{1}, [&](const JournalRow& one) {
+      if (one.place > *last) return false;
+      const Result<RoomRow> row = row_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
+      outcome = row ? room->replay(*row) : Result<void>(tl::unexpected(row.error()));
+      progress.update(static_cast<double>(one.place.value) / static_cast<double>(last->value));
+      return outcome.has_value();
+    });
+    if (!outcome) return failure(outcome.error().code, given.file.string() + ": " + outcome.error().message);
+    if (!read) return tl::unexpected(read.error());
+    return room;
   });
-  if (!outcome) return failure(outcome.error().code, file.string() + ": " + outcome.error().message);
-  if (!read) return tl::unexpected(read.error());
-  return room;
 }
 
 Result<void> verify(const Arguments& given) {
@@ -76,7 +172,7 @@ Result<void> verify(const Arguments& given) {
     return failure(ErrorCode::invalid_input, given.file.string() + " is damaged; osteon-server recover " + given.file.string() +
                                                  " NEW copies what can be confirmed");
   if (!given.case_folder.empty()) {
-    const Result<Room> room = replayed(given.file, given.case_folder, 0);
+    const Result<Room> room = replayed(given);
     if (!room) return tl::unexpected(room.error());
     say("field hash", to_hex(room->field_hash()));
     say("room hash", to_hex(room->room_hash()));
@@ -95,8 +191,24 @@ Result<void> recover(const Arguments& given) {
   return {};
 }
 
+// Only earlier fields are replaced. Asked before what takes long, and again before they are written.
+Result<void> check_fields_file(const Arguments& given) {
+  const fs::path &file = given.fields, folder = folder_of(file);
+  std::error_code ignored;
+  if (!fs::is_directory(folder, ignored))
+    return failure(ErrorCode::not_found,
+                   "there is no folder " + folder.string() + " for --fields " + file.string() + "; make it first");
+  if (::access(folder.c_str(), W_OK) != 0) return tl::unexpected(cannot_write(file, errno));
+  if (const Result<void> apart = check_apart(given.file, file); !apart) return apart;
+  if (!fs::exists(fs::symlink_status(file, ignored)) || load_fields(file)) return {};
+  return failure(ErrorCode::exists, "there is " + file.string() + ", which is no file of fields, to be replaced by newer ones; "
+                                        "give --fields another name");
+}
+
 Result<void> replay(const Arguments& given) {
-  const Result<Room> room = replayed(given.file, given.case_folder, given.at);
+  if (!given.fields.empty())
+    if (const Result<void> may = check_fields_file(given); !may) return may;
+  const Result<Room> room = replayed(given);
   if (!room) return tl::unexpected(room.error());
   say("events", std::to_string(room->room_seq().value));
   say("time", std::to_string(std::chrono::duration_cast<std::chrono::seconds>(room->time()).count()) + " s");
@@ -115,6 +227,7 @@ Result<void> replay(const Arguments& given) {
   const std::shared_ptr<ToolBox> built_in = builtin_tool_box();
   for (const ToolBox::Entry* entry : room->tools()->entries())
     if (!built_in->find(entry->hash)) saved.tools.push_back(entry->tool);
+  if (const Result<void> may = check_fields_file(given); !may) return may;
   return save_fields(given.fields, saved);
 }
 
@@ -145,68 +258,79 @@ Result<void> remove(const Arguments& given) {
 
 // One line of text for each event, of all or of one person.
 Result<void> write_out(const Arguments& given) {
-  Result<Journal> journal = Journal::open(given.file);
-  if (!journal) return tl::unexpected(journal.error());
-  std::ofstream out(given.to);
-  if (!out) return failure(ErrorCode::internal, "cannot write " + given.to.string() + "; give another file");
-  std::optional<PersonExport> of_person;
-  if (given.person != 0) {
-    const Result<std::vector<Person>> people = journal->people();
-    if (!people) return tl::unexpected(people.error());
-    of_person.emplace(given.person, *people);
-    if (of_person->who()) out << *of_person->who() << '\n';
-  }
-  Result<void> outcome;
-  std::uint64_t events = 0;
-  const auto put = [&](const std::string& line) {
-    out << line << '\n';
-    ++events;
-  };
-  const Result<void> read = journal->read(RoomSeq{1}, [&](const JournalRow& row) {
-    if (of_person) {
-      const Result<std::optional<std::string>> line = of_person->of(row);
-      if (!line) outcome = tl::unexpected(line.error());
-      else if (*line) put(**line);
-    } else {
-      const Result<std::string> line = row_as_json(row.place, std::chrono::nanoseconds(row.at_ns), row.bytes);
-      if (!line) outcome = tl::unexpected(line.error());
-      else put(*line);
+  if (const Result<void> apart = check_apart(given.file, given.to); !apart) return apart;
+  Result<NewFile> out = NewFile::begin(given.to);
+  if (!out) return tl::unexpected(out.error());
+  return with_journal(given.file, [&](Journal& journal) -> Result<void> {
+    const Result<RoomSeq> last = last_of(journal, given);
+    if (!last) return tl::unexpected(last.error());
+    std::optional<PersonExport> of_person;
+    if (given.person != 0) {
+      const Result<std::vector<Person>> people = journal.people();
+      if (!people) return tl::unexpected(people.error());
+      of_person.emplace(given.person, *people);
+      if (of_person->who() && !out->write(*of_person->who())) return tl::unexpected(out->failed());
     }
-    return outcome.has_value() && out.good();
+    Result<void> outcome;
+    std::uint64_t events = 0;
+    const auto put = [&](const std::string& line) {
+      ++events;
+      if (!out->write(line)) outcome = tl::unexpected(out->failed());
+    };
+    const Result<void> read = journal.read(RoomSeq{1}, [&](const JournalRow& row) {
+      if (row.place > *last) return false;
+      if (of_person) {
+        const Result<std::optional<std::string>> line = of_person->of(row);
+        if (!line) outcome = tl::unexpected(line.error());
+        else if (*line) put(**line);
+      } else {
+        const Result<std::string> line = row_as_json(row.place, std::chrono::nanoseconds(row.at_ns), row.bytes);
+        if (!line) outcome = tl::unexpected(line.error());
+        else put(*line);
+      }
+      return outcome.has_value();
+    });
+    if (!outcome) return outcome;
+    if (!read) return read;
+    if (of_person && !of_person->who() && events == 0) return of_person->nobody();
+    if (const Result<void> named = out->finish(); !named) return named;
+    say("events", std::to_string(events));
+    return {};
   });
-  if (!outcome) return outcome;
-  if (!read) return read;
-  if (!out.flush()) return failure(ErrorCode::internal, "cannot write all of " + given.to.string() + "; is the disk full?");
-  if (of_person && !of_person->who() && events == 0) return of_person->nobody();
-  say("events", std::to_string(events));
-  return journal->close();
 }
 
 Result<void> list_people(const Arguments& given) {
-  Result<Journal> journal = Journal::open(given.file);
-  if (!journal) return tl::unexpected(journal.error());
-  const Result<std::vector<Person>> people = journal->people();
-  if (!people) return tl::unexpected(people.error());
-  for (const Person& person : *people) {
-    const std::chrono::year_month_day day{std::chrono::sys_days{std::chrono::days{person.joined_day}}};
-    std::printf("%s  %04d-%02u-%02u  %s\n", person.pseudonym.c_str(), static_cast<int>(day.year()),
-                static_cast<unsigned>(day.month()), static_cast<unsigned>(day.day()), person.label.c_str());
-  }
-  return {};
+  return with_journal(given.file, [](Journal& journal) -> Result<void> {
+    const Result<std::vector<Person>> people = journal.people();
+    if (!people) return tl::unexpected(people.error());
+    for (const Person& person : *people) {
+      const std::chrono::year_month_day day{std::chrono::sys_days{std::chrono::days{person.joined_day}}};
+      std::printf("%s  %04d-%02u-%02u  %s\n", person.pseudonym.c_str(), static_cast<int>(day.year()),
+                  static_cast<unsigned>(day.month()), static_cast<unsigned>(day.day()), person.label.c_str());
+    }
+    // Of a journal that has lost something nobody knows whether these are all.
+    if (const Error* closed = journal.closed_because()) return tl::unexpected(*closed);
+    return {};
+  });
 }
 
 Result<void> forget(const Arguments& given) {
   if ((given.person == 0) == (given.days == 0))
     return failure(ErrorCode::invalid_input, "forget needs either --person NUMBER, as \"people\" lists it, or --older-than DAYS");
-  Result<Journal> journal = Journal::open(given.file);
-  if (!journal) return tl::unexpected(journal.error());
   const auto today = std::chrono::duration_cast<std::chrono::days>(std::chrono::system_clock::now().time_since_epoch());
-  const Result<std::size_t> forgotten = given.person == 0
-                                            ? journal->forget_people_before(static_cast<std::int32_t>(today.count()) - given.days)
-                                            : journal->forget_person(std::to_string(given.person));
-  if (!forgotten) return tl::unexpected(forgotten.error());
-  say("forgotten", std::to_string(*forgotten) + " (what they did stays, under a number; backups made before have the names)");
-  return journal->close();
+  return with_journal(given.file, [&](Journal& journal) -> Result<void> {
+    // Also where nobody was to be forgotten: a name may be in what cannot be read.
+    if (const Error* closed = journal.closed_because()) return tl::unexpected(*closed);
+    const Result<std::size_t> forgotten =
+        given.person == 0 ? journal.forget_people_before(static_cast<std::int32_t>(today.count()) - given.days)
+                          : journal.forget_person(std::to_string(given.person));
+    if (!forgotten) return tl::unexpected(forgotten.error());
+    if (given.person != 0 && *forgotten == 0)
+      return failure(ErrorCode::not_found, "nobody in " + given.file.string() + " has the number " +
+                                               std::to_string(given.person) + "; \"people\" lists those it knows");
+    say("forgotten", std::to_string(*forgotten) + " (what they did stays, under a number; backups made before have the names)");
+    return {};
+  });
 }
 
 }  // namespace
@@ -234,9 +358,11 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
   CLI::App* again = command("replay", "Makes the room again and says its hashes, marks and time", replay);
   again->add_option("--case", given->case_folder, "Folder of the case")->required();
   again->add_option("--to", given->at, "room_seq of the last event; all by default");
-  again->add_option("--fields", given->fields, "Writes the bone as it was then (.vdb), for --resume and osteon-import surface");
-  copies("export", "Writes each event as a line of JSON", write_out)
-      ->add_option("--person", given->person, "Number of one, as \"people\" lists it: who it is and only what it did");
+  again->add_option("--fields", given->fields,
+                    "Writes the bone as it was then (.vdb), for --resume and osteon-import surface; replaces only earlier fields");
+  CLI::App* lines = copies("export", "Writes each event as a line of JSON", write_out);
+  lines->add_option("--person", given->person, "Number of one, as \"people\" lists it: who it is and only what it did");
+  lines->add_option("--to", given->at, "room_seq of the last event; all by default");
   command("people", "Lists the people whose numbers the events have", list_people);
   CLI::App* gone = command("forget", "Forgets who people were; what they did stays", forget);
   gone->add_option("--person", given->person, "Number of one, as \"people\" lists it");
