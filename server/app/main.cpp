@@ -317,8 +317,8 @@ int main(int argc, char** argv) {
   CLI::Option* resume = app.add_option("--resume", options.resume_file,
                                        "What --save wrote: the room goes on from there; what came before cannot be undone");
   app.add_option("--journal", options.journal_file,
-                 "Every event of the room, on the disk before anyone is told of it; where the file is there, the room goes on, "
-                 "with all that can be undone")
+                 "Every event of the room, on the disk before any hand is told or answered; where the file is there, the room "
+                 "goes on, with all that can be undone")
       ->excludes(resume);
   app.add_option("--rooms", options.rooms_folder,
                  "Folder of many rooms, each kept in a journal: those that were open are opened, and \"osteon-server rooms\" makes, "

@@ -152,6 +152,8 @@ void OpenRoom::keep_up(const std::function<bool()>& stop) {
     if (const Result<std::size_t> gone = keeper_->forget_old(); !gone)
       log::warn("nobody was forgotten", {{"room", name}, {"reason", gone.error().message}});
   }
+  if (const Result<void> tidied = keeper_->tidy_if_idle(); !tidied)
+    log::warn("the journal's log stays long", {{"room", name}, {"reason", tidied.error().message}});
   const bool due = CheckpointPolicy{}.is_due(keeper_->changes_since_checkpoint(), Clock::now() - newest_checkpoint_);
   if (!due) return;
   newest_checkpoint_ = Clock::now();

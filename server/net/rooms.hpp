@@ -87,8 +87,8 @@ class OpenRoom {
   void send_away(const std::string& why);
   // Afterwards nothing changes any more; the journal is closed cleanly, with a checkpoint.
   RoomSummary close();
-  // [upkeep] Writes a checkpoint where the next opening would take long without, and forgets whom it is time to forget. `stop`
-  // returns true: what takes long is given up.
+  // [upkeep] Writes a checkpoint where the next opening would take long without, forgets whom it is time to forget, and cuts the
+  // journal's log where the room is idle. `stop` returns true: what takes long is given up.
   void keep_up(const std::function<bool()>& stop);
 
  private:

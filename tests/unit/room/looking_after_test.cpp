@@ -131,6 +131,23 @@ TEST(HealthWatch, ARoomServesUntilItIsClosedOrKeepsNothingAnyMore) {
   }
 }
 
+// As the server's upkeep asks it, every few seconds.
+TEST(Upkeep, AnIdleRoomsLogIsCut) {
+  TempDir dir;
+  const std::filesystem::path file = dir / "femur.journal", log = dir / "femur.journal-wal";
+  KeptCuts kept(file, nullptr, "femur");
+  for (int i = 0; i < 300; ++i) {
+    ASSERT_TRUE(kept.room->mark(kept.hand, "a mark"));
+    kept.keep();
+  }
+  ASSERT_GT(std::filesystem::file_size(log), std::uint64_t{1} << 20);
+  Rooms rooms(RoomsOptions{.cases = {{test_block(), dir / "case"}}});
+  ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.keeper), {}, [](double) {}));
+  const std::shared_ptr<OpenRoom> room = *rooms.find("femur");
+  for (int i = 0; i < 2; ++i) room->keep_up([] { return false; });
+  EXPECT_EQ(std::filesystem::file_size(log), 0u);
+}
+
 TEST_F(DrainTest, EveryHandLeavesWithWhatItSentDecidedAndNobodyComesIn) {
   const auto hand = surgeon();
   ASSERT_TRUE(wait_until([&] { return hand->complete(); }, kPatience));
