@@ -539,8 +539,8 @@ void SimClient::oversee() {
   const double which = random_.unit();
   word.stopped = which < 0.2;
   if (which >= 0.2 && which < 0.3) word.taken_by = room_->author;
-  if (which >= 0.3 && which < 0.4) word.zone = ZoneLimit{at_.position, 1 + static_cast<std::int32_t>(random_.index(4096))};
-  if (which >= 0.4 && which < 0.5) word.tools = {hand_.tools[random_.index(hand_.tools.size())].hash()};
+  if (which >= 0.3 && which < 0.4) word.zone = ZoneLimit{at_.position, 1 + static_cast<std::int32_t>(random_.index(2048))};
+  if (which >= 0.4 && which < 0.5) word.tools = {find_tool(random_.unit() < 0.5 ? "burr-round-3.2" : "drill-3.2").value().hash()};
   if (which < 0.6) word.words = "as I say";
   const std::uint64_t pick = random_.index(1000);
   change([word, pick](Room& room, AuthorId by) -> Result<RoomEvent> {

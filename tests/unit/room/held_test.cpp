@@ -185,7 +185,7 @@ TEST(Held, DoesNothingAgainThatItMayNotCut) {
   const Digest bone = all.room.field_hash();
   all.decide(all.ben, {.tools = {tool_named("burr-round-5").hash()}});
   const Result<RoomEvent> denied = all.room.redo_last(all.ben, 1);
-  EXPECT_EQ(all.refused(denied), ErrorCode::denied);
+  ASSERT_EQ(all.refused(denied), ErrorCode::denied);
   EXPECT_NE(denied.error().message.find("event " + std::to_string(drilled.value)), std::string::npos) << denied.error().message;
   EXPECT_EQ(all.refused(all.room.redo_last(all.cy, 1)), ErrorCode::denied) << "nor does a friend, for it";
   EXPECT_EQ(all.room.field_hash(), bone);
