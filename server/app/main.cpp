@@ -158,21 +158,23 @@ Result<Room> open_journal(const ServerConfig& options, const Case& bone, std::sh
   return std::move(kept->room);
 }
 
-// Cases that were uploaded earlier are served as those of the command line are. One that cannot be read is none.
-Result<void> open_uploads(const std::filesystem::path& folder, RoomsOptions& rooms) {
+// Cases that were uploaded earlier are served as those of the command line are, and read when a room is of them. One that cannot
+// be described is none.
+Result<std::vector<KnownCase>> open_uploads(const std::filesystem::path& folder, RoomsOptions& rooms) {
   Result<std::unique_ptr<CaseStore>> store = CaseStore::open(folder, "/proc/self/exe");
   if (!store) return tl::unexpected(store.error());
+  std::vector<KnownCase> known;
   for (const std::filesystem::path& kept : (*store)->folders()) {
-    Result<Case> bone = Case::load(kept);
-    if (!bone) {
-      log::error("an uploaded case cannot be read", {{"folder", kept.string()}, {"reason", bone.error().message}});
+    const Result<StoredCase> stored = CaseStore::peek(kept);
+    if (!stored) {
+      log::error("an uploaded case cannot be read", {{"folder", kept.string()}, {"reason", stored.error().message}});
       continue;
     }
-    log::info("case", {{"title", bone->info().title}, {"hash", to_hex(bone->hash())}, {"uploaded", true}});
-    rooms.cases.push_back({std::move(*bone), kept});
+    log::info("case", {{"title", stored->title}, {"hash", to_hex(stored->hash)}, {"uploaded", true}});
+    known.push_back({stored->hash, stored->title, kept, stored->memory_bytes});
   }
   rooms.store = std::move(*store);
-  return {};
+  return known;
 }
 
 // What the command line asks for: the rooms of a folder, or one room.
@@ -187,6 +189,8 @@ Result<std::unique_ptr<Rooms>> open_rooms(const ServerConfig& options) {
   rooms_options.rates.mount = options.mount;
   rooms_options.retention_days = options.retention_days;
   rooms_options.most_rooms = options.most_rooms;
+  rooms_options.case_memory_bytes = static_cast<std::uint64_t>(options.case_memory_mib) << 20;
+  std::uint64_t case_bytes = 0;
   for (const std::filesystem::path& folder : options.case_folders) {
     Result<Case> bone = Case::load(folder);
     if (!bone) return tl::unexpected(bone.error());
@@ -194,12 +198,19 @@ Result<std::unique_ptr<Rooms>> open_rooms(const ServerConfig& options) {
                        {"pitch_mm", bone->pitch_mm()},
                        {"volume_mm3", bone->volume_mm3()},
                        {"hash", to_hex(bone->hash())}});
+    case_bytes += bone->memory_bytes();
+    if (case_bytes > rooms_options.case_memory_bytes)
+      return failure(ErrorCode::exhausted,
+                     "the cases up to " + folder.string() + " take more than the " + std::to_string(options.case_memory_mib) +
+                         " MiB of memory that they may; give fewer with --case, or a larger --case-memory-mib");
     rooms_options.cases.push_back({std::move(*bone), folder});
   }
-  if (!options.uploads_folder.empty())
-    if (Result<void> opened = open_uploads(options.uploads_folder, rooms_options); !opened) return tl::unexpected(opened.error());
+  Result<std::vector<KnownCase>> uploaded;
+  if (!options.uploads_folder.empty()) uploaded = open_uploads(options.uploads_folder, rooms_options);
+  if (!uploaded) return tl::unexpected(uploaded.error());
   const Case bone = rooms_options.cases.front().bone;
   auto rooms = std::make_unique<Rooms>(std::move(rooms_options));
+  for (KnownCase& known : *uploaded) rooms->add_case(std::move(known));
   Progress progress("surface");
   const auto tell = [&](double fraction) { progress.update(fraction); };
   if (!options.rooms_folder.empty()) {
@@ -328,6 +339,11 @@ int main(int argc, char** argv) {
       ->excludes("--save");
   app.add_option("--uploads", options.uploads_folder,
                  "Folder in which cases are kept that \"osteon-server cases upload\" sends, for rooms of their own; without it none are taken");
+  app.add_option("--case-memory-mib", options.case_memory_mib,
+                 "Of all cases in memory: those of --case, and uploaded ones as long as a room is of them; a room that needs more "
+                 "is refused")
+      ->check(CLI::Range(1, kMostCaseMemoryMib))
+      ->capture_default_str();
   app.add_option("--retention-days", options.retention_days,
                  "After so many days a room's journal forgets who somebody was, when it is opened and once a day; what they did stays")
       ->check(CLI::Range(1, 36500));

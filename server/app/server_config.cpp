@@ -110,6 +110,7 @@ const std::vector<Field>& fields() {
   using Config = ServerConfig;
   static const std::vector<Field> all{
       {"address_file", [](const Value& v, Config& c) { c.address_file = path(v); }},
+      {"case_memory_mib", [](const Value& v, Config& c) { c.case_memory_mib = whole(v, 1, kMostCaseMemoryMib); }},
       {"cases", [](const Value& v, Config& c) { c.case_folders = paths(v); }},
       {"certificates", [](const Value& v, Config& c) { c.certificates = path(v); }},
       {"detail", [](const Value& v, Config& c) { c.detail = detail(v); }},

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/core/result.hpp"
+#include "server/net/case_shelf.hpp"
 #include "server/net/mesh_room.hpp"
 #include "server/net/rooms.hpp"
 #include "server/room/room.hpp"
@@ -16,6 +17,8 @@ namespace osteon {
 inline constexpr CutLimits kServedLimits{
     .time_slack = std::chrono::milliseconds(1000), .swept_voxels_per_s = 5e8, .power_w = 500.0};
 
+inline constexpr int kMostCaseMemoryMib = 1 << 20;
+
 struct ServerConfig {
   std::vector<std::filesystem::path> case_folders;
   std::string listen = "127.0.0.1:0";   // HOST:PORT
@@ -25,6 +28,7 @@ struct ServerConfig {
   int most_rooms = kMostRooms;          // open and closed ones together
   std::filesystem::path address_file, summary_file, tools_folder;
   std::filesystem::path save_file, resume_file, journal_file, rooms_folder, uploads_folder;
+  int case_memory_mib = static_cast<int>(kMostCaseMemory >> 20);  // of all cases in memory
   int retention_days = 0;               // 0: nobody is forgotten
   Detail detail = Detail::automatic;
   std::string metrics;                  // HOST:PORT or PORT, of this machine alone; empty: none are served

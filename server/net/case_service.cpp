@@ -1,8 +1,12 @@
 // Cases that are uploaded.
+#include <grpcpp/alarm.h>
 #include <grpcpp/grpcpp.h>
 
+#include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -34,77 +38,157 @@ std::uint64_t bytes_of(const std::filesystem::path& folder) {
   return bytes;
 }
 
-// One upload. What has come goes to the disk at once, so that none of it waits in memory.
+// One upload. What has come goes to the disk at once, so that none of it waits in memory. It ends with its sender's right, and
+// with their patience: each holds one of the few places for uploads.
 class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest> {
  public:
   static constexpr std::size_t kMostPiece = 1 << 20;
+  static constexpr std::string_view kMethod = "/osteon.v1.CaseService/UploadCase";
 
-  UploadStream(Rooms& rooms, v1::UploadCaseResponse* response) : rooms_(rooms), response_(response) {}
+  UploadStream(Rooms& rooms, v1::UploadCaseResponse* response) : rooms_(rooms), store_(rooms.store()), response_(response) {}
 
-  void start() {
-    if (rooms_.store() == nullptr)
-      return Finish({StatusCode::FAILED_PRECONDITION, "this server takes no cases; start it with --uploads FOLDER"});
-    Result<std::unique_ptr<Upload>> upload = rooms_.store()->begin();
-    if (!upload) return Finish(status_of(upload.error()));
-    upload_ = std::move(*upload);
-    StartRead(&request_);
+  // gRPC holds the stream until OnDone; the thread for what takes long, the gate and the alarm may hold it longer.
+  static UploadStream* launch(const std::shared_ptr<UploadStream>& stream, const Result<Caller>& caller) {
+    stream->self_ = stream;
+    stream->start(caller);
+    return stream.get();
   }
 
   void OnReadDone(bool ok) override {
-    if (!upload_) return;
-    // Taken apart and looked through by the thread for what takes long; gRPC keeps this until it has finished.
-    if (!ok) return rooms_.jobs.run([this] { Finish(keep()); });
+    std::unique_lock lock(mutex_);
+    if (finished_ || !upload_) return;
+    if (!ok) {
+      // Taken apart and looked through by the thread for what takes long.
+      whole_ = true;
+      lock.unlock();
+      return rooms_.jobs.run([this, keep = self_] { keep_case(); });
+    }
+    newest_ = Clock::now();
     Result<void> added = request_.data().size() <= kMostPiece
                              ? upload_->add(request_.data())
                              : failure(ErrorCode::invalid_input, "a piece of the upload has more than " + std::to_string(kMostPiece) + " bytes");
-    if (added) return StartRead(&request_);
-    upload_.reset();
-    Finish(status_of(added.error()));
+    if (!added) return finish(status_of(added.error()));
+    StartRead(&request_);
   }
   void OnCancel() override { cancelled_ = true; }
-  void OnDone() override { delete this; }
+  void OnDone() override {
+    {
+      const std::lock_guard lock(mutex_);
+      finished_ = true;  // the alarm is set no more
+      alarm_.reset();
+      if (!whole_) upload_.reset();
+    }
+    watched_.reset();
+    const std::shared_ptr<UploadStream> last = std::move(self_);
+  }
 
  private:
-  Status keep() {
+  using Clock = std::chrono::steady_clock;
+
+  void start(const Result<Caller>& caller) {
+    const std::lock_guard lock(mutex_);
+    if (!caller) return finish(status_of(caller.error()));
+    if (!store_) return finish({StatusCode::FAILED_PRECONDITION, "this server takes no cases; start it with --uploads FOLDER"});
+    if (rooms_.gate) {
+      auto entered = rooms_.gate->enter(*caller, caller->room, {}, kMethod, [weak = std::weak_ptr(self_)](const Refusal& why) {
+        if (const auto self = weak.lock()) self->end(status_of(why));
+      });
+      if (!entered) return finish(status_of(entered.error()));
+      watched_ = std::move(*entered);
+    }
+    Result<std::unique_ptr<Upload>> upload = store_->begin();
+    if (!upload) return finish(status_of(upload.error()));
+    upload_ = std::move(*upload);
+    began_ = newest_ = Clock::now();
+    set_alarm();
+    StartRead(&request_);
+  }
+
+  void end(Status why) {
+    cancelled_ = true;  // also of a case that is being looked through
+    const std::lock_guard lock(mutex_);
+    finish(std::move(why));
+  }
+  // Under mutex_. Once.
+  void finish(Status status) {
+    if (std::exchange(finished_, true)) return;
+    if (!status.ok()) log::warn("upload refused", {{"reason", status.error_message()}});
+    if (!whole_) upload_.reset();
+    Finish(std::move(status));
+  }
+
+  // Under mutex_.
+  [[nodiscard]] Clock::time_point due() const {
+    return std::min(newest_ + store_->quota().idle, began_ + store_->quota().sending);
+  }
+  void set_alarm() {
+    const Clock::duration until = std::max<Clock::duration>(due() - Clock::now(), Clock::duration(0));
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(until);
+    alarm_ = std::make_unique<grpc::Alarm>();
+    alarm_->Set(std::chrono::system_clock::now() + left, [weak = std::weak_ptr(self_)](bool rang) {
+      if (const auto self = rang ? weak.lock() : nullptr) self->look_at_the_clock();
+    });
+  }
+  // Once all has come, time is the business of who looks it through.
+  void look_at_the_clock() {
+    const std::lock_guard lock(mutex_);
+    if (finished_ || whole_) return;
+    if (Clock::now() < due()) return set_alarm();
+    const bool idle = due() < began_ + store_->quota().sending;
+    const auto limit = std::chrono::ceil<std::chrono::seconds>(idle ? store_->quota().idle : store_->quota().sending);
+    const std::string seconds = std::to_string(limit.count()) + " s";
+    finish({StatusCode::DEADLINE_EXCEEDED,
+            idle ? "nothing of the upload came for " + seconds + "; send it again"
+                 : "the upload took longer than the " + seconds + " that it may; send it again over a faster line"});
+  }
+
+  // [thread for what takes long]
+  void keep_case() {
     // A sender who is gone, or a server that stops: nobody waits for it.
     const auto stop = [this] { return cancelled_ || rooms_.ending(); };
-    if (stop()) return {StatusCode::CANCELLED, "the upload was given up"};
-    const Result<StoredCase> stored = rooms_.store()->keep(std::move(upload_), stop);
-    if (!stored) {
-      log::warn("upload refused", {{"reason", stored.error().message}});
-      return status_of(stored.error());
+    Result<StoredCase> stored = stop() ? failure(ErrorCode::cancelled, "the upload was given up") : Result<StoredCase>{};
+    if (stored) stored = store_->keep(std::move(upload_), stop);
+    upload_.reset();
+    if (stored) {
+      rooms_.add_case({stored->hash, stored->title, stored->folder, stored->memory_bytes});
+      log::info("case uploaded", {{"hash", to_hex(stored->hash)}, {"title", stored->title}, {"bytes", stored->bytes}});
     }
-    // What is read here was written by the process that looked it through, not by whoever sent it.
-    Result<Case> bone = Case::load(stored->folder);
-    if (!bone) return status_of(bone.error());
-    rooms_.add_case({std::move(*bone), stored->folder});
-    log::info("case uploaded", {{"hash", to_hex(stored->hash)}, {"title", stored->title}, {"bytes", stored->bytes}});
-    *response_->mutable_stored() = to_wire(stored->hash, stored->title, stored->bytes);
-    response_->set_known(stored->known);
-    return Status::OK;
+    const std::lock_guard lock(mutex_);
+    if (!stored) return finish(stop() ? Status{StatusCode::CANCELLED, "the upload was given up"} : status_of(stored.error()));
+    if (!finished_) {
+      *response_->mutable_stored() = to_wire(stored->hash, stored->title, stored->bytes);
+      response_->set_known(stored->known);
+    }
+    finish(Status::OK);
   }
 
   Rooms& rooms_;
-  v1::UploadCaseResponse* const response_;
+  const std::shared_ptr<CaseStore> store_;  // shared with the rooms; outlives what was uploaded here
+  v1::UploadCaseResponse* const response_;  // until it has finished
   v1::UploadCaseRequest request_;
-  std::unique_ptr<Upload> upload_;
   std::atomic<bool> cancelled_{false};
+  std::shared_ptr<OpenStream> watched_;     // shared with the gate while it ends the stream
+  std::mutex mutex_;
+  std::shared_ptr<UploadStream> self_;
+  std::unique_ptr<Upload> upload_;          // once all has come, of the thread that keeps it
+  std::unique_ptr<grpc::Alarm> alarm_;
+  Clock::time_point began_, newest_;
+  bool whole_ = false, finished_ = false;
 };
 
 class CaseServiceImpl final : public v1::CaseService::CallbackService {
  public:
   explicit CaseServiceImpl(Rooms& rooms) : rooms_(rooms) {}
 
-  grpc::ServerReadReactor<v1::UploadCaseRequest>* UploadCase(grpc::CallbackServerContext*, v1::UploadCaseResponse* response) override {
-    auto* stream = new UploadStream(rooms_, response);  // deletes itself in OnDone
-    stream->start();
-    return stream;
+  grpc::ServerReadReactor<v1::UploadCaseRequest>* UploadCase(grpc::CallbackServerContext* context,
+                                                             v1::UploadCaseResponse* response) override {
+    return UploadStream::launch(std::make_shared<UploadStream>(rooms_, response), caller_of(rooms_, *context));
   }
   grpc::ServerUnaryReactor* ListCases(grpc::CallbackServerContext* context, const v1::ListCasesRequest*,
                                       v1::ListCasesResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     rooms_.files.run([this, reactor, response] {
-      for (const ServedCase* one : rooms_.cases()) *response->add_cases() = to_wire(one->bone.hash(), one->bone.info().title, bytes_of(one->folder));
+      for (const KnownCase& one : rooms_.cases()) *response->add_cases() = to_wire(one.hash, one.title, bytes_of(one.folder));
       reactor->Finish(Status::OK);
     });
     return reactor;

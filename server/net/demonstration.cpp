@@ -14,6 +14,7 @@
 
 #include "common/runtime/log.hpp"
 #include "osteon/v1/cutting.pb.h"
+#include "server/net/gate.hpp"
 #include "server/net/playback.hpp"
 #include "server/net/rooms.hpp"
 
@@ -39,6 +40,16 @@ class Demonstration final : public SessionSink, public std::enable_shared_from_t
   Demonstration(RoomHost& host, AuthorId author, std::vector<Recorded> cuts, double speed)
       : host_(host), author_(author), cuts_(std::move(cuts)), speed_(speed) {}
 
+  // Before start(). `by` may be whoever they were when they asked; a newer session of theirs leaves what they started alone.
+  [[nodiscard]] Result<void> stand_under(Gate& gate, const Caller& by, const std::string& room) {
+    const auto end = [weak = weak_from_this()](const Refusal& why) {
+      if (const auto self = weak.lock()) self->refuse({ErrorCode::denied, why.sentence});
+    };
+    auto entered = gate.enter(by, room, {}, "/osteon.v1.PeopleService/Demonstrate", end);
+    if (!entered) return failure(ErrorCode::denied, entered.error().sentence);
+    watched_ = std::move(*entered);
+    return {};
+  }
   [[nodiscard]] Result<void> start() {
     if (Result<void> opened = host_.open_session(shared_from_this()); !opened) return opened;
     thread_ = std::thread([this] { run(); });
@@ -52,6 +63,12 @@ class Demonstration final : public SessionSink, public std::enable_shared_from_t
   [[nodiscard]] bool over() const {
     const std::lock_guard lock(mutex_);
     return over_;
+  }
+
+  // Empty: it came to its end, or somebody ended it.
+  [[nodiscard]] std::string why() const {
+    const std::lock_guard lock(mutex_);
+    return why_;
   }
 
   AuthorId author() const override { return author_; }
@@ -84,7 +101,10 @@ class Demonstration final : public SessionSink, public std::enable_shared_from_t
   void answer(const Bytes&) override {}
   void refuse(const Error& why) override {
     log::error("demonstration ended", {{"author", author_.value}, {"reason", why.message}});
-    finish();
+    const std::lock_guard lock(mutex_);
+    why_ = why.message;
+    over_ = true;
+    wake_.notify_one();
   }
   void decided() override {}
   void end(const std::string&) override { finish(); }
@@ -154,8 +174,10 @@ class Demonstration final : public SessionSink, public std::enable_shared_from_t
         host_.offer_state(std::move(*state));
     }
     host_.leave(*this);
+    std::shared_ptr<OpenStream> watched;  // let go of without the lock, which its end takes
     const std::lock_guard lock(mutex_);
     over_ = true;
+    watched = std::move(watched_);
   }
 
   RoomHost& host_;
@@ -170,6 +192,8 @@ class Demonstration final : public SessionSink, public std::enable_shared_from_t
   std::deque<std::size_t> undecided_, again_;  // which of them
   Clock::time_point due_{};
   bool stopped_ = false, over_ = false;
+  std::string why_;
+  std::shared_ptr<OpenStream> watched_;        // shared with the gate while it ends this
   std::thread thread_;
 };
 
@@ -236,7 +260,7 @@ Result<void> add_tool(RoomHost& host, AuthorId by, const Tool& tool) {
 Demonstrations::Demonstrations() = default;
 Demonstrations::~Demonstrations() { end_all(); }
 
-Result<Shown> Demonstrations::begin(Rooms& rooms, OpenRoom& in, AuthorId by, const WhatToShow& what) {
+Result<Shown> Demonstrations::begin(Rooms& rooms, OpenRoom& in, AuthorId by, const Caller& caller, const WhatToShow& what) {
   if (!(what.speed > 0 && what.speed <= kMostSpeed))
     return failure(ErrorCode::invalid_input,
                    "the speed is not more than 0 and at most " + std::to_string(static_cast<int>(kMostSpeed)));
@@ -262,6 +286,8 @@ Result<Shown> Demonstrations::begin(Rooms& rooms, OpenRoom& in, AuthorId by, con
   if (!author) return tl::unexpected(author.error());
   const Shown shown{*author, recording->cuts.size()};
   const auto one = std::make_shared<Demonstration>(host, *author, std::move(recording->cuts), what.speed);
+  if (rooms.gate)
+    if (const Result<void> may = one->stand_under(*rooms.gate, caller, in.name); !may) return tl::unexpected(may.error());
   if (const Result<void> started = one->start(); !started) return tl::unexpected(started.error());
   going_on_.push_back(one);
   return shown;
@@ -270,8 +296,11 @@ Result<Shown> Demonstrations::begin(Rooms& rooms, OpenRoom& in, AuthorId by, con
 Result<void> Demonstrations::end(AuthorId demonstrator) {
   const std::lock_guard lock(mutex_);
   const auto one = std::ranges::find(going_on_, demonstrator, [](const auto& d) { return d->author(); });
-  if (one == going_on_.end() || (*one)->over())
-    return failure(ErrorCode::not_found, "author " + std::to_string(demonstrator.value) + " demonstrates nothing");
+  if (one == going_on_.end() || (*one)->over()) {
+    const std::string why = one == going_on_.end() ? std::string() : (*one)->why();
+    return failure(ErrorCode::not_found, "author " + std::to_string(demonstrator.value) + " demonstrates nothing" +
+                                             (why.empty() ? "" : ": " + why));
+  }
   (*one)->stop();
   going_on_.erase(one);
   return {};

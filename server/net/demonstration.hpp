@@ -12,6 +12,7 @@
 
 namespace osteon {
 
+struct Caller;
 class Demonstration;
 class OpenRoom;
 class Rooms;
@@ -41,9 +42,10 @@ class Demonstrations {
 
   // Reads the journal first, which takes a while. Cuts that were taken back by `to` are not shown. Errors:
   // invalid_input (the speed; another case; more than kMostCuts), not_found (no such room, no cut there), unavailable
-  // (that room is not kept, kMost go on), and those of reading.
-  [[nodiscard]] Result<Shown> begin(Rooms& rooms, OpenRoom& in, AuthorId by, const WhatToShow& what);
-  // Error not_found: no demonstration of that author goes on.
+  // (that room is not kept, kMost go on), denied (`caller` may not any more), and those of reading. It ends once the caller may
+  // not start one any more: who is revoked leaves nothing going on.
+  [[nodiscard]] Result<Shown> begin(Rooms& rooms, OpenRoom& in, AuthorId by, const Caller& caller, const WhatToShow& what);
+  // Error not_found: no demonstration of that author goes on; of one that was ended, why.
   [[nodiscard]] Result<void> end(AuthorId demonstrator);
   // For good.
   void end_all();

@@ -213,6 +213,7 @@ tl::expected<Caller, Refusal> Gate::judge(const CallClaims& call) {
   std::string room(call.room.empty() ? std::string_view(ticket->room) : call.room);
   if (room == kAnyRoom && only_room_) room = only_room_();
   if (std::optional<Refusal> refusal = judge_again(caller, room, call.method)) return tl::unexpected(std::move(*refusal));
+  caller.room = std::move(room);
   return caller;
 }
 
@@ -281,14 +282,19 @@ Result<void> Gate::joined(const Caller& caller, const std::string& room, int kin
   return {};
 }
 
+std::optional<Refusal> Gate::judge_author(const Caller& caller, const std::string& room, AuthorId author) const {
+  const auto known = authors_.find({room, author});
+  if (known == authors_.end() || std::get<1>(known->second.seat) != caller.user)
+    return Refusal{"author", true,
+                   "author " + std::to_string(author.value) + " is not yours in this room, or no more; join anew"};
+  if (known->second.role != caller.role) return Refusal{"role", true, changed_role(caller.role)};
+  return {};
+}
+
 Result<void> Gate::check_author(const Caller& caller, const std::string& room, AuthorId author) const {
   const std::lock_guard lock(mutex_);
-  const auto known = authors_.find({room, author});
-  if (known != authors_.end() && std::get<1>(known->second.seat) == caller.user) {
-    if (known->second.role == caller.role) return {};
-    return failure(ErrorCode::denied, changed_role(caller.role));
-  }
-  return failure(ErrorCode::denied, "author " + std::to_string(author.value) + " is not yours in this room, or no more; join anew");
+  if (const std::optional<Refusal> why = judge_author(caller, room, author)) return failure(ErrorCode::denied, why->sentence);
+  return {};
 }
 
 void Gate::forget_room(const std::string& room) {
@@ -297,11 +303,15 @@ void Gate::forget_room(const std::string& room) {
   std::erase_if(authors_, [&](const auto& author) { return author.first.first == room; });
 }
 
-std::shared_ptr<OpenStream> Gate::enter(const Caller& caller, const std::string& room, AuthorId author, std::string_view method, End end) {
+Gate::Entered Gate::enter(const Caller& caller, const std::string& room, AuthorId author, std::string_view method, End end) {
   auto stream = std::make_shared<Watched>(*this, caller, room, author, method, std::move(end));  // shared with look() while it ends it
   const std::lock_guard lock(mutex_);
+  std::optional<Refusal> refusal = judge_again(stream->caller, room, method);
+  if (!refusal && stream->caller.role != caller.role) refusal = Refusal{"role", true, changed_role(stream->caller.role)};
+  if (!refusal && author) refusal = judge_author(caller, room, author);
+  if (refusal) return tl::unexpected(std::move(*refusal));
   streams_.push_back(stream);
-  return stream;
+  return std::shared_ptr<OpenStream>(stream);
 }
 
 GateCounts Gate::counts() const {

@@ -41,6 +41,7 @@ struct Caller {
   Role role = Role::none;            // what holds now
   UnixTime ends{};                   // of the ticket
   UnixTime certificate_ends{};
+  std::string room{};                // that the call named or meant, where the role holds
 };
 
 // Why somebody was not.
@@ -107,11 +108,12 @@ class Gate {
   // A room that is closed: its identities mean nothing any more.
   void forget_room(const std::string& room);
 
-  // `end` is called once, on a thread of the gate's own, when the caller may have the stream no more; not after the result has
-  // been destroyed, except while that happens.
+  // Looks again who it is, and as whom (`author` null: as nobody), in one step with the beginning: whose right ends meanwhile
+  // is refused here or hears of it. `end` is called once, on a thread of the gate's own, when the caller may have the stream no
+  // more; not after the result has been destroyed, except while that happens.
   using End = std::function<void(const Refusal& why)>;
-  [[nodiscard]] std::shared_ptr<OpenStream> enter(const Caller& caller, const std::string& room, AuthorId author, std::string_view method,
-                                                  End end);
+  using Entered = tl::expected<std::shared_ptr<OpenStream>, Refusal>;
+  [[nodiscard]] Entered enter(const Caller& caller, const std::string& room, AuthorId author, std::string_view method, End end);
   [[nodiscard]] GateCounts counts() const;
   void look();  // at all streams, now
 
@@ -120,6 +122,7 @@ class Gate {
   Gate(std::filesystem::path folder, TicketCheckKey key, RefusalCounts& counts, Now now);
   // Under mutex_. What changes while somebody is in: revocations, ends and roles. Sets the role that holds.
   [[nodiscard]] std::optional<Refusal> judge_again(Caller& caller, const std::string& room, std::string_view method) const;
+  [[nodiscard]] std::optional<Refusal> judge_author(const Caller& caller, const std::string& room, AuthorId author) const;
   [[nodiscard]] Result<void> check_resume_locked(const Caller& caller, const std::string& room, int kind, AuthorId author) const;
   [[nodiscard]] Result<PersonCertificate> certificate_of(std::string_view pem);  // under mutex_, as the next two
   [[nodiscard]] Result<Ticket> ticket_of(std::string_view text);

@@ -70,12 +70,18 @@ class OutStream : public Reactor {
   }
 
   // From now on `gate` ends it when its caller may have it no more, or has come anew; null, over plain text: nothing does.
-  // Before the stream is given to gRPC, or in its reactions to reads.
-  void stand_under(Gate* gate, const Caller& caller, const std::string& room, AuthorId author, std::string_view method) {
-    if (gate == nullptr) return;
-    watched_ = gate->enter(caller, room, author, method, [this, weak = std::weak_ptr<void>(self_)](const Refusal& why) {
+  // Before the stream is given to gRPC, or in its reactions to reads. False: the caller, or `author` where it is not null, may
+  // not have it now, and it ends with the reason.
+  [[nodiscard]] bool stand_under(Gate* gate, const Caller& caller, const std::string& room, AuthorId author, std::string_view method) {
+    if (gate == nullptr) return true;
+    auto entered = gate->enter(caller, room, author, method, [this, weak = std::weak_ptr<void>(self_)](const Refusal& why) {
       if (const std::shared_ptr<void> keep = weak.lock()) close(status_of(why));
     });
+    if (entered)
+      watched_ = std::move(*entered);
+    else
+      close(status_of(entered.error()));
+    return entered.has_value();
   }
 
   void close(Status status) {

@@ -1,6 +1,7 @@
 // The people of a room: who is there, and what they decide about each other, draw, say and show.
 #include <grpcpp/grpcpp.h>
 
+#include <algorithm>
 #include <atomic>
 #include <memory>
 #include <mutex>
@@ -20,6 +21,11 @@ namespace {
 class PeopleStream final : public OutStream<WriteReactor>, public PeopleSink {
  public:
   PeopleStream(std::shared_ptr<OpenRoom> room, AuthorId author) : room_(std::move(room)), author_(author) {}
+  void begin() {
+    begun_ = true;
+    room_->host().people().came(author_);
+    room_->host().people().watch(*this);
+  }
 
   void changed() override {
     const std::lock_guard lock(mutex_);
@@ -41,12 +47,14 @@ class PeopleStream final : public OutStream<WriteReactor>, public PeopleSink {
     return news != nullptr;
   }
   void leave() override {
+    if (!begun_) return;
     room_->host().people().leave(*this);
     room_->host().people().went(author_);
   }
 
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
   const AuthorId author_;
+  bool begun_ = false;
   PeopleCursor cursor_;
 };
 
@@ -69,9 +77,7 @@ class PeopleServiceImpl final : public PeopleBase {
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused(status_of(caller.error()));
     PeopleStream* stream = PeopleStream::launch(std::make_shared<PeopleStream>(*room, author), context);
-    stream->stand_under(rooms_.gate, *caller, (*room)->name, author, "/osteon.v1.PeopleService/WatchPeople");
-    (*room)->host().people().came(author);
-    (*room)->host().people().watch(*stream);
+    if (stream->stand_under(rooms_.gate, *caller, (*room)->name, author, "/osteon.v1.PeopleService/WatchPeople")) stream->begin();
     return stream;
   }
 
@@ -89,24 +95,36 @@ class PeopleServiceImpl final : public PeopleBase {
       std::erase(subjects, by);
       if (subjects.empty()) return refuse(reactor, {StatusCode::NOT_FOUND, "nobody else has a hand in this room"});
     }
-    // One event each, in one tick; answered with the last.
+    // One event each, in one tick; answered with the last. Of all together, none for whom it changes nothing: most of those who
+    // ever had a hand here are away for good.
     // A room that closes meanwhile answers the rest on this thread.
     struct Answer {
       std::mutex mutex;
       std::size_t left = 0;
+      RoomSeq place;  // of the newest event by which it holds, also of earlier ones
       std::optional<Error> failed;
     };
     const auto answer = std::make_shared<Answer>();  // by the events that are queued
     answer->left = subjects.size();
+    const bool all = request->subject() == 0;
     for (const AuthorId subject : subjects)
-      room->host().queue_event([by, subject, word = *word](Room& r) { return r.supervise(by, subject, word); },
-                               [answer, reactor, response](const Result<RoomEvent>& decided) {
+      room->host().queue_event([by, subject, word = *word, all, answer](Room& r) -> Result<RoomEvent> {
+                                 const People::Supervised& now = r.people().supervised(subject);
+                                 const bool holds = all && now.supervision == word && r.people().oversees(by);
+                                 if (!holds) return r.supervise(by, subject, word);
+                                 const std::lock_guard lock(answer->mutex);
+                                 answer->place = std::max(answer->place, now.place);
+                                 return RoomEvent{};
+                               },
+                               [answer, room, reactor, response](const Result<RoomEvent>& decided) {
                                  std::unique_lock lock(answer->mutex);
                                  if (decided)
-                                   response->set_room_seq(decided->room_seq.value);
+                                   answer->place = std::max(answer->place, decided->room_seq);
                                  else if (!answer->failed)
                                    answer->failed = decided.error();
                                  if (--answer->left > 0) return;
+                                 // Of those for whom nothing was ever decided it holds from the beginning.
+                                 response->set_room_seq(answer->place ? answer->place.value : room->host().room_seq().value);
                                  lock.unlock();
                                  reactor->Finish(answer->failed ? status_of(*answer->failed) : Status::OK);
                                });
@@ -162,8 +180,8 @@ class PeopleServiceImpl final : public PeopleBase {
       if (const Result<Caller> there = caller_in(rooms_, *context, request->room(), "/osteon.v1.PeopleService/Demonstrate"); !there)
         return refuse(reactor, status_of(there.error()));
     // A journal is read, which takes a while.
-    rooms_.files.run([this, room, reactor, request, response] {
-      const Result<Shown> shown = room->demonstrations().begin(rooms_, *room, AuthorId{request->author()},
+    rooms_.files.run([this, room, reactor, request, response, caller = *caller] {
+      const Result<Shown> shown = room->demonstrations().begin(rooms_, *room, AuthorId{request->author()}, caller,
                                                                {.room = request->room(),
                                                                 .of = AuthorId{request->of_author()},
                                                                 .from = RoomSeq{request->from_room_seq()},

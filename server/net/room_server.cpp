@@ -43,8 +43,6 @@ constexpr int kShortestPingMs = 500;               // clients may ask that often
 constexpr int kMostStreams = 64;                   // of one connection
 constexpr int kMostMetadataBytes = 8 * 1024;       // of one call; a ticket is below 1 kB
 constexpr int kHandshakeMs = 5'000;                // for those who have not shown who they are
-constexpr int kOldConnectionMs = 60 * 60 * 1000;   // then calls go over a new one, with a new handshake; streams go on
-constexpr int kLongestSessionMs = 12 * kOldConnectionMs;
 constexpr std::size_t kMostTransportBytes = std::size_t{512} << 20;  // of all connections, in gRPC
 constexpr const char* kStopping = "the server is stopping; come again in a few seconds";
 constexpr std::chrono::milliseconds kComeAgainAfter{1000}, kDrainLook{20};
@@ -134,8 +132,8 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMostStreams);
   builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, kMostMetadataBytes);
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMs);
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_MS, kOldConnectionMs);
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_GRACE_MS, kLongestSessionMs);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_MS, static_cast<int>(doors.connection_age.count()));
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_GRACE_MS, static_cast<int>(doors.longest_session.count()));
   grpc::ResourceQuota quota("osteon");
   quota.Resize(kMostTransportBytes);
   builder.SetResourceQuota(quota);

@@ -20,6 +20,9 @@ namespace osteon {
 struct DoorOptions {
   std::filesystem::path certificates{};  // as Gate::open has them; empty: plain text, on this machine alone
   std::size_t most_connections = 512;    // further ones are closed at once
+  // After which calls go over a new connection, with a new handshake and the authority's certificates as they are then. Streams go
+  // on over the old one for `longest_session` more; then it is closed, and sessions come again by themselves.
+  std::chrono::milliseconds connection_age = std::chrono::hours(1), longest_session = std::chrono::hours(12);
 };
 
 struct DoorHealth {

@@ -93,10 +93,10 @@ class RowsAgain {
 
 }  // namespace
 
-OpenRoom::OpenRoom(std::string n, ServedCase served, Room room, const RoomsOptions& options,
+OpenRoom::OpenRoom(std::string n, LoadedCase loaded, Room room, const RoomsOptions& options,
                    const std::function<void(double)>& progress, std::unique_ptr<RoomKeeper> keeper, std::optional<Playback> playback)
     : name(std::move(n)),
-      case_folder(std::move(served.folder)),
+      of(std::move(loaded)),
       server_epoch(keeper ? keeper->server_epoch() : new_server_epoch()),
       keeper_(std::move(keeper)) {
   // What took long to make again should not take so long the next time.
@@ -165,9 +165,9 @@ void OpenRoom::keep_up(const std::function<bool()>& stop) {
     log::warn("no checkpoint", {{"room", name}, {"reason", kept.error().message}});
 }
 
-Rooms::Rooms(RoomsOptions options) : options_(std::move(options)) {
+Rooms::Rooms(RoomsOptions options) : options_(std::move(options)), cases_(options_.case_memory_bytes) {
   OSTEON_CHECK(!options_.cases.empty());
-  cases_.assign(options_.cases.begin(), options_.cases.end());
+  for (const ServedCase& served : options_.cases) cases_.keep(served);
   jobs.start();
   files.start();
   upkeep_ = std::thread([this] { run_upkeep(); });
@@ -233,26 +233,6 @@ std::vector<std::shared_ptr<OpenRoom>> Rooms::open_rooms() const {
   return rooms;
 }
 
-const ServedCase* Rooms::find_case(const Digest& hash) const {
-  const std::lock_guard lock(cases_mutex_);
-  const auto found = std::ranges::find_if(cases_, [&](const ServedCase& one) { return one.bone.hash() == hash; });
-  return found == cases_.end() ? nullptr : &*found;
-}
-
-std::vector<const ServedCase*> Rooms::cases() const {
-  const std::lock_guard lock(cases_mutex_);
-  std::vector<const ServedCase*> all;
-  for (const ServedCase& one : cases_) all.push_back(&one);
-  std::ranges::sort(all, {}, [](const ServedCase* one) { return one->bone.hash(); });
-  return all;
-}
-
-void Rooms::add_case(ServedCase served) {
-  const std::lock_guard lock(cases_mutex_);
-  const bool known = std::ranges::any_of(cases_, [&](const ServedCase& one) { return one.bone.hash() == served.bone.hash(); });
-  if (!known) cases_.push_back(std::move(served));
-}
-
 fs::path Rooms::journal_of(const std::string& name) const { return options_.folder / (name + kEnding); }
 
 Result<fs::path> Rooms::kept_file(const std::string& name) const {
@@ -277,7 +257,7 @@ std::vector<RoomListing> Rooms::list() const {
     listing.case_hash = genesis.case_hash;
     listing.parent = genesis.parent;
     listing.parent_room_seq = genesis.parent_room_seq;
-    if (const ServedCase* served = find_case(genesis.case_hash)) listing.case_title = served->bone.info().title;
+    if (const std::optional<KnownCase> known = find_case(genesis.case_hash)) listing.case_title = known->title;
   };
   for (const std::shared_ptr<OpenRoom>& room : open_rooms()) {
     RoomListing& listing = all[room->name];
@@ -367,9 +347,9 @@ Result<std::shared_ptr<OpenRoom>> Rooms::add(const std::string& name, Room room,
                                              const std::function<void(double)>& progress) {
   const std::lock_guard changing(changing_);
   if (Result<void> may = check_free(name); !may) return tl::unexpected(may.error());
-  const ServedCase* served = find_case(room.bone().hash());
-  OSTEON_CHECK(served);
-  auto made = std::make_shared<OpenRoom>(name, *served, std::move(room), options_, progress, std::move(keeper));
+  const Result<LoadedCase> of = cases_.load(room.bone().hash());
+  if (!of) return tl::unexpected(of.error());
+  auto made = std::make_shared<OpenRoom>(name, *of, std::move(room), options_, progress, std::move(keeper));
   made->save = std::move(save);
   return take_in(std::move(made));
 }
@@ -394,10 +374,10 @@ Result<std::shared_ptr<OpenRoom>> Rooms::create(const std::string& name, const D
   if (Result<void> may = check_new(name); !may) return tl::unexpected(may.error());
   if (!case_hash && cases().size() > 1)
     return failure(ErrorCode::invalid_input, "the server has several cases; say which with --case-hash");
-  const ServedCase* served = case_hash ? find_case(*case_hash) : cases().front();
-  if (!served) return failure(ErrorCode::not_found, "the server has no case " + to_hex(*case_hash));
-  if (!options_.folder.empty()) return open(name, *served, true, {});
-  return take_in(std::make_shared<OpenRoom>(name, *served, Room(served->bone, options_.limits, options_.tools()), options_,
+  const Result<LoadedCase> of = cases_.load(case_hash ? *case_hash : cases().front().hash);
+  if (!of) return tl::unexpected(of.error());
+  if (!options_.folder.empty()) return open(name, *of, true, {});
+  return take_in(std::make_shared<OpenRoom>(name, *of, Room(*of->bone, options_.limits, options_.tools()), options_,
                                             std::function<void(double)>{}, nullptr));
 }
 
@@ -408,15 +388,16 @@ Result<std::shared_ptr<OpenRoom>> Rooms::resume(const std::string& name, const s
   if (!file) return tl::unexpected(file.error());
   const Result<RoomGenesis> genesis = peek_genesis(*file);
   if (!genesis) return tl::unexpected(genesis.error());
-  const ServedCase* served = find_case(genesis->case_hash);
-  if (!served)
+  if (!find_case(genesis->case_hash))
     return failure(ErrorCode::unsupported, "the room " + name + " is of the case " + to_hex(genesis->case_hash) +
                                                ", which the server was not given with --case");
-  return open(name, *served, false, progress);
+  const Result<LoadedCase> of = cases_.load(genesis->case_hash);
+  if (!of) return tl::unexpected(of.error());
+  return open(name, *of, false, progress);
 }
 
 // [with changing_]
-Result<std::shared_ptr<OpenRoom>> Rooms::open(const std::string& name, const ServedCase& served, bool is_new,
+Result<std::shared_ptr<OpenRoom>> Rooms::open(const std::string& name, const LoadedCase& of, bool is_new,
                                               const std::function<void(double)>& progress) {
   RoomKeeper::Options keeping{.name = name, .limits = options_.limits, .tools = {}, .journal = {}, .today = {}};
   keeping.retention_days = options_.retention_days;
@@ -427,9 +408,9 @@ Result<std::shared_ptr<OpenRoom>> Rooms::open(const std::string& name, const Ser
       if (progress) progress(begin + fraction / 2);
     };
   };
-  Result<KeptRoom> kept = RoomKeeper::open(journal_of(name), served.bone, keeping, half(0));
+  Result<KeptRoom> kept = RoomKeeper::open(journal_of(name), *of.bone, keeping, half(0));
   if (!kept) return tl::unexpected(kept.error());
-  return take_in(std::make_shared<OpenRoom>(name, served, std::move(kept->room), options_, half(0.5), std::move(kept->keeper)));
+  return take_in(std::make_shared<OpenRoom>(name, of, std::move(kept->room), options_, half(0.5), std::move(kept->keeper)));
 }
 
 Result<RoomSummary> Rooms::close(const std::string& name) {
@@ -477,9 +458,8 @@ Result<std::shared_ptr<OpenRoom>> Rooms::replay(const std::string& name, const s
   if (last > head || from > last)
     return failure(ErrorCode::invalid_input, "events " + std::to_string(from.value) + " to " + std::to_string(last.value) +
                                                  " are not among the " + std::to_string(head.value) + " of room " + name);
-  const ServedCase* served = find_case(keeper->genesis().case_hash);
-  OSTEON_CHECK(served);
-  Result<Room> room = begin_room(served->bone, keeper->genesis(), options_.limits);
+  const LoadedCase& of = (*source)->of;
+  Result<Room> room = begin_room(*of.bone, keeper->genesis(), options_.limits);
   if (!room) return tl::unexpected(room.error());
   Result<void> happened;
   const Result<void> read = !from ? Result<void>{} : keeper->read(RoomSeq{1}, from, [&](const RoomRow& row) {
@@ -490,7 +470,7 @@ Result<std::shared_ptr<OpenRoom>> Rooms::replay(const std::string& name, const s
   if (!read) return tl::unexpected(read.error());
   (void)room->take_changes();
   Playback playback{RowsAgain(*source, RoomSeq{from.value + 1}, last), speed};
-  auto shown = std::make_shared<OpenRoom>(new_name, *served, std::move(*room), options_, std::function<void(double)>{}, nullptr,
+  auto shown = std::make_shared<OpenRoom>(new_name, of, std::move(*room), options_, std::function<void(double)>{}, nullptr,
                                           std::move(playback));
   shown->shows = {name, last};
   return take_in(std::move(shown));

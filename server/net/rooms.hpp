@@ -4,7 +4,6 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -19,8 +18,8 @@
 
 #include "common/core/result.hpp"
 #include "common/tools/tool_box.hpp"
-#include "common/volume/case.hpp"
 #include "server/intake/case_store.hpp"
+#include "server/net/case_shelf.hpp"
 #include "server/net/demonstration.hpp"
 #include "server/net/job_thread.hpp"
 #include "server/net/refusals.hpp"
@@ -43,15 +42,10 @@ struct RoomSummary {
   Digest surface_hash;         // equal to every viewer's that has shown room_seq
 };
 
-struct ServedCase {
-  Case bone;
-  std::filesystem::path folder;  // that clients are sent
-};
-
 inline constexpr int kMostRooms = 256;  // unless somebody says otherwise
 
 struct RoomsOptions {
-  std::vector<ServedCase> cases;      // at least one
+  std::vector<ServedCase> cases;      // at least one; in memory as long as the rooms are
   std::filesystem::path folder{};     // of the journals NAME.journal; empty: rooms made here end with the process
   CutLimits limits{};
   std::function<std::shared_ptr<ToolBox>()> tools = builtin_tool_box;  // that a new room begins with: a box of its own
@@ -59,17 +53,18 @@ struct RoomsOptions {
   Detail detail = Detail::automatic;
   int retention_days = 0;             // after which it is forgotten who somebody was; 0: never
   std::shared_ptr<CaseStore> store{};  // where uploaded cases are kept, shared with uploads under way; null: none are taken
+  std::uint64_t case_memory_bytes = kMostCaseMemory;  // of all cases that rooms have
   int most_rooms = kMostRooms;        // open and closed ones together; none is made beyond
 };
 
 // A room that is open. Streams and calls hold it, so that it is there until the last of them is over.
 class OpenRoom {
  public:
-  OpenRoom(std::string name, ServedCase served, Room room, const RoomsOptions& options,
+  OpenRoom(std::string name, LoadedCase of, Room room, const RoomsOptions& options,
            const std::function<void(double)>& progress, std::unique_ptr<RoomKeeper> keeper, std::optional<Playback> playback = {});
 
   const std::string name;
-  const std::filesystem::path case_folder;
+  const LoadedCase of;                // in memory for as long as this is
   std::filesystem::path save;         // where the cut fields are written on request; empty: nowhere
   const std::uint64_t server_epoch;   // rises with every opening
   std::optional<std::pair<std::string, RoomSeq>> shows;  // of a playback: which room, up to where
@@ -125,11 +120,11 @@ class Rooms {
   // The open room of that name; without a name the only one that is open. The error says which there are.
   [[nodiscard]] Result<std::shared_ptr<OpenRoom>> find(const std::string& name) const;
   [[nodiscard]] std::vector<std::shared_ptr<OpenRoom>> open_rooms() const;  // in the order of their names
-  // There as long as this is.
-  [[nodiscard]] const ServedCase* find_case(const Digest& hash) const;
-  [[nodiscard]] std::vector<const ServedCase*> cases() const;
-  void add_case(ServedCase served);  // one that is known stays as it is
-  [[nodiscard]] CaseStore* store() const { return options_.store.get(); }
+  [[nodiscard]] std::optional<KnownCase> find_case(const Digest& hash) const { return cases_.find(hash); }
+  [[nodiscard]] std::vector<KnownCase> cases() const { return cases_.all(); }
+  void add_case(KnownCase known) { cases_.add(std::move(known)); }
+  [[nodiscard]] std::uint64_t case_bytes() const { return cases_.loaded_bytes(); }  // that cases take in memory
+  [[nodiscard]] const std::shared_ptr<CaseStore>& store() const { return options_.store; }
   [[nodiscard]] std::vector<RoomListing> list() const;
 
   // A room that was made elsewhere, with its keeper. `save`: see OpenRoom. `progress` hears how far its first surface is.
@@ -177,7 +172,7 @@ class Rooms {
   [[nodiscard]] Result<void> check_free(const std::string& name) const;
   [[nodiscard]] std::size_t count() const;  // of open and of kept ones
   [[nodiscard]] Result<std::filesystem::path> kept_file(const std::string& name) const;
-  Result<std::shared_ptr<OpenRoom>> open(const std::string& name, const ServedCase& served, bool is_new,
+  Result<std::shared_ptr<OpenRoom>> open(const std::string& name, const LoadedCase& of, bool is_new,
                                          const std::function<void(double)>& progress);
   std::shared_ptr<OpenRoom> take_in(std::shared_ptr<OpenRoom> room);
   [[nodiscard]] std::shared_ptr<OpenRoom> take_out(const std::string& name);
@@ -186,8 +181,7 @@ class Rooms {
   [[nodiscard]] UpkeepCalls until_the_end() const;
 
   const RoomsOptions options_;
-  mutable std::mutex cases_mutex_;  // never held with another that is taken within
-  std::deque<ServedCase> cases_;    // none goes, so that none moves
+  CaseShelf cases_;
   mutable std::mutex changing_;  // held by whatever changes the rooms; taken before mutex_, never within it
   mutable std::mutex mutex_;
   std::map<std::string, std::shared_ptr<OpenRoom>> open_;

@@ -209,7 +209,7 @@ class RoomServiceImpl final : public RoomBase {
     if (!request) return refused(invalid("the GetCaseRequest could not be parsed"));
     const Result<Digest> hash = wire::digest_from_wire(request->case_hash());
     if (!hash) return refused(invalid("case_hash is not a digest of 32 bytes"));
-    const ServedCase* served = rooms_.find_case(*hash);
+    const std::optional<KnownCase> served = rooms_.find_case(*hash);
     if (!served) return refused({StatusCode::NOT_FOUND, "this server has no case " + to_hex(*hash)});
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused(status_of(caller.error()));
@@ -223,8 +223,7 @@ class RoomServiceImpl final : public RoomBase {
       of_room = (*room)->name;
     }
     CaseStream* stream = CaseStream::launch(std::make_shared<CaseStream>(rooms_.files, served->folder), context);
-    stream->stand_under(rooms_.gate, *caller, of_room, {}, "/osteon.v1.RoomService/GetCase");
-    stream->start();
+    if (stream->stand_under(rooms_.gate, *caller, of_room, {}, "/osteon.v1.RoomService/GetCase")) stream->start();
     return stream;
   }
 

@@ -32,8 +32,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   SessionStream(std::shared_ptr<OpenRoom> room, LinkServer* links, Gate* gate, Caller caller)
       : room_(std::move(room)), host_(room_->host()), links_(links), gate_(gate), caller_(std::move(caller)) {}
   void start() {
-    stand_under(gate_, caller_, room_->name, {}, kMethod);
-    StartRead(&request_);
+    if (stand_under(gate_, caller_, room_->name, {}, kMethod)) StartRead(&request_);
   }
 
   AuthorId author() const override { return author_; }
@@ -159,9 +158,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
  private:
   void open(const v1::SessionOpen& request) {
     if (opened_) return close(invalid("open was sent before"));
-    if (gate_ != nullptr)
-      if (const Result<void> own = gate_->check_author(caller_, room_->name, AuthorId{request.author()}); !own)
-        return close(status_of(own.error()));
+    if (!stand_under(gate_, caller_, room_->name, AuthorId{request.author()}, kMethod)) return;
     if (request.server_epoch() != room_->server_epoch)
       // It joined a server that was killed meanwhile: this one knows it, if it joins again.
       return close({StatusCode::UNAVAILABLE, "open.server_epoch is " + std::to_string(request.server_epoch()) + " and the server's " +
@@ -169,7 +166,6 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     opened_ = true;
     author_ = AuthorId{request.author()};
     version_ = room_->version_of(author_);
-    stand_under(gate_, caller_, room_->name, author_, kMethod);
     const Digest secret = digest_of_secret(request.secret());
     // Reading goes on after the leaves were taken, so that no cut of this author is among them.
     host_.run_slowly([this, keep = self(), secret] {

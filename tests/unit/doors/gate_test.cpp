@@ -275,14 +275,14 @@ TEST_F(GateTest, EndsStreamsOfWhoMayHaveThemNoMore) {
   const auto second = gate_->enter(ben, "ward", AuthorId{2}, kWatch, into(1));
   auto gone = gate_->enter(anna, "ward", AuthorId{1}, kWatch, into(2));
   EXPECT_EQ(gate_->counts().streams, 3u);
-  gone.reset();
+  gone->reset();
   EXPECT_EQ(gate_->counts().streams, 2u);
-  EXPECT_EQ(first->role(), Role::trainee);
+  EXPECT_EQ((*first)->role(), Role::trainee);
   // Nobody asks: the gate looks by itself.
   people_->append_access("role anna observer");
   ASSERT_TRUE(test::wait_until([&] { return calls == 1; }, 5s));
   EXPECT_THAT(ended[0]->sentence, HasSubstr("your role has changed to observer"));
-  EXPECT_EQ(first->role(), Role::none);
+  EXPECT_EQ((*first)->role(), Role::none);
   EXPECT_FALSE(ended[1]);
   now_ += 3600;
   ASSERT_TRUE(test::wait_until([&] { return calls == 2; }, 5s));

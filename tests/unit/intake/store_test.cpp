@@ -60,6 +60,13 @@ TEST_F(StoreTest, ACaseIsKeptUnderItsHashAndIsTheSameCase) {
   const auto again = Case::load(stored->folder);
   ASSERT_TRUE(again) << again.error().message;
   EXPECT_EQ(again->hash(), bone_.hash());
+  // What it takes in memory is known before it is read again.
+  EXPECT_EQ(stored->memory_bytes, bone_.memory_bytes());
+  const auto peeked = CaseStore::peek(stored->folder);
+  ASSERT_TRUE(peeked) << peeked.error().message;
+  EXPECT_EQ(peeked->hash, bone_.hash());
+  EXPECT_EQ(peeked->title, bone_.info().title);
+  EXPECT_EQ(peeked->memory_bytes, bone_.memory_bytes());
   EXPECT_EQ(left_over(), 0U);
 
   const auto twice = keep(*store_, content_of(temp_ / "case.zip"));

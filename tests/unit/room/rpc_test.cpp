@@ -1,6 +1,7 @@
 // What members ask of a served room beside cutting, with real clients.
 #include <filesystem>
 
+#include "osteon/v1/people.grpc.pb.h"
 #include "tests/unit/room/served_room.hpp"
 
 namespace osteon {
@@ -46,6 +47,38 @@ Tool own_tool() {
   tool.name = "burr-of-this-room";
   tool.diameter_mm = tool.cutting_length_mm = 4.0;
   return tool;
+}
+
+// Stops, or frees, all of them, at the place that is answered.
+TEST_F(RoomRpc, AWordAboutAllIsARowForThoseAloneWhomItChanges) {
+  auto away = surgeon();
+  const auto here = surgeon();
+  const auto viewer = join(address(), wire::ClientKind::viewer);
+  ASSERT_TRUE(wait_until([&] { return away->complete() && here->complete(); }, kPatience));
+  const AuthorId absent = away->author();
+  away.reset();
+  const auto tell = [&](std::uint64_t subject, bool stopped) {
+    v1::SuperviseRequest request;
+    request.set_author(viewer.author.value);
+    request.set_subject(subject);
+    request.mutable_supervision()->set_stopped(stopped);
+    v1::SuperviseResponse response;
+    grpc::ClientContext context;
+    const grpc::Status status = v1::PeopleService::NewStub(viewer.channel)->Supervise(&context, request, &response);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return response.room_seq();
+  };
+  const auto head = [&] { return host().room_seq().value; };
+  const std::uint64_t before = head();
+  EXPECT_EQ(tell(0, false), before) << "nobody was ever stopped";
+  EXPECT_EQ(head(), before);
+  EXPECT_EQ(tell(0, true), before + 2) << "also who is away";
+  EXPECT_EQ(tell(0, true), before + 2);
+  EXPECT_EQ(head(), before + 2) << "and once";
+  EXPECT_EQ(tell(absent.value, false), before + 3);
+  EXPECT_EQ(tell(0, true), before + 4);
+  EXPECT_EQ(head(), before + 4) << "the one who was freed alone";
+  EXPECT_EQ(tell(here->author().value, true), before + 5) << "a word about one is a row";
 }
 
 TEST_F(RoomRpc, AnUndoByAnotherReachesEveryReplicaAndViewer) {

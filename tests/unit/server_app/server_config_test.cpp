@@ -50,6 +50,7 @@ certificates: certs
 plain: true
 most_connections: 40
 most_rooms: 12
+case_memory_mib: 2000
 mount: true
 metrics: 9464
 drain_seconds: 7
@@ -81,6 +82,7 @@ limits:
   EXPECT_TRUE(c.plain);
   EXPECT_EQ(c.most_connections, 40);
   EXPECT_EQ(c.most_rooms, 12);
+  EXPECT_EQ(c.case_memory_mib, 2000);
   EXPECT_TRUE(c.mount);
   EXPECT_EQ(c.metrics, "9464");
   EXPECT_EQ(c.drain_seconds, 7);
@@ -97,6 +99,7 @@ limits:
 // One wrong value for every field that there is, and a word of the remedy.
 const std::multimap<std::string, std::pair<std::string, std::string>> kWrong{
     {"address_file", {"[a, b]", "write a path"}},
+    {"case_memory_mib", {"0", "from 1 to 1048576"}},
     {"cases", {"{}", "list of paths"}},
     {"cases", {"[]", "list of paths"}},
     {"certificates", {"[x]", "write a path"}},

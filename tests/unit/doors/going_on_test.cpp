@@ -1,0 +1,283 @@
+// What somebody has started ends with their right to it: demonstrations and uploads. And what goes on over the age of a
+// connection.
+#include <gmock/gmock.h>
+#include <grpcpp/grpcpp.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "osteon/v1/cases.grpc.pb.h"
+#include "osteon/v1/people.grpc.pb.h"
+#include "server/net/room_server.hpp"
+#include "tests/support/doors/people.hpp"
+#include "tests/support/wait.hpp"
+#include "tests/unit/room/cuts.hpp"
+#include "tests/unit/room/members.hpp"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+using grpc::StatusCode;
+using testing::HasSubstr;
+namespace fs = std::filesystem;
+
+std::string content(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+class GoingOn : public ::testing::Test {
+ protected:
+  void start(DoorOptions doors = {}, IntakeQuota quota = {}, const fs::path& checker = "/bin/false") {
+    const Case bone = test::test_block();
+    ASSERT_TRUE(bone.save(dir_ / "case"));
+    auto store = CaseStore::open(dir_ / "cases", checker, quota);
+    ASSERT_TRUE(store.has_value()) << store.error().message;
+    store_ = std::move(*store);
+    RoomsOptions options{.cases = {{bone, dir_ / "case"}}, .folder = dir_ / "rooms", .store = store_};
+    auto rooms = std::make_unique<Rooms>(std::move(options));
+    fs::create_directories(dir_ / "rooms");
+    ASSERT_TRUE(rooms->create("ward", nullptr));
+    doors.certificates = people_.server();
+    auto started = RoomServer::start(std::move(rooms), "127.0.0.1:0", doors);
+    ASSERT_TRUE(started.has_value()) << started.error().message;
+    server_ = std::move(*started);
+  }
+  RoomHost& host() { return (*server_->rooms().find("ward"))->host(); }
+  wire::JoinedRoom join(const wire::Door& door) {
+    auto joined = wire::join_room(server_->address(), wire::ClientKind::viewer, "whatever", 5s, {}, "ward", door);
+    EXPECT_TRUE(joined.has_value()) << joined.error().message;
+    return joined.value();
+  }
+  std::unique_ptr<test::Surgeon> surgeon(const std::string& name) {
+    const wire::Door door = people_.door(name, Role::trainee, "ward");
+    auto one = std::make_unique<test::Surgeon>(server_->address(), dir_ / "cache", "", "ward", door);
+    EXPECT_TRUE(test::wait_until([&] { return one->complete(); }, test::kPatience));
+    return one;
+  }
+  // Its next strokes, which arrive.
+  void cut(test::Surgeon& by, int count) {
+    const std::uint64_t before = by.own();
+    std::vector<Cut> cuts = test::strokes(by.author(), static_cast<int>(before) + count, 7);
+    for (std::size_t i = before; i < cuts.size(); ++i) {
+      ASSERT_TRUE(test::wait_until([&] { return by.stands(); }, test::kPatience));
+      cuts[i].lease_epoch = by.lease();
+      ASSERT_TRUE(test::wait_until([&] { return by.session().send(cuts[i]); }, test::kPatience));
+    }
+    const std::uint64_t after = before + static_cast<std::uint64_t>(count);
+    ASSERT_TRUE(test::wait_until([&] { return by.own() == after; }, test::kPatience)) << by.rejected();
+  }
+
+  test::TempDir dir_;
+  test::People people_;
+  std::shared_ptr<CaseStore> store_;
+  std::unique_ptr<RoomServer> server_;
+};
+
+TEST_F(GoingOn, ADemonstrationEndsWithTheRightOfWhoStartedIt) {
+  start();
+  const auto sue = surgeon("sue");
+  for (int i = 0; i < 10; ++i) cut(*sue, 1);  // each in a tick of its own
+  const auto show = [&](const wire::JoinedRoom& by) {
+    v1::DemonstrateRequest request;
+    request.set_author(by.author.value);
+    request.set_of_author(sue->author().value);
+    request.set_speed(0.001);  // far longer than this test
+    v1::DemonstrateResponse response;
+    grpc::ClientContext context;
+    const grpc::Status status = v1::PeopleService::NewStub(by.channel)->Demonstrate(&context, request, &response);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return response.demonstrator();
+  };
+  const auto end = [&](const wire::JoinedRoom& by, std::uint64_t which) {
+    v1::EndDemonstrationRequest request;
+    request.set_author(by.author.value);
+    request.set_demonstrator(which);
+    v1::EndDemonstrationResponse response;
+    grpc::ClientContext context;
+    return v1::PeopleService::NewStub(by.channel)->EndDemonstration(&context, request, &response);
+  };
+  const auto ina = join(people_.door("ina", Role::instructor, "ward")), ira = join(people_.door("ira", Role::instructor, "ward")),
+             ida = join(people_.door("ida", Role::instructor, "ward"));
+  const std::uint64_t of_ina = show(ina), of_ira = show(ira), of_ida = show(ida);
+  const auto sessions = [&] { return host().health().sessions; };
+  ASSERT_EQ(sessions(), 4u);
+  people_.append_access("role ina trainee ward");
+  EXPECT_TRUE(test::wait_until([&] { return sessions() == 3; }, test::kPatience));
+  people_.certs({"revoke", "ira"});
+  EXPECT_TRUE(test::wait_until([&] { return sessions() == 2; }, test::kPatience));
+  EXPECT_THAT(end(ida, of_ina).error_message(), HasSubstr("may not call PeopleService/Demonstrate"));
+  const grpc::Status revoked = end(ida, of_ira);
+  EXPECT_EQ(revoked.error_code(), StatusCode::NOT_FOUND);
+  EXPECT_THAT(revoked.error_message(), HasSubstr("revoked"));
+  // Nobody else's: it goes on until it is ended.
+  EXPECT_EQ(sessions(), 2u);
+  EXPECT_TRUE(end(ida, of_ida).ok());
+  cut(*sue, 1);
+}
+
+// A newer window of the same person takes the place of the older one, and leaves what that one has started.
+TEST_F(GoingOn, ADemonstrationGoesOnWhenItsStarterComesAnew) {
+  start();
+  const auto sue = surgeon("sue");
+  for (int i = 0; i < 10; ++i) cut(*sue, 1);
+  const wire::Door door = people_.door("ina", Role::instructor, "ward");
+  const auto before = join(door);
+  v1::DemonstrateRequest request;
+  request.set_author(before.author.value);
+  request.set_speed(0.001);
+  v1::DemonstrateResponse response;
+  grpc::ClientContext context;
+  ASSERT_TRUE(v1::PeopleService::NewStub(before.channel)->Demonstrate(&context, request, &response).ok());
+  const auto after = join(door);
+  EXPECT_NE(after.author, before.author);
+  server_->rooms().gate->look();
+  v1::EndDemonstrationRequest ending;
+  ending.set_author(after.author.value);
+  ending.set_demonstrator(response.demonstrator());
+  v1::EndDemonstrationResponse ended;
+  grpc::ClientContext again;
+  const grpc::Status status = v1::PeopleService::NewStub(after.channel)->EndDemonstration(&again, ending, &ended);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+}
+
+// An upload as some client makes it, piece by piece.
+struct Sending {
+  Sending(const std::string& address, const wire::Door& door) {
+    context.AddMetadata("osteon-ticket", wire::ticket_text(door));
+    const auto channel = grpc::CreateChannel(address, wire::credentials_of(door, address).value());
+    writer = v1::CaseService::NewStub(channel)->UploadCase(&context, &response);
+  }
+  bool send() {
+    v1::UploadCaseRequest piece;
+    piece.set_data(std::string(1000, 'x'));
+    return writer->Write(piece);
+  }
+  // Goes on until nobody takes it any more.
+  grpc::Status send_until_the_end() {
+    EXPECT_TRUE(test::wait_until([&] { return !send(); }, test::kPatience));
+    return writer->Finish();
+  }
+  grpc::ClientContext context;
+  v1::UploadCaseResponse response;
+  std::unique_ptr<grpc::ClientWriter<v1::UploadCaseRequest>> writer;
+};
+
+class Uploads : public GoingOn {
+ protected:
+  [[nodiscard]] bool nothing_is_left() const {
+    return test::wait_until([&] { return fs::is_empty(dir_ / "cases"); }, test::kPatience);
+  }
+};
+
+TEST_F(Uploads, EndWithTheRightOfWhoSendsThem) {
+  start();
+  const wire::Door otto = people_.door("otto", Role::operator_, "*");
+  Sending sending(server_->address(), otto);
+  ASSERT_TRUE(sending.send());
+  ASSERT_TRUE(test::wait_until([&] { return !fs::is_empty(dir_ / "cases"); }, test::kPatience));
+  people_.certs({"revoke", "otto"});
+  const grpc::Status end = sending.send_until_the_end();
+  EXPECT_EQ(end.error_code(), StatusCode::UNAUTHENTICATED) << end.error_message();
+  EXPECT_THAT(end.error_message(), HasSubstr("revoked"));
+  EXPECT_TRUE(nothing_is_left());
+}
+
+TEST_F(Uploads, EndAlsoWhileTheyAreLookedThrough) {
+  // A program that takes long to look a case through.
+  const fs::path checker = dir_ / "checker";
+  std::ofstream(checker) << "#!/bin/sh\nexec sleep 60\n";
+  fs::permissions(checker, fs::perms::owner_all);
+  start({}, {}, checker);
+  ASSERT_TRUE(pack_case(dir_ / "case", dir_ / "case.zip"));
+  Sending sending(server_->address(), people_.door("otto", Role::operator_, "*"));
+  v1::UploadCaseRequest whole;
+  whole.set_data(content(dir_ / "case.zip"));
+  ASSERT_LE(whole.data().size(), 1u << 20);
+  ASSERT_TRUE(sending.writer->Write(whole));
+  ASSERT_TRUE(sending.writer->WritesDone());
+  const auto incoming = [&] {
+    const fs::recursive_directory_iterator all(dir_ / "cases");
+    return std::ranges::any_of(all, [](const auto& one) { return one.is_directory(); });
+  };
+  ASSERT_TRUE(test::wait_until(incoming, test::kPatience));
+  people_.append_access("role otto instructor");
+  const grpc::Status end = sending.writer->Finish();
+  EXPECT_EQ(end.error_code(), StatusCode::PERMISSION_DENIED) << end.error_message();
+  EXPECT_THAT(end.error_message(), HasSubstr("an instructor may not call CaseService/UploadCase"));
+  EXPECT_TRUE(nothing_is_left());
+}
+
+TEST_F(Uploads, EndWhereNothingComesOrTheyTakeTooLong) {
+  start({}, {.idle = 300ms, .sending = 1500ms});
+  const wire::Door otto = people_.door("otto", Role::operator_, "*");
+  Sending silent(server_->address(), otto);
+  ASSERT_TRUE(silent.send());
+  const grpc::Status idle = silent.writer->Finish();
+  EXPECT_EQ(idle.error_code(), StatusCode::DEADLINE_EXCEEDED) << idle.error_message();
+  EXPECT_THAT(idle.error_message(), HasSubstr("nothing of the upload came"));
+  Sending slow(server_->address(), otto);
+  const grpc::Status late = slow.send_until_the_end();
+  EXPECT_EQ(late.error_code(), StatusCode::DEADLINE_EXCEEDED) << late.error_message();
+  EXPECT_THAT(late.error_message(), HasSubstr("took longer"));
+  EXPECT_TRUE(nothing_is_left());
+}
+
+TEST_F(GoingOn, ASessionDoesNotNoticeTheAgeOfItsConnection) {
+  start({.connection_age = 400ms});
+  const auto sue = surgeon("sue");
+  cut(*sue, 5);
+  const std::uint64_t before = server_->door_health().connections.accepted;
+  // Calls go over newer connections, each with a handshake of its own.
+  EXPECT_TRUE(test::wait_until(
+      [&] {
+        EXPECT_GT(test::status_of(sue->session().room()).room_seq(), 0u);
+        return server_->door_health().connections.accepted >= before + 3;
+      },
+      test::kPatience));
+  cut(*sue, 5);
+  EXPECT_EQ(sue->interruptions(), 0);
+  EXPECT_EQ(sue->lost(), "");
+}
+
+TEST_F(GoingOn, ASessionComesAgainAfterTheLongestThatThereIs) {
+  start({.connection_age = 400ms, .longest_session = 400ms});
+  const auto sue = surgeon("sue");
+  for (int i = 0; sue->interruptions() < 2 && i < 1000 && !HasFatalFailure(); ++i) cut(*sue, 1);
+  EXPECT_GE(sue->interruptions(), 2);
+  EXPECT_EQ(sue->lost(), "");
+  EXPECT_TRUE(test::wait_until([&] { return sue->stands() && sue->seq() == host().room_seq(); }, test::kPatience));
+  EXPECT_EQ(wire::to_wire(sue->hash()), test::status_of(sue->session().room()).field_hash());
+}
+
+// Whose authority is trusted no more is shut out when their connection is old, for all calls that begin later.
+TEST_F(GoingOn, WhoseAuthorityIsTrustedNoMoreIsOutWithTheAgeOfTheConnection) {
+  test::People others;
+  const fs::path guest = others.person("guest");
+  const std::string own = content(people_.server() / "ca.pem");
+  fs::copy_file(people_.server() / "ca.pem", guest / "ca.pem", fs::copy_options::overwrite_existing);
+  std::ofstream(people_.server() / "ca.pem") << own << content(others.server() / "ca.pem");
+  start({.connection_age = 400ms});
+  const auto sue = surgeon("sue");
+  const wire::JoinedRoom joined = join({.certificates = guest, .ticket = people_.ticket("guest", "ward", Role::observer)});
+  std::ofstream(dir_ / "own.pem") << own;
+  fs::rename(dir_ / "own.pem", people_.server() / "ca.pem");
+  const auto refused = [&] {
+    v1::GetStatusResponse response;
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + 2s);
+    return v1::RoomService::NewStub(joined.channel)->GetStatus(&context, {}, &response).error_code() == StatusCode::UNAVAILABLE;
+  };
+  EXPECT_TRUE(test::wait_until(refused, test::kPatience));
+  cut(*sue, 3);
+  EXPECT_EQ(sue->interruptions(), 0);
+}
+
+}  // namespace
+}  // namespace osteon
