@@ -66,8 +66,8 @@ inline constexpr int kStreamContents = 9;
 enum class Right : std::uint8_t {
   hold_a_tool,   // join as a haptic client
   undo_own,      // events of the same person
-  undo_anyones,  // those of others too, and back to a mark
-  undo_all,      // back to the imported bone
+  undo_anyones,  // those of others too, and back to a mark, but not all that others did
+  undo_all,      // that too, and back to the imported bone
 };
 inline constexpr int kRights = 4;
 [[nodiscard]] bool has_right(Role role, Right right);

@@ -16,6 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kIncoming = "incoming-", kArchive = "upload.zip";
+constexpr std::uintmax_t kMostDescription = 1 << 20;  // bytes
 constexpr std::string_view kNote = "memory.json";  // in a case's folder: what it takes once it is loaded
 
 tl::unexpected<Error> disk(const fs::path& where, const std::string& why) {
@@ -131,6 +132,10 @@ std::vector<fs::path> CaseStore::folders() const {
 Result<StoredCase> CaseStore::peek(const fs::path& folder) {
   const Result<Digest> hash = digest_from_hex(folder.filename().string());
   if (!hash) return failure(ErrorCode::invalid_input, folder.string() + " is not called by the hash of a case");
+  std::error_code none;
+  if (fs::file_size(folder / "case.json", none) > kMostDescription || none)
+    return failure(ErrorCode::invalid_input,
+                   (folder / "case.json").string() + " is missing or too long; delete the folder and upload the case again");
   std::ifstream described(folder / "case.json"), noted(folder / kNote);
   const nlohmann::json about = nlohmann::json::parse(described, nullptr, false), note = nlohmann::json::parse(noted, nullptr, false);
   if (!about.is_object() || !about.contains("title") || !about["title"].is_string())

@@ -44,7 +44,7 @@ std::uint64_t CaseShelf::loaded_locked() const {
 
 Result<void> CaseShelf::check_space(const KnownCase& known, std::uint64_t bytes) const {
   const std::uint64_t loaded = loaded_locked();
-  if (loaded + bytes <= most_bytes_) return {};
+  if (bytes <= most_bytes_ && loaded <= most_bytes_ - bytes) return {};
   const auto mib = [](std::uint64_t n) { return std::to_string((n + (1 << 20) - 1) >> 20); };
   return failure(ErrorCode::exhausted,
                  "the case " + to_hex(known.hash) + " needs " + mib(bytes) + " MiB of memory, and " + mib(loaded) + " of the " +

@@ -150,6 +150,7 @@ TEST_F(GoingOn, ADemonstrationGoesOnWhenItsStarterComesAnew) {
 // An upload as some client makes it, piece by piece.
 struct Sending {
   Sending(const std::string& address, const wire::Door& door) {
+    context.set_deadline(std::chrono::system_clock::now() + 2 * test::kPatience);  // where nobody ends it
     context.AddMetadata("osteon-ticket", wire::ticket_text(door));
     const auto channel = grpc::CreateChannel(address, wire::credentials_of(door, address).value());
     writer = v1::CaseService::NewStub(channel)->UploadCase(&context, &response);
