@@ -212,7 +212,7 @@ struct RoomSession::Impl {
   mutable std::mutex fast_mutex;
   std::shared_ptr<FastPath> fast;             // of the present stream; held by those who use it just now
 
-  std::atomic<std::uint64_t> heard{0};        // place of the newest event that was passed on
+  std::atomic<std::uint64_t> heard{0};        // place of the newest event that was passed on, over the present stream
   std::atomic<bool> heard_leaves{false};      // no datagram says that these have come
 
   mutable std::mutex mutex;
@@ -350,6 +350,8 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
   {
     const std::lock_guard lock(read_mutex);
     reader->begin();
+    heard = 0;
+    heard_leaves = false;
   }
   offer.reset();
   redial_why.clear();

@@ -25,6 +25,7 @@ SessionReader::SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomE
 
 void SessionReader::begin() {
   rows_ = ReceiveWindow<Row>();
+  place_ = {};
   supervised_ = false;
   partners_.clear();
 }
@@ -142,7 +143,8 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
         if (!tools_->find(item->tool)) return failure(ErrorCode::invalid_input, "scene.items names a tool that was not sent");
         items.push_back(*item);
       }
-      place_ = std::max(place_, RoomSeq{response.scene().room_seq()});
+      // Without a number it goes before the leaves, which have not come.
+      if (response.index() != 0) place_ = std::max(place_, RoomSeq{response.scene().room_seq()});
       if (events_.scene) events_.scene(RoomSeq{response.scene().room_seq()}, items);
       return {};
     }

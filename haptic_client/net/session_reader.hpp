@@ -25,7 +25,8 @@ class SessionReader {
   SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomEvents events, std::function<void(std::uint64_t)> decided,
                 std::function<void(std::uint64_t)> complete);
 
-  // A stream begins: its leaves and rows count anew.
+  // A stream begins: its leaves and rows count anew, and so does place(), as the server may have lost the end of what an
+  // earlier one told. What was said to be kept stays: it is what shows such a loss.
   void begin();
   // Error: the server sent what no correct server sends; nothing more of the stream is to be taken.
   [[nodiscard]] Result<void> take(v1::SessionResponse response);
@@ -35,7 +36,7 @@ class SessionReader {
   [[nodiscard]] std::uint64_t taken() const { return rows_.acknowledged(); }
   // Another's tool, heard of over the fast path.
   void take(const CuttingState& partner);
-  // The newest event that was passed on, or that the leaves contain.
+  // The newest event of the present stream that was passed on, or that its leaves contain once all of them have come.
   [[nodiscard]] RoomSeq place() const { return place_; }
   // The newest that the room has said is kept.
   [[nodiscard]] const std::optional<wire::KeptEvents>& kept() const { return kept_; }

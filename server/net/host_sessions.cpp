@@ -280,7 +280,9 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, co
     sink->set_leaves(std::move(leaves));
     return {};
   }
-  // They hold what may not be kept yet, and `complete` says that it is decided: nobody hears of it before it is kept.
+  // All that the session begins with tells of what may not be kept yet, and `complete` says that it is decided: the sink sends
+  // none of it before it has the leaves, and it has these once it is kept. By datagram nothing is told sooner either, whose
+  // keys are with the rest.
   queue_event([](Room&) { return RoomEvent{}; },
               [sink, leaves = std::move(leaves)](const Result<RoomEvent>& kept) mutable {
                 if (kept) sink->set_leaves(std::move(leaves));

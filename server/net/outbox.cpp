@@ -94,12 +94,13 @@ RoomSeq SessionOutbox::arrived(std::uint64_t index) {
 }
 
 MessageParts SessionOutbox::take() {
+  // Until then some of it may not be kept.
+  if (!leaves_known_) return {};
   if (!before_.empty()) {
     MessageParts parts{std::move(before_.front())};
     before_.pop_front();
     return parts;
   }
-  if (!leaves_known_) return {};
   v1::SessionResponse response;
   if (next_leaf_ < leaves_.size()) {
     *response.mutable_leaf() = wire::to_wire(leaves_[next_leaf_]);

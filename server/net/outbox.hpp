@@ -60,13 +60,14 @@ class MeshOutbox {
   bool news_ = true;            // newest_ was not said yet
 };
 
-// What a session sends: the tools, scene and field as they were on joining, then rows in room_seq order. Rows cannot be skipped, so a reader
-// that falls too far behind is given up instead.
+// What a session sends: the tools, scene and field as they were on joining, then rows in room_seq order. Nothing of it before
+// the leaves are given, which is when all that it tells of is kept. Rows cannot be skipped, so a reader that falls too far
+// behind is given up instead.
 class SessionOutbox {
  public:
   static constexpr std::size_t kMaxRows = 8192;
 
-  // `before`: sent before the leaves, `complete` after them.
+  // `before`: sent before the leaves, once they are given; `complete` after them.
   void begin(RoomSeq contained, MessageParts before, Bytes complete);
   // Copied while rows may have come already: every leaf contains at least the order up to `contained`. What it contains
   // beyond that changes nothing when its row is applied again, since a cut field is a minimum over its cuts and all other

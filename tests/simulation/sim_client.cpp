@@ -333,7 +333,10 @@ RoomEvents SimClient::events() {
     ledger_.told_up_to(part.place);
     pass(std::move(part));
   };
-  events.scene = [this](RoomSeq place, const std::vector<SceneItem>&) { pass(Noted{place}); };
+  events.scene = [this](RoomSeq place, const std::vector<SceneItem>&) {
+    ledger_.told_up_to(place);
+    pass(Noted{place});
+  };
   events.supervised = [this](const HandSupervised& decided) {
     if (decided.place) ledger_.told_event(decided.place, EventKind::supervise);
     pass(decided);
@@ -342,7 +345,10 @@ RoomEvents SimClient::events() {
     ledger_.told_event(said.place, EventKind::words);
     pass(Noted{said.place});
   };
-  events.noted = [this](RoomSeq place) { pass(Noted{place}); };
+  events.noted = [this](RoomSeq place) {
+    ledger_.told_up_to(place);
+    pass(Noted{place});
+  };
   return events;
 }
 

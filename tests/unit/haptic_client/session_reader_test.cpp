@@ -210,6 +210,34 @@ TEST(SessionReader, PassesOnWhereTheBoneStandsOnItsMount) {
   EXPECT_EQ(heard.places.size(), 1u);
 }
 
+// A server that was killed may have lost what an earlier one told: of its order, nothing has been heard yet. What was said to
+// be kept is what shows the loss.
+TEST(SessionReader, ItsPlaceIsThatOfThePresentStream) {
+  Heard heard;
+  heard.reader.begin();
+  ASSERT_TRUE(heard.reader.take(row(1, 10, 2, 1)));
+  v1::SessionResponse kept;
+  kept.mutable_kept()->set_room_seq(9);
+  kept.mutable_kept()->set_chain(std::string(32, 'c'));
+  ASSERT_TRUE(heard.reader.take(kept));
+  EXPECT_EQ(heard.reader.place(), RoomSeq{10});
+  heard.reader.begin();
+  EXPECT_EQ(heard.reader.place(), RoomSeq{0});
+  EXPECT_EQ(heard.reader.kept().value().room_seq, RoomSeq{9});
+  // The scene goes before the leaves, which are not there yet.
+  v1::SessionResponse scene, complete;
+  scene.mutable_scene()->set_room_seq(8);
+  ASSERT_TRUE(heard.reader.take(scene));
+  EXPECT_EQ(heard.reader.place(), RoomSeq{0});
+  complete.mutable_complete()->set_room_seq(8);
+  ASSERT_TRUE(heard.reader.take(complete));
+  EXPECT_EQ(heard.reader.place(), RoomSeq{8});
+  scene.set_index(1);
+  scene.mutable_scene()->set_room_seq(9);
+  ASSERT_TRUE(heard.reader.take(scene));
+  EXPECT_EQ(heard.reader.place(), RoomSeq{9});
+}
+
 TEST(SessionReader, BeginsAnewWithEachStream) {
   Heard heard;
   heard.reader.begin();

@@ -192,9 +192,9 @@ TEST(SessionOutbox, SendsLeavesThenCompleteThenOnlyTheRowsAfterThem) {
   // The publisher may still bring the row that the leaves already contain.
   EXPECT_TRUE(outbox.add(RoomSeq{4}, row(4)));
   EXPECT_TRUE(outbox.add(RoomSeq{5}, row(5)));
-  EXPECT_TRUE(parsed(outbox.take()).has_tool()) << "tools go before the leaves";
-  EXPECT_TRUE(outbox.take().empty()) << "no row before the leaves are known";
+  EXPECT_TRUE(outbox.take().empty()) << "nothing before the leaves are known";
   outbox.set_leaves(leaves);
+  EXPECT_TRUE(parsed(outbox.take()).has_tool()) << "tools go before the leaves";
   EXPECT_EQ(parsed(outbox.take()).leaf().origin().x(), 0);
   EXPECT_EQ(parsed(outbox.take()).leaf().origin().x(), 8);
   EXPECT_EQ(parsed(outbox.take()).complete().room_seq(), 4u);

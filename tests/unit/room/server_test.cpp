@@ -51,6 +51,35 @@ TEST_F(RoomServerTest, AHandSaysThatTheLeavesHaveCome) {
   EXPECT_TRUE(wait_until([&] { return host().people().heard_of(AuthorId{1}) == host().room_seq(); }, kPatience));
 }
 
+// As one would that was told of more, by a server whose journal has lost its end.
+TEST_F(RoomServerTest, AHandThatHasHeardMoreThanThereIsIsNotTurnedAway) {
+  const wire::JoinedRoom room = join(address(), wire::ClientKind::haptic);
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kPatience);
+  const auto stream = v1::CuttingService::NewStub(room.channel)->Session(&context);
+  v1::SessionRequest request;
+  request.mutable_open()->set_author(room.author.value);
+  request.mutable_open()->set_server_epoch(room.server_epoch);
+  request.mutable_open()->set_secret(room.secret);
+  ASSERT_TRUE(stream->Write(request));
+  request.mutable_heard()->set_room_seq(host().room_seq().value + 1000);
+  ASSERT_TRUE(stream->Write(request));
+  Cut cut = strokes(room.author, 1, 3)[0];
+  cut.lease_epoch = room.lease_epoch;
+  *request.mutable_cut() = wire::to_wire(cut);
+  ASSERT_TRUE(stream->Write(request));
+  v1::SessionResponse response;
+  while (stream->Read(&response) && !response.has_committed()) {
+  }
+  EXPECT_TRUE(response.has_committed()) << "its session goes on";
+  const RoomSeq heard = host().people().heard_of(room.author);
+  EXPECT_GT(heard, RoomSeq{});
+  EXPECT_LE(heard, host().room_seq()) << "as far as there is anything";
+  context.TryCancel();
+  const grpc::Status status = stream->Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::CANCELLED) << status.error_message();
+}
+
 TEST_F(RoomServerTest, ACutBeyondTheLimitsIsRejectedToItsAuthorAndTheRoomGoesOn) {
   const auto one = surgeon(), other = surgeon();
   auto cuts = strokes(one->author(), 2, 3);

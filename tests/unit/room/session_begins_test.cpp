@@ -1,0 +1,181 @@
+// What a session is told of its beginning, and when: nothing that a room that is killed then would not have.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "osteon/v1/cutting.pb.h"
+#include "server/net/room_host.hpp"
+#include "server/net/room_keeper.hpp"
+#include "tests/support/disk/memory_disk.hpp"
+#include "tests/unit/room/cuts.hpp"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+using test::strokes;
+using test::test_block;
+
+const Digest kSecret{{7}};
+
+// What its reader is told at once, as over a line that takes everything.
+class Told final : public SessionSink {
+ public:
+  explicit Told(AuthorId author) : author_(author) {}
+  AuthorId author() const override { return author_; }
+  void begin(RoomSeq contained, MessageParts before, Bytes complete) override {
+    outbox_.begin(contained, std::move(before), std::move(complete));
+    read();
+  }
+  void set_leaves(std::vector<FieldLeaf> leaves) override {
+    outbox_.set_leaves(std::move(leaves));
+    read();
+  }
+  void offer(RoomSeq place, const Bytes& row) override {
+    ASSERT_TRUE(outbox_.add(place, row));
+    read();
+  }
+  void answer(const Bytes& row) override {
+    ASSERT_TRUE(outbox_.add_answer(row));
+    read();
+  }
+  void refuse(const Error& why) override { ADD_FAILURE() << why.message; }
+  void replaced(const std::string&) override {}
+  void decided() override {}
+  void end(const std::string&) override {}
+  std::size_t waiting() const override { return 0; }
+
+  std::vector<v1::SessionResponse> told;
+
+ private:
+  void read() {
+    for (MessageParts parts = outbox_.take(); !parts.empty(); parts = outbox_.take()) {
+      std::string whole;
+      for (const Bytes& part : parts) whole += *part;
+      ASSERT_TRUE(told.emplace_back().ParseFromString(whole));
+    }
+  }
+  const AuthorId author_;
+  SessionOutbox outbox_;
+};
+
+// A driven host over a disk in memory, with an instructor and a hand.
+class BegunSession : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    open();
+    ada = join(MemberKind::watcher, "Ada", Role::instructor);
+    ben = join(MemberKind::surgeon, "Ben", Role::trainee);
+  }
+  void TearDown() override { kill(); }
+  void open() {
+    Result<KeptRoom> kept = RoomKeeper::open("/rooms/femur", test_block(), options());
+    ASSERT_TRUE(kept) << kept.error().message;
+    keeper = std::move(kept->keeper);
+    host = std::make_unique<RoomHost>(std::move(kept->room), HostRates{.tick = 0ns, .mesh = 1s, .pieces = 0ns}, nullptr,
+                                      Detail::automatic, keeper.get());
+  }
+  RoomKeeper::Options options() {
+    RoomKeeper::Options options;
+    options.name = "femur";
+    options.journal.disk = &disk;
+    return options;
+  }
+  // What no transaction has is lost.
+  void kill() {
+    host.reset();
+    keeper.reset();
+    sinks.clear();
+  }
+  void tick(bool keep) { host->tick(now += 8ms, keep); }
+  AuthorId join(MemberKind kind, const std::string& name, Role role) {
+    AuthorId author;
+    host->join(kind, name, kSecret, role, [&](const Result<AuthorId>& given) { author = given.value(); });
+    tick(true);
+    return author;
+  }
+  std::shared_ptr<Told> session() {
+    auto sink = std::make_shared<Told>(ben);
+    EXPECT_TRUE(host->open_session(sink, kSecret));
+    return sinks.emplace_back(std::move(sink));
+  }
+  // A mark, a cut and a word about the hand: decided, and on no disk yet.
+  void change_all() {
+    const auto ask = [&](std::function<Result<RoomEvent>(Room&)> change) {
+      host->queue_event(std::move(change), [](const Result<RoomEvent>&) {});
+    };
+    ask([this](Room& room) { return room.mark(ada, "here"); });
+    Cut cut = strokes(ben, 1, 3)[0];
+    cut.lease_epoch = host->lease_epoch(ben);
+    host->queue_cut(std::make_shared<Told>(ben), cut, {});
+    ask([this](Room& room) { return room.supervise(ada, ben, {.stopped = true, .words = "wait"}); });
+    tick(false);
+  }
+
+  test::MemoryDisk disk{1};
+  std::unique_ptr<RoomKeeper> keeper;
+  std::unique_ptr<RoomHost> host;
+  std::vector<std::shared_ptr<Told>> sinks;  // the host's until they go
+  std::chrono::nanoseconds now{};
+  AuthorId ada, ben;
+};
+
+std::size_t count(const Told& sink, v1::SessionResponse::MessageCase kind) {
+  return static_cast<std::size_t>(std::ranges::count(sink.told, kind, &v1::SessionResponse::message_case));
+}
+
+// The newest place that it was told that the room stands at.
+std::uint64_t furthest(const Told& sink) {
+  std::uint64_t place = 0;
+  for (const v1::SessionResponse& one : sink.told)
+    place = std::max({place, one.scene().room_seq(), one.complete().room_seq(), one.committed().room_seq(), one.supervised().room_seq()});
+  return place;
+}
+
+TEST_F(BegunSession, TellsNothingBeforeItIsKept) {
+  const RoomSeq kept = keeper->head().place;
+  change_all();
+  ASSERT_EQ(host->room_seq().value, kept.value + 3) << "all of it is decided";
+  ASSERT_EQ(keeper->head().place, kept) << "and none of it kept";
+  const auto hand = session();
+  tick(false);
+  tick(false);
+  EXPECT_TRUE(hand->told.empty()) << hand->told.front().ShortDebugString();
+  tick(true);
+  ASSERT_EQ(keeper->head().place.value, kept.value + 3);
+  EXPECT_GT(count(*hand, v1::SessionResponse::kTool), 0u);
+  EXPECT_GT(count(*hand, v1::SessionResponse::kLeaf), 0u);
+  ASSERT_EQ(count(*hand, v1::SessionResponse::kScene), 1u);
+  ASSERT_EQ(count(*hand, v1::SessionResponse::kSupervised), 1u);
+  ASSERT_EQ(count(*hand, v1::SessionResponse::kComplete), 1u);
+  EXPECT_EQ(furthest(*hand), kept.value + 3);
+  EXPECT_TRUE(std::ranges::any_of(hand->told, [](const auto& one) { return one.supervised().supervision().stopped(); }));
+}
+
+// Whoever comes while the disk is slow, and the room is killed before it was done: nobody knows of what it has lost.
+TEST_F(BegunSession, OfARoomThatIsKilledSaysNoMoreThanWasLeft) {
+  const auto before = session();
+  tick(true);
+  change_all();
+  const auto again = session();  // the same hand, over another line
+  tick(false);
+  const std::uint64_t heard = std::max(furthest(*before), furthest(*again));
+  const RoomSeq decided = host->room_seq();
+  kill();
+  open();
+  EXPECT_LT(host->room_seq(), decided) << "something was lost";
+  EXPECT_LE(heard, host->room_seq().value);
+  EXPECT_EQ(count(*before, v1::SessionResponse::kComplete), 1u);
+  const auto after = session();
+  tick(true);
+  EXPECT_EQ(count(*after, v1::SessionResponse::kSupervised), 0u) << "what nobody heard of holds for nobody";
+}
+
+}  // namespace
+}  // namespace osteon
