@@ -201,6 +201,7 @@ Result<JoinedRoom> join_again(const JoinedRoom& room, ClientKind kind, const std
   if (kept) {
     request.set_kept_room_seq(kept->room_seq.value);
     request.set_kept_chain(to_wire(kept->chain));
+    request.set_kept_seal(to_wire(kept->seal));
   }
   // As soon as the channel, which keeps trying, has a connection.
   grpc::ClientContext context;

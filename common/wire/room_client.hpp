@@ -48,10 +48,10 @@ struct JoinedRoom {
                                            const std::string& room = {}, const Door& door = {});
 
 // The same author again over the same channel, after the stream or the server was lost. `kept`: the newest event that the
-// server said is kept, and its chain. Errors: unavailable (try again), any other (the room knows this client no more).
+// server said is kept, its chain and the server's seal. Errors: unavailable (try again), any other (the room knows this client no more).
 struct KeptEvents {
   RoomSeq room_seq;
-  Digest chain;
+  Digest chain, seal;
 };
 [[nodiscard]] Result<JoinedRoom> join_again(const JoinedRoom& room, ClientKind kind, const std::optional<KeptEvents>& kept);
 

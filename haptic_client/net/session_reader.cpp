@@ -163,7 +163,9 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
     case v1::SessionResponse::kKept: {
       const Result<Digest> chain = wire::digest_from_wire(response.kept().chain());
       if (!chain) return tl::unexpected(chain.error());
-      kept_ = {RoomSeq{response.kept().room_seq()}, *chain};
+      // A server of before there were seals sends none.
+      const Result<Digest> seal = wire::digest_from_wire(response.kept().seal());
+      kept_ = {RoomSeq{response.kept().room_seq()}, *chain, seal ? *seal : Digest{}};
       return {};
     }
     case v1::SessionResponse::kNoted:

@@ -39,7 +39,7 @@ struct RoomHost::Impl {
   Impl(Room r, HostRates rates, Detail detail, RoomKeeper* k, std::optional<Playback> p)
       : keeper(k), room(std::move(r)),
         rates_(rates),
-        room_began(Clock::now() - std::chrono::duration_cast<Clock::duration>(room.time())),
+        room_began(Clock::now() - std::chrono::duration_cast<Clock::duration>(k ? reopened_time(room) : room.time())),
         people(room, names_of(k)),
         mesh(room, room_mutex, {rates.mesh, rates.looks}, detail, [this] { return board.tool_tips_mm(); }),
         committer(k ? [k](std::span<const RoomRow> rows) { return k->write(rows); } : Committer::Write{},
@@ -113,7 +113,7 @@ struct RoomHost::Impl {
   std::shared_mutex room_mutex;
   std::optional<std::vector<Cut>> meanwhile;  // under room_mutex: cuts applied since copy_bone() began to copy
   const HostRates rates_;
-  const Clock::time_point room_began;     // the room's time 0, as if it had never been closed
+  const Clock::time_point room_began;     // the room's time 0, as if it had hardly been closed
   std::atomic<std::uint64_t> room_seq{0}, authors{0};
   std::atomic<bool> stopping{false};
 

@@ -132,7 +132,7 @@ void RoomHost::Impl::tell_kept(std::chrono::nanoseconds now) {
   next_kept = now + std::chrono::seconds(1);
   later([this](const Result<void>& durable) {
     if (!durable) return;
-    const Bytes row = kept_row(keeper->head());
+    const Bytes row = kept_row(keeper->witness());
     const std::lock_guard lock(sessions_mutex);
     sessions.each([&](SessionSink& sink) { sink.answer(row); });
   });
@@ -181,7 +181,7 @@ void RoomHost::Impl::end_sessions(const std::string& why, bool to_return) {
   sessions.each([&](SessionSink& sink) { to_return ? sink.replaced(why) : sink.end(why); });
 }
 
-Result<void> RoomHost::resume(AuthorId author, const Digest& secret, const std::optional<JournalHead>& kept, std::optional<Role> role) {
+Result<void> RoomHost::resume(AuthorId author, const Digest& secret, const std::optional<Witness>& kept, std::optional<Role> role) {
   if (impl_->player) return tl::unexpected(only_to_be_watched());
   {
     const std::shared_lock lock(impl_->room_mutex);

@@ -15,6 +15,8 @@ namespace osteon {
 
 // The register of a journal that has the last number given to a person.
 inline constexpr const char* kPeopleRegister = "people";
+// The one that has the key of what clients are told is safe.
+inline constexpr const char* kWitnessRegister = "witness key";
 
 // What a room began as: enough to make it again beside the case itself.
 struct RoomGenesis {

@@ -127,7 +127,7 @@ class RoomHost {
                                       Role role = Role::none);
   // Whether an earlier connection may go on. `kept`: what it was told is safe, if anything. Errors: invalid_input (not the
   // secret of which the author has the digest), unavailable (the room has lost what was said to be safe), denied (`role` is given, and he joined with another).
-  [[nodiscard]] Result<void> resume(AuthorId author, const Digest& secret, const std::optional<JournalHead>& kept,
+  [[nodiscard]] Result<void> resume(AuthorId author, const Digest& secret, const std::optional<Witness>& kept,
                                     std::optional<Role> role = {});
   [[nodiscard]] BoneStatus bone_status();
   // [thread for slow requests] All bodies' leaves, those that were taken away too, at one place of the order.

@@ -1,8 +1,10 @@
 #include "server/net/room_keeper.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <utility>
 #include <variant>
@@ -100,6 +102,7 @@ Result<KeptRoom> RoomKeeper::open(const std::filesystem::path& file, const Case&
     keeper->server_epoch_ = *epoch;
   else
     return tl::unexpected(epoch.error());
+  if (Result<void> key = keeper->find_witness_key(options); !key) return tl::unexpected(key.error());
   keeper->retention_days_ = options.retention_days;
   keeper->today_ = options.today ? options.today : computers_day;
   if (const auto forgotten = keeper->forget_old(); !forgotten)
@@ -190,8 +193,44 @@ Result<std::uint32_t> RoomKeeper::person(const std::string& label) {
   });
 }
 
-Result<void> RoomKeeper::check_witness(const JournalHead& witness) {
-  return with_journal([&](Journal& journal) { return journal.check_witness(witness); });
+Result<void> RoomKeeper::find_witness_key(const Options& options) {
+  Result<std::optional<std::string>> known = journal_->find_register(kWitnessRegister);
+  if (known && *known) {
+    witness_key_ = std::move(**known);
+    return {};
+  }
+  std::array<std::uint8_t, 32> key{};
+  (options.random ? options.random : system_random())(key);
+  witness_key_.assign(key.begin(), key.end());
+  return journal_->closed_because() ? Result<void>{} : journal_->set_register(kWitnessRegister, witness_key_);
+}
+
+Digest RoomKeeper::seal_of(const JournalHead& head) const {
+  Hasher hasher;
+  hasher.text("osteon witness");
+  hasher.text(witness_key_);
+  hasher.integer(head.place.value);
+  hasher.bytes(std::as_bytes(std::span(head.chain.bytes)));
+  return hasher.finish();
+}
+
+Witness RoomKeeper::witness() const {
+  const JournalHead at = head();
+  return {at, seal_of(at)};
+}
+
+Result<void> RoomKeeper::check_witness(const Witness& witness) {
+  return with_journal([&](Journal& journal) -> Result<void> {
+    if (witness.head.place > journal.head().place && witness.seal != seal_of(witness.head))
+      return failure(ErrorCode::invalid_input, file_.string() + " goes to place " + std::to_string(journal.head().place.value) +
+                                                   ", and a client says without its seal that place " +
+                                                   std::to_string(witness.head.place.value) + " is safe; it has to join anew");
+    return journal.check_witness(witness.head);
+  });
+}
+
+std::chrono::nanoseconds reopened_time(const Room& room) {
+  return room.room_seq() ? room.time() + kTimeAway : room.time();
 }
 
 Result<void> RoomKeeper::checkpoint(RoomSeq place, std::span<const FieldLeaf> leaves, const UpkeepCalls& calls) {

@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/link/random_bytes.hpp"
 #include "server/journal/journal.hpp"
 #include "server/journal/upkeep.hpp"
 #include "server/net/journal_rows.hpp"
@@ -66,6 +67,11 @@ struct RoomReport {
   [[nodiscard]] bool sound() const { return faults.empty(); }
 };
 
+// When a reopened room's time goes on. Nobody knows how long it was away, and its hands worked on for the two seconds after
+// which they hold the server for silent: their cuts come when it is back, and the time that they took must have passed.
+inline constexpr std::chrono::nanoseconds kTimeAway = std::chrono::milliseconds(2500);
+[[nodiscard]] std::chrono::nanoseconds reopened_time(const Room& room);
+
 // Any thread. What takes long holds the journal for a slice of rows at a time, between which rows are written. After close()
 // every function returns the error unavailable.
 class RoomKeeper {
@@ -77,6 +83,7 @@ class RoomKeeper {
     JournalOptions journal;
     int retention_days = 0;             // who joined more days ago is forgotten; 0: nobody ever
     std::function<std::int32_t()> today;  // days since 1970-01-01; null: the computer's
+    FillRandom random;                    // for the key of its witnesses; null: the system's
   };
   // Goes on with the journal's room, up to the last row that anyone was told of, or makes a new one where there is no such
   // file. `progress` hears the fraction of the rows replayed. Errors: those of Journal::open; unsupported (of another case,
@@ -94,8 +101,11 @@ class RoomKeeper {
   [[nodiscard]] std::uint64_t evaluated() const { return evaluated_; }
   [[nodiscard]] const RoomGenesis& genesis() const { return genesis_; }
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
-  // What a client was told was safe: see Journal::check_witness.
-  [[nodiscard]] Result<void> check_witness(const JournalHead& witness);
+  // What clients are told is safe, now.
+  [[nodiscard]] Witness witness() const;
+  // What a client says it was told is safe: see Journal::check_witness. One beyond the journal counts only under its seal, so
+  // that no client can close a room by what it makes up. Error invalid_input: also that it is not.
+  [[nodiscard]] Result<void> check_witness(const Witness& witness);
 
   // The pseudonym under which rows know this person; the same for the same label, until it is forgotten.
   [[nodiscard]] Result<std::uint32_t> person(const std::string& label);
@@ -157,6 +167,9 @@ class RoomKeeper {
     return what(*journal_);
   }
   [[nodiscard]] tl::unexpected<Error> is_closed() const;
+  // The register is made by the first opening that finds none.
+  [[nodiscard]] Result<void> find_witness_key(const Options& options);
+  [[nodiscard]] Digest seal_of(const JournalHead& head) const;
   // Rows after `at`, which goes on with them, up to `last`. Error invalid_input: the row after `at` does not fit the chain.
   [[nodiscard]] Result<void> each_row(JournalHead& at, RoomSeq last, const std::function<bool(const JournalRow&)>& take);
   [[nodiscard]] Result<void> run(JournalCopy& copy, const UpkeepCalls& calls);
@@ -174,6 +187,7 @@ class RoomKeeper {
   Disk& disk_;
   int retention_days_ = 0;
   std::function<std::int32_t()> today_;
+  std::string witness_key_;
   std::vector<RoomSeq> changes_;    // since the newest checkpoint
   std::optional<RoomSeq> idle_at_;  // its head when tidy_if_idle() looked
   std::uint64_t server_epoch_ = 0, evaluated_ = 0;

@@ -60,10 +60,11 @@ Bytes link_row(const SessionKeys& keys, std::uint16_t udp_port) {
   return serialised(response);
 }
 
-Bytes kept_row(const JournalHead& head) {
+Bytes kept_row(const Witness& witness) {
   v1::SessionResponse response;
-  response.mutable_kept()->set_room_seq(head.place.value);
-  response.mutable_kept()->set_chain(wire::to_wire(head.chain));
+  response.mutable_kept()->set_room_seq(witness.head.place.value);
+  response.mutable_kept()->set_chain(wire::to_wire(witness.head.chain));
+  response.mutable_kept()->set_seal(wire::to_wire(witness.seal));
   return serialised(response);
 }
 

@@ -21,7 +21,7 @@ namespace osteon {
 [[nodiscard]] Bytes cut_row(RoomSeq place, const Cut& cut);
 [[nodiscard]] Bytes rejection_row(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, Rejection reason);
 [[nodiscard]] Bytes link_row(const SessionKeys& keys, std::uint16_t udp_port);
-[[nodiscard]] Bytes kept_row(const JournalHead& head);
+[[nodiscard]] Bytes kept_row(const Witness& witness);
 [[nodiscard]] Bytes redial_row(std::chrono::milliseconds after, const std::string& why);
 [[nodiscard]] Bytes tool_row(RoomSeq place, const Tool& tool, std::uint32_t number);
 [[nodiscard]] Bytes scene_row(RoomSeq place, const std::vector<SceneItem>& items);

@@ -386,11 +386,13 @@ class RoomServiceImpl final : public RoomBase {
   }
   // `role`: what the caller may be now; nothing: whatever it was.
   static Result<AuthorId> come_back(RoomHost& host, const v1::JoinRequest& request, std::optional<Role> role) {
-    std::optional<JournalHead> kept;
+    std::optional<Witness> kept;
     if (request.kept_room_seq() != 0) {
       const Result<Digest> chain = wire::digest_from_wire(request.kept_chain());
       if (!chain) return failure(ErrorCode::invalid_input, "kept_chain is not a digest of 32 bytes");
-      kept = JournalHead{RoomSeq{request.kept_room_seq()}, *chain};
+      // None, of programs of before there were any, is as good as a false one.
+      const Result<Digest> seal = wire::digest_from_wire(request.kept_seal());
+      kept = Witness{{RoomSeq{request.kept_room_seq()}, *chain}, seal ? *seal : Digest{}};
     }
     const AuthorId author{request.resume_author()};
     if (Result<void> may = host.resume(author, digest_of_secret(request.secret()), kept, role); !may) return tl::unexpected(may.error());

@@ -1,9 +1,11 @@
 // A hand of a test, in its process: a client with a replica that cuts without end.
 #pragma once
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
 #include <thread>
+#include <utility>
 
 #include "tests/support/scenes/bones.hpp"
 #include "tests/support/scenes/random.hpp"
@@ -34,6 +36,7 @@ class Hand {
  private:
   void cut() {
     constexpr std::uint64_t kMostWaiting = 40;
+    auto before = std::chrono::steady_clock::now();
     while (!over_) {
       if (sent_ >= surgeon_.own() + kMostWaiting) {
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -43,7 +46,10 @@ class Hand {
       const Vec3 at{random_.between(-5, 5), random_.between(-5, 5), random_.between(-0.5, 0.5)};
       Cut cut = straight_cut(burr_, at, at, {0, 0, -1}, sent_ + 1);
       cut.author = surgeon_.author();
-      sent_at_[cut.author_seq % sent_at_.size()] = std::chrono::steady_clock::now().time_since_epoch().count();
+      const auto now = std::chrono::steady_clock::now();
+      const auto took = std::chrono::duration_cast<std::chrono::microseconds>(now - std::exchange(before, now));
+      cut.path_us = static_cast<std::uint32_t>(std::min<std::int64_t>(took.count(), 20'000));
+      sent_at_[cut.author_seq % sent_at_.size()] = now.time_since_epoch().count();
       if (surgeon_.session().send(cut)) ++sent_;
       std::this_thread::sleep_for(apart_);
     }

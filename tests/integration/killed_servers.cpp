@@ -65,6 +65,8 @@ KilledServers kill_servers(int kills, std::uint64_t seed) {
     stage.server().signal(SIGKILL);
     (void)stage.server().wait(10s);
     if (acknowledged() == before) ++report.killed_idle;
+    for (const auto& hand : hands)
+      if (const std::string why = hand->surgeon().rejected(); !why.empty()) report.fault = "an honest cut was rejected: " + why;
     const auto started = std::chrono::steady_clock::now();
     stage.start_server(again);
     listens = std::chrono::steady_clock::now();

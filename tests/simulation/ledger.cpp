@@ -188,6 +188,10 @@ void Ledger::check_rows(std::span<const RoomRow> rows) {
       hands.cuts[row.place] = &cut->cut;
       check_cut(row, hands, cut->cut.author, cut->cut);
     } else if (const auto* rejection = std::get_if<RejectionRow>(&row.what)) {
+      // All these hands are honest.
+      check(rejection->reason != Rejection::time, Invariant::served,
+            "row " + number(row.place) + " says that " + whose(rejection->author, rejection->author_seq) +
+                " took longer than time has passed");
       kept = {EventKind::cut, true, rejection->author, rejection->author_seq, {}};
       check_author(row, rejection->author, rejection->author_seq, rejection->bytes, newest);
       if (rejection->reason == Rejection::lease) {

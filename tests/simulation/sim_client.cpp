@@ -212,7 +212,7 @@ void SimClient::line_ended(const Ending& ending) {
 void SimClient::come_again() {
   later(backoff_->next(), [this] {
     SimServer::JoinRequest request{.name = {}, .resume = room_->author, .secret = room_->secret, .kept = {}};
-    if (const auto& kept = reader_->kept()) request.kept = JournalHead{kept->room_seq, kept->chain};
+    if (const auto& kept = reader_->kept()) request.kept = Witness{{kept->room_seq, kept->chain}, kept->seal};
     ask<SimServer::Joined>([this, request](auto answer) { server_.join(request, answer); }, kLaterAnswers,
                            [this](const Result<SimServer::Joined>& again) {
                              if (!again && again.error().code == ErrorCode::unavailable) return come_again();

@@ -257,6 +257,7 @@ RoomKeeper::Options SimServer::options() {
   options.tools = few_tools();
   options.journal.disk = &disk_;
   options.journal.page_bytes = static_cast<int>(std::max<std::size_t>(1024, condition_.sector_bytes));
+  options.random = [](std::span<std::uint8_t> key) { std::ranges::fill(key, 7); };
   options.journal.durable = condition_.breakage != Breakage::forgetful;
   return options;
 }
@@ -284,7 +285,7 @@ void SimServer::boot() {
   made_ = true;
   const Digest opened = kept->room.room_hash();
   keeper_ = std::move(kept->keeper);
-  began_ = kept->room.time();
+  began_ = reopened_time(kept->room);
   booted_ = time_.now();
   jumped_ = {};
   host_ = driven_host(std::move(kept->room), *keeper_);

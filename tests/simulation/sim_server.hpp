@@ -71,7 +71,7 @@ class SimServer {
     std::string name;
     AuthorId resume;                                // null: somebody new
     std::string secret;
-    std::optional<JournalHead> kept;
+    std::optional<Witness> kept;
   };
   struct Joined {
     AuthorId author;

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <thread>
 
+#include "haptic_client/control/room_watch.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/room/kept_room.hpp"
@@ -63,7 +64,7 @@ TEST_F(KeeperTest, OnceClosedItSaysSoAndTouchesNothing) {
   note(keeper.people());
   note(keeper.forget(1));
   note(keeper.forget_old());
-  note(keeper.check_witness(head));
+  note(keeper.check_witness(keeper.witness()));
   note(keeper.has_head(head));
   note(keeper.read(RoomSeq{1}, head.place, [](const RoomRow&) { return true; }));
   note(keeper.export_person(1, [](const std::string&) { return true; }));
@@ -80,6 +81,52 @@ TEST_F(KeeperTest, OnceClosedItSaysSoAndTouchesNothing) {
   EXPECT_EQ(keeper.head(), head);
   EXPECT_EQ(disk_.image(), before);
   EXPECT_EQ(disk_.counts().writes, counts.writes);
+}
+
+TEST_F(KeeperTest, BelievesWhatItSealedAndNothingElseOfWhatItLacks) {
+  KeptCuts kept(kFile, &disk_, "femur");
+  kept.cut(2);
+  const Witness early = kept.keeper->witness();
+  const MemoryDisk::Image image = disk_.image();
+  kept.cut(3);
+  const Witness late = kept.keeper->witness();
+  ASSERT_GT(late.head.place, early.head.place);
+  EXPECT_TRUE(kept.keeper->check_witness(early));
+  EXPECT_TRUE(kept.keeper->check_witness({early.head, {}})) << "what it has needs no seal";
+  Witness other = early;
+  other.head.chain.bytes[0] ^= 1;
+  EXPECT_EQ(kept.keeper->check_witness(other).error().code, ErrorCode::invalid_input) << "another history";
+
+  // The disk forgets what it said it had.
+  kept.keeper.reset();
+  disk_.load(image);
+  kept.open(kFile);
+  Witness far = late;
+  far.head.place = RoomSeq{1'000'000};
+  for (const Witness& lie : {Witness{late.head, {}}, Witness{late.head, early.seal}, far}) {
+    const Result<void> told = kept.keeper->check_witness(lie);
+    ASSERT_FALSE(told);
+    EXPECT_EQ(told.error().code, ErrorCode::invalid_input);
+    EXPECT_THAT(told.error().message, HasSubstr("has to join anew"));
+  }
+  kept.cut(1);
+  kept.keeper.reset();
+  disk_.load(image);
+  kept.open(kFile);
+  EXPECT_EQ(kept.keeper->check_witness(late).error().code, ErrorCode::unavailable);
+  EXPECT_FALSE(kept.keeper->write(plain_rows(kept.keeper->head().place, 1))) << "rows were lost: it takes no more";
+}
+
+TEST_F(KeeperTest, TimeGoesOnByMoreThanHandsWorkInSilence) {
+  static_assert(std::chrono::duration<double>(kTimeAway).count() > haptic::RoomWatch::kSilence_s);
+  KeptCuts kept(kFile, &disk_, "femur");
+  EXPECT_EQ(reopened_time(Room(test_block())), 0ns) << "a new one";
+  kept.cut(3);
+  const auto at = kept.room->time();
+  kept.keeper.reset();
+  kept.open(kFile);
+  EXPECT_EQ(kept.room->time(), at);
+  EXPECT_EQ(reopened_time(*kept.room), at + kTimeAway);
 }
 
 TEST_F(KeeperTest, IsReadWhileItIsWritten) {
