@@ -47,7 +47,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
 
   UploadStream(Rooms& rooms, v1::UploadCaseResponse* response) : rooms_(rooms), store_(rooms.store()), response_(response) {}
 
-  // gRPC holds the stream until OnDone; the thread for what takes long, the gate and the alarm may hold it longer.
+  // gRPC holds the stream until OnDone; the thread that looks cases through, the gate and the alarm may hold it longer.
   static UploadStream* launch(const std::shared_ptr<UploadStream>& stream, const Result<Caller>& caller) {
     stream->self_ = stream;
     stream->start(caller);
@@ -58,10 +58,10 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
     std::unique_lock lock(mutex_);
     if (finished_ || !upload_) return;
     if (!ok) {
-      // Taken apart and looked through by the thread for what takes long.
+      // Taken apart and looked through by the thread for that.
       whole_ = true;
       lock.unlock();
-      return rooms_.jobs.run([this, keep = self_] { keep_case(); });
+      return rooms_.checks.run([this, keep = self_] { keep_case(); });
     }
     newest_ = Clock::now();
     Result<void> added = request_.data().size() <= kMostPiece
@@ -142,7 +142,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
                  : "the upload took longer than the " + seconds + " that it may; send it again over a faster line"});
   }
 
-  // [thread for what takes long]
+  // [thread that looks cases through]
   void keep_case() {
     // A sender who is gone, or a server that stops: nobody waits for it.
     const auto stop = [this] { return cancelled_ || rooms_.ending(); };

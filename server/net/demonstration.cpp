@@ -1,6 +1,7 @@
 #include "server/net/demonstration.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
@@ -80,6 +81,11 @@ class Demonstration final : public SessionSink, public std::enable_shared_from_t
     body_ = BodyId{said.complete().bodies(0)};
   }
   void set_leaves(std::vector<FieldLeaf>) override {}
+  // Decided before its session was open.
+  void hold(const wire::SessionRow& supervised) override {
+    const std::lock_guard lock(mutex_);
+    stopped_ = !supervised.supervision.may_cut();
+  }
   void offer(RoomSeq, const Bytes&) override {}
   void offer(RoomSeq, const Bytes&, const wire::SessionRow& row) override {
     const std::lock_guard lock(mutex_);
@@ -117,39 +123,47 @@ class Demonstration final : public SessionSink, public std::enable_shared_from_t
     wake_.notify_one();
   }
 
-  // The next cut once it is due; nothing at the end.
-  std::optional<Recorded> next() {
+  struct Step {
+    enum class What { cut, rest, end } what;
+    Recorded cut{};
+  };
+  // Waits for the next cut that is due, for the end, or for the tool to come to rest: at once where it is stopped, else at
+  // `seen_at_work`, until when it is seen at work; null: it rests.
+  Step next(const std::optional<Clock::time_point>& seen_at_work) {
     std::unique_lock lock(mutex_);
     while (!over_) {
       const bool may_go_on = !stopped_ && undecided_.size() < kMostUndecided;
       const bool all_made = again_.empty() && made_ == cuts_.size();
-      if (all_made && undecided_.empty()) return std::nullopt;
-      if (!may_go_on || all_made) {
+      if (all_made && undecided_.empty()) break;
+      const Clock::time_point now = Clock::now();
+      const bool has_next = may_go_on && !all_made;
+      if (has_next && now >= due_) return {Step::What::cut, next_cut()};
+      if (seen_at_work && (stopped_ || now >= *seen_at_work)) return {Step::What::rest};
+      if (has_next || seen_at_work)
+        wake_.wait_until(lock, std::min(has_next ? due_ : Clock::time_point::max(), seen_at_work.value_or(Clock::time_point::max())));
+      else
         wake_.wait(lock);
-        continue;
-      }
-      if (Clock::now() < due_) {
-        wake_.wait_until(lock, due_);
-        continue;
-      }
-      if (!again_.empty()) {
-        const std::size_t which = again_.front();
-        again_.pop_front();
-        undecided_.push_back(which);
-        // Not faster than a tool goes: a lease allows only so much.
-        due_ = Clock::now() + at_speed(std::chrono::microseconds(cuts_[which].cut.path_us));
-        return stamped(which);
-      }
-      const std::size_t which = made_++;
+    }
+    return {Step::What::end};
+  }
+  // Under mutex_.
+  Recorded next_cut() {
+    if (!again_.empty()) {
+      const std::size_t which = again_.front();
+      again_.pop_front();
       undecided_.push_back(which);
-      if (made_ < cuts_.size()) {
-        const Clock::duration apart = std::min<Clock::duration>(cuts_[made_].at - cuts_[which].at, kLongestPause);
-        due_ = std::max(due_, Clock::now()) +
-               at_speed(std::max<Clock::duration>(apart, std::chrono::microseconds(cuts_[made_].cut.path_us)));
-      }
+      // Not faster than a tool goes: a lease allows only so much.
+      due_ = Clock::now() + at_speed(std::chrono::microseconds(cuts_[which].cut.path_us));
       return stamped(which);
     }
-    return std::nullopt;
+    const std::size_t which = made_++;
+    undecided_.push_back(which);
+    if (made_ < cuts_.size()) {
+      const Clock::duration apart = std::min<Clock::duration>(cuts_[made_].at - cuts_[which].at, kLongestPause);
+      due_ = std::max(due_, Clock::now()) +
+             at_speed(std::max<Clock::duration>(apart, std::chrono::microseconds(cuts_[made_].cut.path_us)));
+    }
+    return stamped(which);
   }
   [[nodiscard]] Clock::duration at_speed(Clock::duration time) const {
     return std::chrono::duration_cast<Clock::duration>(time / speed_);
@@ -167,11 +181,19 @@ class Demonstration final : public SessionSink, public std::enable_shared_from_t
 
   void run() {
     Player tool(Playback{}, {});
-    const Clock::time_point began = Clock::now();
-    while (const std::optional<Recorded> cut = next()) {
-      host_.queue_cut(shared_from_this(), cut->cut, Clock::now());
-      if (std::optional<CuttingState> state = tool.see(cut->cut, host_.tools(), Clock::now() - began))
+    std::optional<Clock::time_point> seen_at_work;
+    for (Step step = next({}); step.what != Step::What::end; step = next(seen_at_work)) {
+      if (step.what == Step::What::rest) {
+        for (CuttingState& state : tool.at_rest()) host_.offer_state(std::move(state));
+        seen_at_work.reset();
+        continue;
+      }
+      const Clock::time_point now = Clock::now();
+      host_.queue_cut(shared_from_this(), step.cut.cut, now);
+      if (std::optional<CuttingState> state = tool.see(step.cut.cut, host_.tools(), now.time_since_epoch())) {
         host_.offer_state(std::move(*state));
+        seen_at_work = now + Player::kSeenAfterCut;
+      }
     }
     host_.leave(*this);
     std::shared_ptr<OpenStream> watched;  // let go of without the lock, which its end takes
@@ -205,7 +227,8 @@ struct Recording {
   std::vector<Tool> tools;  // that they are made with
 };
 
-Result<Recording> read_recording(Rooms& rooms, OpenRoom& in, const WhatToShow& what) {
+// `over`: nobody waits for it any more.
+Result<Recording> read_recording(Rooms& rooms, OpenRoom& in, const WhatToShow& what, const std::atomic<bool>& over) {
   std::map<RoomSeq, Recorded> cuts;
   std::set<RoomSeq> undone;
   std::map<Digest, Tool> tools;
@@ -221,7 +244,7 @@ Result<Recording> read_recording(Rooms& rooms, OpenRoom& in, const WhatToShow& w
       tools.emplace(added->tool.hash(), added->tool);
     }
     too_many = cuts.size() > Demonstrations::kMostCuts;
-    return !too_many;
+    return !too_many && !over && !rooms.ending();
   };
   const Result<RoomGenesis> genesis = rooms.read(what.room.empty() ? in.name : what.room, what.to, take);
   if (!genesis) return tl::unexpected(genesis.error());
@@ -264,8 +287,10 @@ Result<Shown> Demonstrations::begin(Rooms& rooms, OpenRoom& in, AuthorId by, con
   if (!(what.speed > 0 && what.speed <= kMostSpeed))
     return failure(ErrorCode::invalid_input,
                    "the speed is not more than 0 and at most " + std::to_string(static_cast<int>(kMostSpeed)));
-  Result<Recording> recording = read_recording(rooms, in, what);
+  if (const std::optional<std::string> why = rooms.draining()) return failure(ErrorCode::unavailable, *why);
+  Result<Recording> recording = read_recording(rooms, in, what, over_);
   if (!recording) return tl::unexpected(recording.error());
+  if (over_ || rooms.ending()) return failure(ErrorCode::unavailable, "the room is closed");
   if (recording->cuts.empty()) return failure(ErrorCode::not_found, "there is no cut to show");
   RoomHost& host = in.host();
   for (const Tool& tool : recording->tools)

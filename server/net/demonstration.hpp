@@ -1,6 +1,7 @@
 // Cuts of a journal that happen again in a live room: made by a tool of its own, judged like anybody's, seen and heard,
 // so that hands can be guided along it.
 #pragma once
+#include <atomic>
 #include <cstddef>
 #include <memory>
 #include <mutex>
@@ -40,20 +41,22 @@ class Demonstrations {
   Demonstrations(const Demonstrations&) = delete;
   Demonstrations& operator=(const Demonstrations&) = delete;
 
-  // Reads the journal first, which takes a while. Cuts that were taken back by `to` are not shown. Errors:
+  // Reads the journal first, which takes a while; given up where all are to end. Cuts that were taken back by `to` are not shown. While
+  // the author is stopped or without their tool, the tool is seen at rest. Errors:
   // invalid_input (the speed; another case; more than kMostCuts), not_found (no such room, no cut there), unavailable
-  // (that room is not kept, kMost go on), denied (`caller` may not any more), and those of reading. It ends once the caller may
+  // (that room is not kept, kMost go on, the room is closed or the server is to stop), denied (`caller` may not any more), and
+  // those of reading. It ends once the caller may
   // not start one any more: who is revoked leaves nothing going on.
   [[nodiscard]] Result<Shown> begin(Rooms& rooms, OpenRoom& in, AuthorId by, const Caller& caller, const WhatToShow& what);
   // Error not_found: no demonstration of that author goes on; of one that was ended, why.
   [[nodiscard]] Result<void> end(AuthorId demonstrator);
-  // For good.
+  // For good, also of those that are about to begin: the room is closed, or the server is to stop. They are over when it returns.
   void end_all();
 
  private:
   std::mutex mutex_;  // never held with another that is taken within, but that of a demonstration
   std::vector<std::shared_ptr<Demonstration>> going_on_;  // shared with the cuts that they have queued
-  bool over_ = false;
+  std::atomic<bool> over_{false};
 };
 
 }  // namespace osteon

@@ -179,8 +179,8 @@ class PeopleServiceImpl final : public PeopleBase {
     if (!request->room().empty())
       if (const Result<Caller> there = caller_in(rooms_, *context, request->room(), "/osteon.v1.PeopleService/Demonstrate"); !there)
         return refuse(reactor, status_of(there.error()));
-    // A journal is read, which takes a while.
-    rooms_.files.run([this, room, reactor, request, response, caller = *caller] {
+    // A journal is read, which takes a while: others do not wait for it.
+    rooms_.recordings.run([this, room, reactor, request, response, caller = *caller] {
       const Result<Shown> shown = room->demonstrations().begin(rooms_, *room, AuthorId{request->author()}, caller,
                                                                {.room = request->room(),
                                                                 .of = AuthorId{request->of_author()},
@@ -201,7 +201,8 @@ class PeopleServiceImpl final : public PeopleBase {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     const std::shared_ptr<OpenRoom> room = called(*context, reactor, request->author());
     if (!room) return reactor;
-    rooms_.files.run([room, reactor, which = AuthorId{request->demonstrator()}] {
+    // Not behind those that are about to begin.
+    room->host().run_slowly([room, reactor, which = AuthorId{request->demonstrator()}] {
       const Result<void> ended = room->demonstrations().end(which);
       reactor->Finish(ended ? Status::OK : status_of(ended.error()));
     });

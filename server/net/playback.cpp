@@ -1,11 +1,6 @@
 #include "server/net/playback.hpp"
 
 namespace osteon {
-namespace {
-
-constexpr std::chrono::milliseconds kSeenAfterCut{250};
-
-}  // namespace
 
 std::optional<RoomRow> Player::take(Time now) {
   // From the first call on, so that nothing has happened before anyone could watch.
@@ -22,7 +17,7 @@ std::optional<CuttingState> Player::see(const Cut& cut, const ToolBox& tools, Ti
   if (!tool) return {};
   CuttingState state;
   state.author = cut.author;
-  state.state_seq = cut.author_seq;
+  state.state_seq = ++states_;
   state.tool_name = tool->tool.name;
   state.pose_bone_tool = state.pose_bone_device = dequantise(cut.path.back());
   state.spindle_rpm = cut.spindle_rpm;
@@ -35,6 +30,7 @@ std::vector<CuttingState> Player::at_rest(Time now) {
   std::vector<CuttingState> rested;
   for (auto& [author, seen] : seen_) {
     if (now - seen.last_cut < kSeenAfterCut) continue;
+    seen.state.state_seq = ++states_;
     seen.state.phase = CuttingPhase::idle;
     seen.state.spindle_rpm = 0;
     rested.push_back(seen.state);

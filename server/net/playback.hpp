@@ -1,6 +1,7 @@
 // What happened in one room happening again in another: which rows are due, and where their tools are seen.
 #pragma once
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <optional>
@@ -19,10 +20,11 @@ struct Playback {
   double speed = 1.0;                            // times as fast as it happened; 0: nothing happens
 };
 
-// One thread, the tick's. `now`: since any start, never falls.
+// One thread: the tick's, or that of a demonstration. `now`: since any start, never falls.
 class Player {
  public:
   using Time = std::chrono::nanoseconds;
+  static constexpr std::chrono::milliseconds kSeenAfterCut{250};  // so long a tool is seen at work after its newest cut
   // `from`: the time of the room that is shown at which it begins, with the first call of take().
   Player(Playback playback, Time from) : playback_(std::move(playback)), from_(from) {}
 
@@ -34,10 +36,13 @@ class Player {
     upcoming_.reset();
   }
 
-  // A recorded cut says where its tool was: nothing of a tool that nobody knows.
+  // A recorded cut says where its tool was: nothing of a tool that nobody knows. Its number rises with every state, also with
+  // those at rest, as readers take only newer ones.
   [[nodiscard]] std::optional<CuttingState> see(const Cut& cut, const ToolBox& tools, Time now);
   // Idle, once: tools that have not cut for a while. What they did between two cuts is not recorded.
   [[nodiscard]] std::vector<CuttingState> at_rest(Time now);
+  // The same at once, of all that are seen at work: they were stopped.
+  [[nodiscard]] std::vector<CuttingState> at_rest() { return at_rest(Time::max()); }
 
  private:
   struct Seen {
@@ -49,6 +54,7 @@ class Player {
   std::optional<Time> began_;
   std::optional<RoomRow> upcoming_;
   std::map<AuthorId, Seen> seen_;
+  std::uint64_t states_ = 0;
 };
 
 }  // namespace osteon

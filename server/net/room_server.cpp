@@ -191,8 +191,7 @@ std::map<std::string, RoomSummary> RoomServer::stop_all() {
   impl_->server->Shutdown(std::chrono::system_clock::now() + std::chrono::milliseconds(500));
   impl_->server->Wait();
   std::map<std::string, RoomSummary> summaries = impl_->rooms->close_all();
-  impl_->rooms->jobs.stop();
-  impl_->rooms->files.stop();
+  impl_->rooms->end_calls();
   impl_->server.reset();
   return summaries;
 }

@@ -168,16 +168,18 @@ void OpenRoom::keep_up(const std::function<bool()>& stop) {
 Rooms::Rooms(RoomsOptions options) : options_(std::move(options)), cases_(options_.case_memory_bytes) {
   OSTEON_CHECK(!options_.cases.empty());
   for (const ServedCase& served : options_.cases) cases_.keep(served);
-  jobs.start();
-  files.start();
+  for (JobThread* calls : {&jobs, &files, &recordings, &checks}) calls->start();
   upkeep_ = std::thread([this] { run_upkeep(); });
 }
 
 Rooms::~Rooms() {
   begin_end();
-  jobs.stop();
-  files.stop();
+  end_calls();
   (void)close_all();
+}
+
+void Rooms::end_calls() {
+  for (JobThread* calls : {&jobs, &files, &recordings, &checks}) calls->stop();
 }
 
 void Rooms::run_upkeep() {
@@ -198,7 +200,10 @@ void Rooms::begin_drain(std::chrono::milliseconds again, const std::string& why)
     const std::lock_guard lock(mutex_);
     draining_ = why;
   }
-  for (const std::shared_ptr<OpenRoom>& room : open_rooms()) room->host().ask_to_redial(again, why);
+  const std::vector<std::shared_ptr<OpenRoom>> rooms = open_rooms();
+  for (const std::shared_ptr<OpenRoom>& room : rooms) room->host().ask_to_redial(again, why);
+  // A demonstration is a session that nobody could ask.
+  for (const std::shared_ptr<OpenRoom>& room : rooms) room->demonstrations().end_all();
 }
 
 std::optional<std::string> Rooms::draining() const {

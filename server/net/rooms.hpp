@@ -153,16 +153,20 @@ class Rooms {
   Result<RoomReport> verify(const std::string& name);
   Result<JournalHead> back_up(const std::string& name, const std::string& file_name, std::filesystem::path& file);
 
-  // From now on nobody is let in. `again`: when those who are asked to leave may come again.
+  // From now on nobody is let in, and demonstrations are over. `again`: when those who are asked to leave may come again.
   void begin_drain(std::chrono::milliseconds again, const std::string& why);
   [[nodiscard]] std::optional<std::string> draining() const;  // why nobody is let in
   void begin_end();  // gives up what takes long, and does no upkeep any more
   [[nodiscard]] bool ending() const { return ending_; }
   [[nodiscard]] std::map<std::string, RoomSummary> close_all();  // those that are open stay so in the folder's list
 
-  // For calls that take long.
-  JobThread jobs;   // whatever changes the rooms
-  JobThread files;  // what only reads a case's files
+  // For calls that take long: a thread for each kind, so that a slow one holds up none but its own. What concerns one room alone runs
+  // on that room's thread for slow requests.
+  JobThread jobs;        // whatever changes the rooms: one at a time, and opening one may take minutes
+  JobThread files;       // what everybody asks for who comes: the lists of rooms and of cases, a case's files piece by piece
+  JobThread recordings;  // journals that are read for demonstrations; that of a closed room waits until no room is being changed
+  JobThread checks;      // uploaded cases, each looked through by a process, for as long as IntakeQuota lets it
+  void end_calls();      // after those that wait; later ones run where they are made
   RefusalCounts refusals;  // of all doors
   Gate* gate = nullptr;    // before every call; null: plain text, and everybody may do anything. It outlives the rooms' calls
 

@@ -54,9 +54,12 @@ TEST(Player, ATrailOfCutsIsSeenAtWorkAndThenOnceAtRest) {
   Player player(of({}, 1.0), 0s);
   const auto tools = builtin_tool_box();
   const std::vector<Cut> cuts = test::strokes(AuthorId{3}, 2, 1);
+  std::uint64_t newest = 0;
   for (int i = 0; i < 2; ++i) {
     const auto seen = player.see(cuts[static_cast<std::size_t>(i)], *tools, i * 200ms);
     ASSERT_TRUE(seen);
+    EXPECT_GT(seen->state_seq, newest);
+    newest = seen->state_seq;
     EXPECT_EQ(seen->phase, CuttingPhase::cutting);
     EXPECT_EQ(seen->author, AuthorId{3});
     EXPECT_TRUE(player.at_rest(i * 200ms + 100ms).empty());
@@ -67,7 +70,13 @@ TEST(Player, ATrailOfCutsIsSeenAtWorkAndThenOnceAtRest) {
   EXPECT_EQ(rested[0].phase, CuttingPhase::idle);
   EXPECT_EQ(rested[0].spindle_rpm, 0.0);
   EXPECT_EQ(rested[0].tool_name, "drill-3.2");
+  EXPECT_GT(rested[0].state_seq, newest) << "readers take only newer states";
   EXPECT_TRUE(player.at_rest(600ms).empty());
+  Cut next = cuts[1];
+  ++next.author_seq;
+  const auto again = player.see(next, *tools, 650ms);
+  ASSERT_TRUE(again);
+  EXPECT_GT(again->state_seq, rested[0].state_seq);
   Cut unknown = cuts[0];
   unknown.tool = Digest{};
   EXPECT_FALSE(player.see(unknown, *tools, 700ms));

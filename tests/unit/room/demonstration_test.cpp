@@ -1,0 +1,269 @@
+// A recording that is cut again in a live room: seen at rest while it is stopped, over when the server is to stop, and in
+// nobody's way while its journal is read.
+#include <grpcpp/grpcpp.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <future>
+#include <mutex>
+#include <thread>
+
+#include "osteon/v1/cases.grpc.pb.h"
+#include "osteon/v1/people.grpc.pb.h"
+#include "osteon/v1/rooms.grpc.pb.h"
+#include "server/intake/case_archive.hpp"
+#include "server/net/gate.hpp"
+#include "server/net/room_server.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/unit/room/kept_room.hpp"
+#include "tests/unit/room/members.hpp"
+
+namespace osteon::test {
+namespace {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+
+// Every state of a tool that viewers are told, of any author.
+class SeenTools final : public CuttingSink {
+ public:
+  void offer(const ShownNow& now) override {
+    v1::WatchCuttingResponse told;
+    EXPECT_TRUE(told.ParseFromString(*now.tools));
+    const std::lock_guard lock(mutex_);
+    for (const v1::CuttingState& state : told.states()) {
+      std::vector<v1::CuttingState>& of_author = states_[state.author()];
+      if (of_author.empty() || of_author.back().SerializeAsString() != state.SerializeAsString()) of_author.push_back(state);
+    }
+  }
+  void end(const std::string&) override {}
+  std::size_t waiting() const override { return 0; }
+  std::vector<v1::CuttingState> of(AuthorId author) const {
+    const std::lock_guard lock(mutex_);
+    const auto seen = states_.find(author.value);
+    return seen == states_.end() ? std::vector<v1::CuttingState>{} : seen->second;
+  }
+  bool at_work(AuthorId author) const {
+    const auto seen = of(author);
+    return !seen.empty() && seen.back().phase() == v1::CUTTING_PHASE_CUTTING && seen.back().spindle_rpm() > 0;
+  }
+  bool at_rest(AuthorId author) const {
+    const auto seen = of(author);
+    return !seen.empty() && seen.back().phase() == v1::CUTTING_PHASE_IDLE && seen.back().spindle_rpm() == 0;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<std::uint64_t, std::vector<v1::CuttingState>> states_;
+};
+
+// A server with the rooms "ward", open, and "shown" and "other", closed, each with a recording of 240 cuts in 2.4 s.
+class DemonstrationTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(test_block().save(dir_ / "case"));
+    fs::create_directories(dir_ / "rooms");
+    for (const std::string name : {"ward", "shown", "other"}) {
+      KeptCuts kept(dir_ / "rooms" / (name + ".journal"), nullptr, name);
+      kept.cut(300);
+      ASSERT_TRUE(kept.keeper->close());
+    }
+    // A program that takes long to look a case through, and says when it begins.
+    std::ofstream(dir_ / "checker") << "#!/bin/sh\n: > '" << (dir_ / "checks").string() << "'\nexec sleep 60\n";
+    fs::permissions(dir_ / "checker", fs::perms::owner_all);
+    auto store = CaseStore::open(dir_ / "cases", dir_ / "checker", {});
+    ASSERT_TRUE(store.has_value()) << store.error().message;
+    RoomsOptions options{.cases = {{test_block(), dir_ / "case"}}, .folder = dir_ / "rooms", .store = std::move(*store)};
+    auto rooms = std::make_unique<Rooms>(std::move(options));
+    ASSERT_TRUE(rooms->resume("ward"));
+    auto started = RoomServer::start(std::move(rooms), "127.0.0.1:0");
+    ASSERT_TRUE(started.has_value()) << started.error().message;
+    server_ = std::move(*started);
+    room_ = *server_->rooms().find("ward");
+    instructor_ = room_->host().join(MemberKind::watcher, "Ada", {}, Role::instructor).value();
+    room_->host().watch_cutting(seen_);
+  }
+  void TearDown() override {
+    if (room_) room_->host().leave(seen_);
+    room_.reset();
+    server_.reset();
+  }
+  Result<Shown> show(double speed, const std::string& of = {}) {
+    return room_->demonstrations().begin(server_->rooms(), *room_, instructor_, {}, {.room = of, .of = {}, .from = {}, .to = {}, .speed = speed});
+  }
+  void decide(AuthorId about, const Supervision& word) {
+    std::promise<Result<RoomEvent>> answer;
+    room_->host().queue_event([&](Room& room) { return room.supervise(instructor_, about, word); },
+                              [&](const Result<RoomEvent>& decided) { answer.set_value(decided); });
+    const Result<RoomEvent> decided = answer.get_future().get();
+    ASSERT_TRUE(decided) << decided.error().message;
+  }
+  std::uint64_t committed() { return room_->host().bone_status().counts.committed; }
+
+  TempDir dir_;
+  std::unique_ptr<RoomServer> server_;
+  std::shared_ptr<OpenRoom> room_;  // shared with the rooms
+  AuthorId instructor_;
+  SeenTools seen_;
+};
+
+// Its cuts are so close together that its tool is not seen at rest between two.
+TEST_F(DemonstrationTest, IsSeenAtRestWhileItIsStoppedOrWithoutItsTool) {
+  const Result<Shown> shown = show(0.06);
+  ASSERT_TRUE(shown) << shown.error().message;
+  const AuthorId who = shown->demonstrator;
+  for (const Supervision& word : {Supervision{.stopped = true}, Supervision{.taken_by = instructor_}}) {
+    ASSERT_TRUE(wait_until([&] { return seen_.at_work(who); }, kPatience));
+    decide(who, word);
+    ASSERT_TRUE(wait_until([&] { return seen_.at_rest(who); }, kPatience)) << "everybody goes on hearing it";
+    // As long as three cuts take.
+    const std::uint64_t cuts = committed();
+    const auto then = seen_.of(who);
+    std::this_thread::sleep_for(500ms);
+    EXPECT_TRUE(seen_.at_rest(who));
+    EXPECT_EQ(seen_.of(who).size(), then.size());
+    EXPECT_EQ(committed(), cuts);
+    decide(who, {});
+    ASSERT_TRUE(wait_until([&] { return seen_.at_work(who); }, kPatience)) << "it goes on";
+    EXPECT_TRUE(wait_until([&] { return committed() > cuts; }, kPatience));
+  }
+  // Whoever takes only newer states than those that they have takes these.
+  const auto all = seen_.of(who);
+  for (std::size_t i = 1; i < all.size(); ++i) EXPECT_GT(all[i].state_seq(), all[i - 1].state_seq());
+}
+
+TEST_F(DemonstrationTest, IsSeenAtRestBetweenTwoCutsThatAreFarApart) {
+  const Result<Shown> shown = show(0.01);
+  ASSERT_TRUE(shown) << shown.error().message;
+  const AuthorId who = shown->demonstrator;
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_TRUE(wait_until([&] { return seen_.at_work(who); }, kPatience));
+    EXPECT_TRUE(wait_until([&] { return seen_.at_rest(who); }, kPatience));
+  }
+}
+
+TEST_F(DemonstrationTest, EndsWhenTheServerIsToStop) {
+  const Result<Shown> shown = show(0.06);
+  ASSERT_TRUE(shown) << shown.error().message;
+  ASSERT_TRUE(wait_until([&] { return seen_.at_work(shown->demonstrator); }, kPatience));
+  int waits = 0;
+  server_->drain(1h, [&](std::chrono::milliseconds time) {
+    std::this_thread::sleep_for(time);
+    return ++waits > 100;
+  });
+  EXPECT_EQ(waits, 0) << "nobody was there who would have had to leave";
+  EXPECT_EQ(room_->host().health().sessions, 0u);
+  const auto newest = [&] { return room_->host().room_seq(); };
+  EXPECT_TRUE(wait_until([&] { return seen_.at_rest(shown->demonstrator); }, kPatience));
+  const RoomSeq then = newest();
+  std::this_thread::sleep_for(500ms);
+  EXPECT_EQ(newest(), then);
+  // Nor does another begin, whose journal would be read first.
+  for (const std::string room : {"", "nowhere"}) {
+    const Result<Shown> late = show(1.0, room);
+    ASSERT_FALSE(late);
+    EXPECT_EQ(late.error().code, ErrorCode::unavailable) << late.error().message;
+  }
+}
+
+// Calls that everybody makes who comes.
+class CallsOfOthers {
+ public:
+  explicit CallsOfOthers(const wire::JoinedRoom& room) : room_(room) {}
+  // Empty: all were answered.
+  std::string fail() const {
+    v1::ListRoomsResponse rooms;
+    v1::ListCasesResponse cases;
+    const grpc::Status listed = ask([&](auto* context) { return v1::RoomsService::NewStub(room_.channel)->ListRooms(context, {}, &rooms); });
+    const grpc::Status asked = ask([&](auto* context) { return v1::CaseService::NewStub(room_.channel)->ListCases(context, {}, &cases); });
+    const grpc::Status fetched = ask([&](auto* context) {
+      v1::GetCaseRequest request;
+      request.set_case_hash(wire::to_wire(room_.case_hash));
+      const auto reader = v1::RoomService::NewStub(room_.channel)->GetCase(context, request);
+      v1::GetCaseResponse piece;
+      while (reader->Read(&piece)) continue;
+      return reader->Finish();
+    });
+    for (const grpc::Status* status : {&listed, &asked, &fetched})
+      if (!status->ok()) return status->error_message();
+    return "";
+  }
+  template <class Call>
+  static grpc::Status ask(Call call) {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kPatience);
+    return call(&context);
+  }
+
+ private:
+  const wire::JoinedRoom room_;
+};
+
+TEST_F(DemonstrationTest, NobodyWaitsUntilItsJournalIsRead) {
+  const wire::JoinedRoom viewer = join(server_->address(), wire::ClientKind::viewer, "ward");
+  // Somebody opens a large room: until that is done no other closed room's journal can be read.
+  std::promise<void> opening, done;
+  std::thread operator_of_rooms([&] {
+    const auto opened = server_->rooms().resume("other", [&, told = false](double) mutable {
+      if (std::exchange(told, true)) return;
+      opening.set_value();
+      done.get_future().wait();
+    });
+    EXPECT_TRUE(opened) << opened.error().message;
+  });
+  opening.get_future().wait();
+  v1::DemonstrateResponse response;
+  grpc::Status shown;
+  std::thread of_instructor([&] {
+    v1::DemonstrateRequest request;
+    request.set_author(viewer.author.value);
+    request.set_room("shown");
+    request.set_speed(1.0);
+    grpc::ClientContext context;
+    shown = v1::PeopleService::NewStub(viewer.channel)->Demonstrate(&context, request, &response);
+  });
+  const CallsOfOthers others(viewer);
+  std::string failed;
+  for (int i = 0; i < 30 && failed.empty(); ++i) {
+    std::this_thread::sleep_for(10ms);  // the call above takes a moment until it is there
+    failed = others.fail();
+  }
+  EXPECT_EQ(failed, "");
+  EXPECT_EQ(response.demonstrator(), 0u) << "it was not waited for at all";
+  done.set_value();
+  operator_of_rooms.join();
+  of_instructor.join();
+  EXPECT_TRUE(shown.ok()) << shown.error_message();
+  EXPECT_EQ(response.cuts(), 240u);
+}
+
+TEST_F(DemonstrationTest, RoomsAreMadeAndClosedWhileACaseIsLookedThrough) {
+  const wire::JoinedRoom viewer = join(server_->address(), wire::ClientKind::viewer, "ward");
+  ASSERT_TRUE(pack_case(dir_ / "case", dir_ / "case.zip"));
+  v1::UploadCaseRequest whole;
+  std::ifstream archive(dir_ / "case.zip", std::ios::binary);
+  whole.set_data(std::string(std::istreambuf_iterator<char>(archive), {}));
+  ASSERT_LE(whole.data().size(), 1u << 20);
+  grpc::ClientContext uploading;
+  v1::UploadCaseResponse stored;
+  const auto sender = v1::CaseService::NewStub(viewer.channel)->UploadCase(&uploading, &stored);
+  ASSERT_TRUE(sender->Write(whole) && sender->WritesDone());
+  ASSERT_TRUE(wait_until([&] { return fs::exists(dir_ / "checks"); }, kPatience));
+  const auto stub = v1::RoomsService::NewStub(viewer.channel);
+  v1::CreateRoomRequest create;
+  create.set_name("new");
+  v1::CreateRoomResponse created;
+  const grpc::Status made = CallsOfOthers::ask([&](auto* context) { return stub->CreateRoom(context, create, &created); });
+  EXPECT_TRUE(made.ok()) << made.error_message();
+  v1::CloseRoomRequest close;
+  close.set_name("new");
+  v1::CloseRoomResponse closed;
+  const grpc::Status gone = CallsOfOthers::ask([&](auto* context) { return stub->CloseRoom(context, close, &closed); });
+  EXPECT_TRUE(gone.ok()) << gone.error_message();
+  EXPECT_EQ(CallsOfOthers(viewer).fail(), "");
+  uploading.TryCancel();
+  EXPECT_EQ(sender->Finish().error_code(), grpc::StatusCode::CANCELLED);
+}
+
+}  // namespace
+}  // namespace osteon::test
