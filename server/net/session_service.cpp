@@ -23,10 +23,12 @@ namespace osteon {
 namespace {
 
 // One haptic client's session. Reading stops while kMaxQueuedCuts of its cuts wait for a tick, so a client that sends
-// faster than the room cuts is slowed down by the network instead of filling memory.
+// faster than the room cuts is slowed down by the network instead of filling memory. Datagrams nobody slows down: who sends
+// more of them than a haptic client does before it has heard of the first is ended.
 class SessionStream final : public OutStream<BidiReactor>, public SessionSink, private SessionLink::Sink {
  public:
   static constexpr int kMaxQueuedCuts = 256;
+  static constexpr int kMostUnheard = 1024;  // cuts that a haptic client sends before it has heard of the first
   static constexpr std::string_view kMethod = "/osteon.v1.CuttingService/Session";
 
   SessionStream(std::shared_ptr<OpenRoom> room, LinkServer* links, Gate* gate, Caller caller)
@@ -199,6 +201,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
       const std::lock_guard lock(mutex_);
       if (closing()) return;
       if (!may_carry(DatagramContent::cuts)) return close_locked(not_allowed());
+      // Beside those that are new there are, after a line broke, as many again as are read of the stream.
+      if (queued_ >= kMaxQueuedCuts + kMostUnheard) return close_locked(too_many_cuts());
       ++queued_;
       taken_ = std::max(taken_, cut.author_seq);
     }
@@ -281,6 +285,11 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     return older->message_case() == said.message_case() ? row : serialised(*older);
   }
 
+  [[nodiscard]] static Status too_many_cuts() {
+    return {StatusCode::RESOURCE_EXHAUSTED, std::to_string(kMaxQueuedCuts + kMostUnheard) +
+                                                " cuts of this session wait to be decided; send no more than " +
+                                                std::to_string(kMostUnheard) + " before you have heard of the first"};
+  }
   [[nodiscard]] static Status not_allowed() { return {StatusCode::PERMISSION_DENIED, "your role does not hold a tool any more"}; }
 
   // Reads the next request, or waits for decided() to do so. False when gRPC has let go of the stream.
