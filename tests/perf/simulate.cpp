@@ -34,14 +34,14 @@ constexpr const char* kUsage =
     "  --soak               1..100000 where no seeds are given\n"
     "  --verbose            a line for each seed, all that is wrong with it, and what the room logs\n"
     "  --break WHAT         with a rule broken, to see that seeds fail: dedup, ordering, skipping, replica, forgetful,\n"
-    "                       pruning, unsaid\n"
+    "                       pruning, unsaid, hasty\n"
     "The figures of all seeds go to standard output as JSON; all else to standard error, with the command that runs a seed\n"
     "that fails again. Status 0: no seed failed, 1: some did, 130: stopped with Ctrl-C, after the seed at hand.\n";
 
 const std::map<std::string_view, Breakage> kBreakages{
     {"dedup", Breakage::dedup},     {"ordering", Breakage::ordering},   {"skipping", Breakage::skipping},
     {"replica", Breakage::replica}, {"forgetful", Breakage::forgetful}, {"pruning", Breakage::pruning},
-    {"unsaid", Breakage::unsaid}};
+    {"unsaid", Breakage::unsaid},   {"hasty", Breakage::hasty}};
 
 struct Arguments {
   std::uint64_t first = 1, last = 300;

@@ -102,7 +102,10 @@ void Ledger::told_rejected(RoomSeq place, AuthorId author, std::uint64_t author_
   told(place, {EventKind::cut, true, author, author_seq, {}});
 }
 void Ledger::told_event(RoomSeq place, EventKind kind) { told(place, {kind, false, {}, 0, {}}); }
-void Ledger::told_up_to(RoomSeq place) { furthest_ = std::max(furthest_, place); }
+void Ledger::told_up_to(RoomSeq place) {
+  check(place <= kept_, Invariant::acknowledged, "place " + number(place) + " was told while the rows were kept up to " + number(kept_));
+  furthest_ = std::max(furthest_, place);
+}
 void Ledger::told_decided(AuthorId author, std::uint64_t author_seq) {
   std::uint64_t& newest = decided_[author];
   newest = std::max(newest, author_seq);

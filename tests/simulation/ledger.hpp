@@ -16,7 +16,7 @@ namespace osteon::test {
 enum class Invariant {
   one_bone,        // after quiet all hold the same
   set_of_cuts,     // any order and repetition of the standing cuts gives that bone
-  acknowledged,    // what anyone was told is in the journal, after every crash
+  acknowledged,    // what anyone was told is in the journal: when they hear of it, and after every crash
   replay,          // replay = live = checkpoint and tail
   lease,           // nothing of a stale lease is committed
   bounds,          // queues stay within them
@@ -46,6 +46,7 @@ class Ledger {
   void made(const Cut& cut, std::chrono::nanoseconds now);
   // So long ago; none where there is no such cut.
   [[nodiscard]] std::optional<std::chrono::nanoseconds> age(const Cut& cut, std::chrono::nanoseconds now) const;
+  void kept_up_to(RoomSeq place) { kept_ = std::max(kept_, place); }  // what anyone may be told of
   // What a client heard, or was answered.
   void told_committed(RoomSeq place, const Cut& cut);
   void told_rejected(RoomSeq place, AuthorId author, std::uint64_t author_seq);
@@ -86,7 +87,7 @@ class Ledger {
   std::map<AuthorId, std::vector<std::chrono::nanoseconds>> made_at_;
   std::map<RoomSeq, Told> told_;
   std::map<AuthorId, std::uint64_t> decided_;
-  RoomSeq furthest_;
+  RoomSeq furthest_, kept_;
   std::vector<Fault> faults_;
 };
 

@@ -69,6 +69,8 @@ TEST(Simulation, FindsCutsThatAreTakenTwice) { EXPECT_GT(found(Breakage::dedup, 
 TEST(Simulation, FindsAReplicaThatDoesNotComeBackRight) { EXPECT_GT(found(Breakage::replica, 40), 0u); }
 TEST(Simulation, FindsAJournalThatWaitsForNoDisk) { EXPECT_GT(found(Breakage::forgetful, 40), 0u); }
 
+TEST(Simulation, FindsASessionThatIsToldTooSoon) { EXPECT_GT(found(Breakage::hasty, 150), 0u); }
+
 TEST(Simulation, FindsAHandThatIsNotTold) { EXPECT_GT(found(Breakage::unsaid, 40), 0u); }
 
 // Rows of a room that heeds nothing: what is found in them goes by no room's judgement.

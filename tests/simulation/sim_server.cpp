@@ -69,6 +69,8 @@ class SimServer::Session final : public SessionSink,
       link_ = server_.links_->add(author_, said.complete().decided_author_seq() + 1, *this);
       before.insert(before.begin(), link_row(link_->keys(), node(Datagrams::kServer).port));
     }
+    if (server_.condition_.breakage == Breakage::hasty && !server_.power_is_out())
+      for (const Bytes& row : std::exchange(before, {})) stream_->write(SimStream::server, *row);
     outbox_.begin(contained, std::move(before), std::move(complete));
     pump();
   }
@@ -203,6 +205,7 @@ class SimServer::Session final : public SessionSink,
   // A server without power sends nothing.
   void pump() {
     if (done_ || server_.power_is_out()) return;
+    server_.note_kept();
     while (!closing_ && stream_->writable(SimStream::server)) {
       const MessageParts parts = outbox_.take();
       if (parts.empty()) return;
@@ -418,6 +421,8 @@ void SimServer::restart() {
   boot_later();
 }
 
+void SimServer::note_kept() { ledger_.kept_up_to(keeper_->head().place); }
+
 void SimServer::lose_power_at(std::uint64_t nth) {
   if (!host_ || power_fails_ || disk_fails_) return;
   power_fails_ = true;
@@ -507,7 +512,9 @@ void SimServer::join(const JoinRequest& request, std::function<void(const Result
 void SimServer::change(std::function<Result<RoomEvent>(Room&)> change, std::function<void(const Result<RoomEvent>&)> answer) {
   if (!host_ || power_is_out()) return;
   host_->queue_event(std::move(change), [this, answer = std::move(answer)](const Result<RoomEvent>& event) {
-    if (!power_is_out()) answer(event);
+    if (power_is_out()) return;
+    note_kept();
+    answer(event);
   });
 }
 

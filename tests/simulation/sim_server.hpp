@@ -28,6 +28,7 @@ enum class Breakage {
   forgetful,    // the journal waits for no disk
   unsaid,       // now and then a hand is not told what was decided about it
   pruning,      // what goes in datagrams is not said over the stream, before the client says that it has come
+  hasty,        // a session is told what it begins with, but for the leaves, before that is kept
 };
 
 // Those that a simulated room begins with: few, because everyone who opens or joins it makes them anew.
@@ -100,6 +101,7 @@ class SimServer {
   [[nodiscard]] RoomKeeper::Options options();
   void tick();
   void after_tick();
+  void note_kept();                                 // before anyone is told of it
   void plan_tick();
   void boot_later();
   void down();                                      // the process is gone
