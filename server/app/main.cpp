@@ -25,6 +25,7 @@
 #include "server/app/server_config.hpp"
 #include "server/app/ticket_command.hpp"
 #include "server/net/metrics.hpp"
+#include "server/net/room_files.hpp"
 #include "server/net/room_server.hpp"
 
 namespace {
@@ -144,7 +145,7 @@ Result<Room> make_room(const ServerConfig& options, const Case& bone, std::share
 
 // The room that the journal keeps, or a new one in a new journal.
 Result<Room> open_journal(const ServerConfig& options, const Case& bone, std::shared_ptr<ToolBox> tools, std::unique_ptr<RoomKeeper>& keeper) {
-  RoomKeeper::Options keeping{.name = options.journal_file.stem().string(), .limits = options.limits, .tools = std::move(tools), .journal = {}, .today = {}};
+  RoomKeeper::Options keeping{.name = options.journal_file.stem().string(), .limits = options.limits, .tools = std::move(tools), .journal = {}, .today = {}, .random = {}};
   keeping.retention_days = options.retention_days;
   Progress progress("journal");
   Result<KeptRoom> kept = RoomKeeper::open(options.journal_file, bone, keeping, [&](double fraction) { progress.update(fraction); });
@@ -226,11 +227,15 @@ Result<std::unique_ptr<Rooms>> open_rooms(const ServerConfig& options) {
   return rooms;
 }
 
-Result<void> check_rooms_folder(const std::filesystem::path& folder) {
+// The folder of rooms, made where it is missing, is this process's as long as it holds this; null: there is none.
+Result<std::unique_ptr<DiskLock>> take_rooms_folder(const std::filesystem::path& folder) {
+  if (folder.empty()) return nullptr;
   std::error_code error;
-  if (!folder.empty()) std::filesystem::create_directories(folder, error);
+  std::filesystem::create_directories(folder, error);
   if (error) return failure(ErrorCode::internal, "the folder --rooms " + folder.string() + " cannot be made: " + error.message());
-  return folder.empty() ? Result<void>{} : check_writable(folder / "open-rooms", "which rooms are open", "--rooms");
+  if (Result<void> usable = check_writable(folder / "open-rooms", "which rooms are open", "--rooms"); !usable)
+    return tl::unexpected(usable.error());
+  return lock_rooms(folder);
 }
 
 // The only room's own, or one for each by its name.
@@ -242,6 +247,9 @@ nlohmann::json summary_of(const std::map<std::string, RoomSummary>& rooms, bool 
 }
 
 Result<void> run(const ServerConfig& options, const StopSignal& stop) {
+  // First, so that nothing is touched of a server that runs; let go last.
+  const Result<std::unique_ptr<DiskLock>> folder = take_rooms_folder(options.rooms_folder);
+  if (!folder) return tl::unexpected(folder.error());
   // An address of an earlier run must not be taken for this one's.
   if (!options.address_file.empty()) {
     std::error_code ignored;
@@ -250,7 +258,6 @@ Result<void> run(const ServerConfig& options, const StopSignal& stop) {
   const DoorOptions doors{.certificates = options.certificates, .most_connections = static_cast<std::size_t>(options.most_connections)};
   if (Result<void> usable = RoomServer::check_listen(options.listen, doors); !usable) return usable;
   if (Result<void> usable = check_writable(options.save_file, "the fields", "--save"); !usable) return usable;
-  if (Result<void> usable = check_rooms_folder(options.rooms_folder); !usable) return usable;
   Result<std::unique_ptr<Rooms>> rooms = open_rooms(options);
   if (!rooms) return tl::unexpected(rooms.error());
   Result<std::unique_ptr<RoomServer>> server = RoomServer::start(std::move(*rooms), options.listen, doors);

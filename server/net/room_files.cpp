@@ -21,6 +21,15 @@ Disk& or_system(Disk* disk) { return disk != nullptr ? *disk : system_disk(); }
 
 tl::unexpected<Error> given_up(const std::string& what) { return failure(ErrorCode::cancelled, what + " was given up"); }
 
+Result<std::unique_ptr<DiskLock>> lock_rooms(const fs::path& folder, Disk* disk) {
+  return or_system(disk).lock(folder / "open-rooms.lock").map_error([&](Error error) {
+    if (error.code == ErrorCode::exists)
+      error.message = "the folder --rooms " + folder.string() +
+                      " is another osteon-server's, which runs; end that one first, or give this one a folder of its own";
+    return error;
+  });
+}
+
 Result<RoomGenesis> peek_genesis(const fs::path& file, Disk* disk) {
   const Result<JournalFile> peeked = JournalFile::peek(file, or_system(disk));
   if (!peeked) return tl::unexpected(peeked.error());

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,11 @@ struct UpkeepCalls {
   std::function<void(double)> progress;  // fraction that is done
   std::function<bool()> stop;            // true: give up, with the error cancelled
 };
+
+// A folder of rooms for one server alone, as long as it holds what this gives: another one would open the rooms that it has
+// closed, and write its list of those that are open. Journals have locks of their own, so that what is done to those that no
+// server has open goes on beside it. Errors: exists (another server has the folder), and those of Disk::lock.
+[[nodiscard]] Result<std::unique_ptr<DiskLock>> lock_rooms(const std::filesystem::path& folder, Disk* disk = nullptr);
 
 // What a journal began as, also of one in use: nothing is confirmed but this. Errors: not_found, invalid_input (no journal,
 // or what it began as cannot be read before it is opened), unsupported.

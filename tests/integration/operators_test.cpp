@@ -70,6 +70,32 @@ TEST(Operators, TheCommandLineWinsOverTheFile) {
   EXPECT_FALSE(std::filesystem::exists(stage / "of-the-file.json"));
 }
 
+// A second server would open the rooms that the first has closed, and write its list of those that are open.
+TEST(Operators, AFolderOfRoomsIsOneServersAndTheNextOnesOnceThatHasEnded) {
+  TempDir temp;
+  const std::string folder = (temp / "rooms").string();
+  Stage stage(12.0, {"--rooms", folder});
+  ASSERT_EQ(run(program("osteon-server"), {"rooms", "create", "anna", "--server", stage.address()}, 60s).exit_code, 0);
+  const std::vector<std::string> second{"--case", (stage / "case").string(), "--rooms", folder,
+                                        "--address-file", (stage / "address").string()};
+  const RunResult refused = run(program("osteon-server"), second, 60s);
+  EXPECT_FALSE(refused.timed_out);
+  EXPECT_NE(refused.exit_code, 0);
+  EXPECT_NE(refused.err.find("--rooms " + folder + " is another osteon-server's"), std::string::npos) << refused.err;
+  EXPECT_EQ(std::ranges::count(refused.err, '\n'), 1) << refused.err;
+  EXPECT_TRUE(std::filesystem::exists(stage / "address")) << "which is the first one's";
+  // Commands on journals go by each journal, as ever.
+  const auto verify = [&] { return run(program("osteon-server"), {"verify", folder + "/anna.journal"}, 60s); };
+  EXPECT_NE(verify().err.find("is in use by another process"), std::string::npos);
+  ASSERT_EQ(run(program("osteon-server"), {"rooms", "close", "anna", "--server", stage.address()}, 60s).exit_code, 0);
+  EXPECT_EQ(verify().exit_code, 0);
+  // Also after one that could not say that it is over.
+  stage.server().signal(SIGKILL);
+  ASSERT_TRUE(stage.server().wait(60s).has_value());
+  stage.start_server({"--rooms", folder});
+  EXPECT_EQ(stage.server().terminate(), 0);
+}
+
 // grpc.health.v1.Health/Check by hand: 1 SERVING, 2 NOT_SERVING; 0 where the call itself fails.
 int health_of(const std::shared_ptr<grpc::Channel>& channel, const std::string& name) {
   std::string request;

@@ -36,6 +36,25 @@ class RoomFilesTest : public ::testing::Test {
   MemoryDisk disk_{1};
 };
 
+TEST(RoomsFolder, IsOneServersAsLongAsItHoldsIt) {
+  const test::TempDir dir;
+  Result<std::unique_ptr<DiskLock>> first = lock_rooms(dir.path());
+  ASSERT_TRUE(first) << first.error().message;
+  const Result<std::unique_ptr<DiskLock>> second = lock_rooms(dir.path());
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().code, ErrorCode::exists);
+  EXPECT_THAT(second.error().message, AllOf(HasSubstr(dir.path().string()), HasSubstr("--rooms"), HasSubstr("end that one first")));
+  // What is done to a journal that no server has open goes on beside it, and the lock is no room.
+  KeptCuts kept(dir / "femur.journal", nullptr, "femur");
+  kept.cut(3);
+  ASSERT_TRUE(kept.keeper->close());
+  ASSERT_TRUE(branch_journal(dir / "femur.journal", dir / "copy.journal", RoomSeq{}, "copy"));
+  EXPECT_THAT(*branches_of(dir.path(), dir / "femur.journal"), SizeIs(1));
+  EXPECT_TRUE(delete_room(dir / "femur.journal", true));
+  first->reset();
+  EXPECT_TRUE(lock_rooms(dir.path()));
+}
+
 TEST_F(RoomFilesTest, WhatAJournalBeganAsIsReadBesideWhoeverUsesIt) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(5);
