@@ -121,7 +121,7 @@ PlanStep read_step(const json& object) {
   const bool drill = action == "drill";
   only(object, {"action", "tool", "spindle_rpm", "hand", "feed_mm_per_s", "push_n", "entry", "beyond_mm", "window_mm",
                 "depth_mm", "sweep_mm_per_s", "wear", "law", "guide", "tremor_mm", "to_mm", "leave", "hand_stiffness_n_per_mm",
-                "hand_damping_n_s_per_mm"});
+                "hand_damping_n_s_per_mm", "hand_across_n_per_mm"});
   step.action = drill ? Action::drill : Action::burr;
   step.tool = text(object, "tool", drill ? "drill-3.2" : "burr-round-5");
   const std::string hand = text(object, "hand", "expert");
@@ -134,6 +134,7 @@ PlanStep read_step(const json& object) {
   step.push_n = number(object, "push_n", step.push_n, 1.0, 200.0);
   step.hand_stiffness_n_per_mm = number(object, "hand_stiffness_n_per_mm", 0.0, 0.1, 50.0);
   step.hand_damping_n_s_per_mm = number(object, "hand_damping_n_s_per_mm", 0.0, 0.001, 5.0);
+  step.hand_across_n_per_mm = number(object, "hand_across_n_per_mm", 0.0, 0.1, 50.0);
   step.beyond_mm = number(object, "beyond_mm", step.beyond_mm, 0.0, 40.0);
   step.to_mm = number(object, "to_mm", step.to_mm, 0.1, 200.0);
   step.depth_mm = number(object, "depth_mm", step.depth_mm, 0.1, 20.0);

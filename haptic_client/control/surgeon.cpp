@@ -242,6 +242,8 @@ Digest plan_digest(const ReadyPlan& plan) {
          {step.spindle_rpm, p.push_n, p.hand_stiffness_n_per_mm, p.hand_damping_n_s_per_mm, p.feed_mm_per_s, p.beyond_mm, p.to_mm,
           p.window_u_mm, p.window_v_mm, p.depth_mm, p.sweep_mm_per_s, p.wear, p.tremor_mm, p.seconds})
       hasher.number(value);
+    // Plans of before it was there keep their digest.
+    if (p.hand_across_n_per_mm > 0.0) hasher.text("across"), hasher.number(p.hand_across_n_per_mm);
     for (const Vec3& v : {step.site.entry_mm, step.site.axis})
       for (const double value : v) hasher.number(value);
   }
@@ -293,6 +295,7 @@ HandParams Surgeon::hand_for(const PlanStep& plan) {
   hand.push_n = plan.push_n;
   if (plan.hand_stiffness_n_per_mm > 0.0) hand.stiffness_n_per_mm = plan.hand_stiffness_n_per_mm;
   if (plan.hand_damping_n_s_per_mm > 0.0) hand.damping_n_s_per_mm = plan.hand_damping_n_s_per_mm;
+  if (plan.hand_across_n_per_mm > 0.0) hand.lateral_n_per_mm = plan.hand_across_n_per_mm;
   return hand;
 }
 

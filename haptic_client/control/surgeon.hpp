@@ -31,7 +31,8 @@ struct PlanStep {
   double spindle_rpm = 0;             // 0: the tool's own
   HandKind hand = HandKind::expert;
   double push_n = 29;                 // hand
-  double hand_stiffness_n_per_mm = 0, hand_damping_n_s_per_mm = 0;  // 0: of the hand's kind
+  double hand_stiffness_n_per_mm = 0, hand_damping_n_s_per_mm = 0;  // along the push; 0: of the hand's kind
+  double hand_across_n_per_mm = 0;    // stiffness across it, likewise: a hand that lets itself be led holds loosely
   double feed_mm_per_s = 1;           // rig
   double beyond_mm = 5;               // rig: past the far side
   double to_mm = 0;                   // drill: as deep as this; 0: through the bone

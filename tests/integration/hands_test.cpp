@@ -1,5 +1,5 @@
-// Two hands of one room as processes: where their tools touch both feel it. Judged by what each program recorded, on the
-// clock of the machine that all of them share.
+// Two hands of one room as processes: where their tools touch both feel it, and a hand is led along what an expert did
+// before. Judged by what each program recorded, on the clock of the machine that all of them share, and by the journal.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,9 +7,12 @@
 #include <cstdio>
 #include <fstream>
 #include <map>
+#include <regex>
 #include <vector>
 
 #include "tests/integration/stage.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/support/wait.hpp"
 
 namespace osteon::test {
 namespace {
@@ -55,6 +58,39 @@ std::vector<Moment> recorded(const std::filesystem::path& file) {
   for (const json& row : json::parse(answer.out, nullptr, false))
     moments.push_back({row[0], row[1], row[2], row[3], row[4], row[5], row[6] != 0.0, row[7] != 0.0});
   return moments;
+}
+
+// Where a tool of an author's was at the end of each cut, by a journal, on the room's clock.
+struct Place {
+  double time_ms, x_mm, y_mm, z_mm;  // bone frame
+};
+std::vector<Place> cuts_of(const std::filesystem::path& journal, const std::string& author) {
+  const std::filesystem::path lines = journal.string() + "-" + author + ".jsonl";
+  const ProcessOptions as_given{.environment = {}, .without = {}, .folder = {}, .as_given = true};
+  EXPECT_EQ(run(program("osteon-server"), {"export", journal, lines}, 60s, as_given).exit_code, 0);
+  std::ifstream in(lines);
+  std::vector<Place> places;
+  for (std::string line; std::getline(in, line);) {
+    const json row = json::parse(line);
+    if (!row.at("event").contains("cut") || row.at("event").at("cut").at("author") != author) continue;
+    const json& at = row.at("event").at("cut").at("path").back().at("position");  // in steps of 2^-10 mm
+    const auto mm = [&](std::size_t i) { return at.at(i).get<double>() / 1024.0; };
+    places.push_back({1e3 * row.at("at_s").get<double>(), mm(0), mm(1), mm(2)});
+  }
+  return places;
+}
+
+// How far apart a hand and such a tool were at most, for a part of the time in which both were there.
+double apart_mm_for(double part, const std::vector<Moment>& hand, const std::vector<Place>& tool, double ahead_ms) {
+  std::vector<double> apart;
+  for (const Moment& moment : hand) {
+    const auto next = std::ranges::lower_bound(tool, moment.time_ms - ahead_ms, {}, &Place::time_ms);
+    if (next == tool.end() || (next == tool.begin() && next->time_ms > moment.time_ms - ahead_ms + 20.0)) continue;
+    apart.push_back(std::hypot(moment.x_mm - next->x_mm, moment.y_mm - next->y_mm, moment.z_mm - next->z_mm));
+  }
+  if (apart.empty()) return 1e9;
+  std::ranges::sort(apart);
+  return apart[static_cast<std::size_t>(part * static_cast<double>(apart.size()))];
 }
 
 struct Touches {
@@ -105,6 +141,86 @@ TEST(Hands, WhoseToolsTouchBothFeelIt) {
   // Each is pushed away from the other, though the walls of the holes take most of it.
   EXPECT_LT(felt_left.force_x_n, 0.0);
   EXPECT_GT(felt_right.force_x_n, 0.0);
+}
+
+// What an expert did is shown again from the journal by a demonstrator, and a trainee's hand is led along it. The trainee's own
+// work is elsewhere, and they are stopped: their hand is soft, but left alone it stays where it is.
+TEST(Hands, AreLedAlongWhatAnExpertDid) {
+  constexpr double kWithin_mm = 3.0;  // half a second behind, at the speed at which it is shown, and what the own hold costs
+  TempDir folder;
+  Stage stage(40.0, {"--journal", (folder / "room.journal").string()});
+  const auto burr = [](double y_mm, double width_mm, double sweep_mm_per_s) {
+    return json{{"action", "burr"},
+                {"tool", "burr-round-5"},
+                {"spindle_rpm", 20000},
+                {"hand", "expert"},
+                {"entry", {{"point_mm", {0.0, y_mm, 0.0}}, {"axis", {0.0, 0.0, -1.0}}}},
+                {"window_mm", {width_mm, 4.0}},
+                {"depth_mm", 1.0},
+                {"sweep_mm_per_s", sweep_mm_per_s}};
+  };
+  Process expert = start_hand(stage, "expert", json::array({burr(0.0, 24.0, 10.0)}));
+  ASSERT_EQ(expert.wait(120s), 0) << expert.err();
+
+  Process console = stage.start("osteon-viewer", {"--console", "--server", stage.address(), "--name", "Ada"});
+  const auto ask = [&](const std::string& command) {
+    console.write(command + "\n");
+    return console.read_line(60s).value_or("");
+  };
+  // What an answer has at the pattern's place; fails where it is another.
+  const auto told = [&](const std::string& command, const std::string& pattern) {
+    const std::string answer = ask(command);
+    std::smatch found;
+    EXPECT_TRUE(std::regex_search(answer, found, std::regex(pattern))) << command << ": " << answer;
+    return found.empty() ? std::string("0") : found[1].str();
+  };
+  const std::string of = told("people", "#([0-9]+) \"expert\"");
+  const std::uint64_t undone_at = std::stoull(told("undo all", "^ok at ([0-9]+) events"));
+
+  json softly = burr(12.0, 20.0, 0.5);
+  softly["hand_stiffness_n_per_mm"] = softly["hand_across_n_per_mm"] = 0.3;
+  Process trainee = start_hand(stage, "trainee", json::array({softly}));
+  ASSERT_TRUE(wait_until([&] { return std::regex_search(ask("people"), std::regex("\"trainee\"[^;]* cuts [1-9]")); }, 60s))
+      << trainee.err();
+  (void)told("freeze trainee", "^ok at ([0-9]+)");
+  (void)told("wait heard trainee", "^ok at ([0-9]+)");
+  const std::string cuts_before = told("people", "\"trainee\"[^;]* cuts ([0-9]+)");
+  const std::string demonstrator = told("demonstrate of #" + of + " to " + std::to_string(undone_at - 1) + " speed 0.5",
+                                        "^ok demonstrator #([0-9]+) cuts [0-9]{2,}");
+  (void)told("guide trainee along #" + demonstrator + " share 1", "^ok at ([0-9]+)");
+  ASSERT_TRUE(wait_until([&] { return std::regex_search(ask("people"), std::regex("#" + demonstrator + " [^;]* away")); }, 120s));
+  EXPECT_EQ(told("people", "\"trainee\"[^;]* cuts ([0-9]+)"), cuts_before) << "led, and stopped all the same";
+  ASSERT_TRUE(trainee.terminate(20s).has_value());
+  EXPECT_EQ(ask("quit"), "ok");
+  ASSERT_EQ(stage.server().terminate(), 0) << stage.server().err();
+
+  // The expert's own recording and rows tell how far the room's clock is off that of the recordings.
+  const std::vector<Moment> by_expert = recorded(stage / "expert.h5");
+  const std::vector<Place> cut_by_expert = cuts_of(folder / "room.journal", of);
+  const std::vector<Place> shown = cuts_of(folder / "room.journal", demonstrator);
+  const auto touched = std::ranges::find_if(by_expert, [](const Moment& moment) { return moment.z_mm < 0.3; });
+  ASSERT_TRUE(touched != by_expert.end() && cut_by_expert.size() > 50 && shown.size() > 50);
+  double ahead_ms = 0, least_mm = 1e9;
+  for (double off_ms = -500.0; off_ms <= 500.0; off_ms += 5.0) {
+    const double ms = touched->time_ms - cut_by_expert.front().time_ms + off_ms;
+    const double mm = apart_mm_for(0.5, by_expert, cut_by_expert, ms);
+    if (mm < least_mm) least_mm = mm, ahead_ms = ms;
+  }
+  std::printf("the expert's cuts within %.2f mm of the expert's hand\n", least_mm);
+  ASSERT_LT(least_mm, 1.0) << "the expert's cuts are where the expert's hand was";
+
+  std::vector<Moment> led = recorded(stage / "trainee.h5");
+  std::erase_if(led, [](const Moment& moment) { return !moment.led; });
+  ASSERT_FALSE(led.empty());
+  const double began_ms = led.front().time_ms + 1500.0;  // until then the hand is on its way there
+  std::erase_if(led, [&](const Moment& m) { return m.time_ms < began_ms || m.time_ms > shown.back().time_ms + ahead_ms; });
+  ASSERT_GT(led.size(), 300u) << "three seconds";
+  const auto [low, high] = std::ranges::minmax(led, {}, &Moment::y_mm);
+  const double apart_mm = apart_mm_for(0.95, led, shown, ahead_ms);
+  std::printf("95 %% of %zu moments within %.2f mm of where the demonstrator was, over %.1f mm\n", led.size(), apart_mm,
+              high.y_mm - low.y_mm);
+  EXPECT_LT(apart_mm, kWithin_mm);
+  EXPECT_GT(high.y_mm - low.y_mm, 10.0) << "of the 18 mm that the expert went to and fro";
 }
 
 }  // namespace

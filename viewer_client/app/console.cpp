@@ -580,6 +580,11 @@ Console::Answer Console::demonstrate(const Words& words) {
   if (!rest.empty()) what.room = rest.front();
   const auto shown = room_.demonstrate(what);
   if (!shown) return tl::unexpected(shown.error());
+  // Hands are guided along it by its number, which the list of people may have later than this answer.
+  const auto seen = [&] {
+    return std::ranges::any_of(room_.people(), [&](const PersonSeen& one) { return one.author == shown->first; });
+  };
+  (void)room_.wait(seen, kUntilSaid);
   return "demonstrator #" + std::to_string(shown->first.value) + " cuts " + std::to_string(shown->second);
 }
 

@@ -144,6 +144,7 @@ TEST(Plan, HasADigestOfItsOwn) {
   EXPECT_NE(changed([](PlanStep& s) { s.law = "allotta"; }), own);
   EXPECT_NE(changed([](PlanStep& s) { s.entry.point_mm = Vec3(1.1, -0.2, 0); }), own);
   EXPECT_NE(changed([](PlanStep& s) { s.hand = HandKind::expert; }), own);
+  EXPECT_NE(changed([](PlanStep& s) { s.hand_across_n_per_mm = 0.3; }), own);
   // A tool of the same name that is not the same.
   EXPECT_NE(digest({step},
                    [](std::string_view name) -> Result<Tool> {
