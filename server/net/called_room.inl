@@ -1,9 +1,11 @@
 // Which room a call is to. For the sources of the services alone: gRPC stays out of headers.
 #include <grpcpp/grpcpp.h>
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "server/net/gate.hpp"
 #include "server/net/out_stream.inl"
@@ -73,6 +75,52 @@ inline Status status_of(const Error& error) {
     case ErrorCode::unsupported: return {StatusCode::FAILED_PRECONDITION, error.message};
     default: return {StatusCode::INTERNAL, error.message};
   }
+}
+
+// Answers a call that is not carried out.
+inline grpc::ServerUnaryReactor* refuse(grpc::ServerUnaryReactor* reactor, Status status) {
+  reactor->Finish(std::move(status));
+  return reactor;
+}
+
+// The room of a call that has one answer; null once `reactor` was told why there is none.
+inline std::shared_ptr<OpenRoom> room_of(const Rooms& rooms, const grpc::CallbackServerContext& context,
+                                         grpc::ServerUnaryReactor* reactor) {
+  Result<std::shared_ptr<OpenRoom>> room = called_room(rooms, context);
+  if (room) return std::move(*room);
+  refuse(reactor, status_of(room.error()));
+  return nullptr;
+}
+
+// The same, of one that is made as `author`, whether they have joined it or not.
+inline std::shared_ptr<OpenRoom> room_of(const Rooms& rooms, const grpc::CallbackServerContext& context,
+                                         grpc::ServerUnaryReactor* reactor, AuthorId author) {
+  Result<std::shared_ptr<OpenRoom>> room = called_room(rooms, context, author);
+  if (room) return std::move(*room);
+  refuse(reactor, status_of(room.error()));
+  return nullptr;
+}
+
+// The same, of a request whose author has joined it.
+template <class Request>
+std::shared_ptr<OpenRoom> room_of_member(const Rooms& rooms, const grpc::CallbackServerContext& context,
+                                         grpc::ServerUnaryReactor* reactor, const Request& request) {
+  const AuthorId author{request.author()};
+  std::shared_ptr<OpenRoom> room = room_of(rooms, context, reactor, author);
+  if (!room || room->host().knows(author)) return room;
+  refuse(reactor, not_joined(std::string(Request::descriptor()->name()).c_str(), author.value));
+  return nullptr;
+}
+
+// An event of the room; the call is answered when every session has been told, by what `fill` makes of it.
+template <class Fill>
+grpc::ServerUnaryReactor* change_room(OpenRoom& room, grpc::ServerUnaryReactor* reactor,
+                                      std::function<Result<RoomEvent>(Room&)> event, Fill fill) {
+  room.host().queue_event(std::move(event), [reactor, fill](const Result<RoomEvent>& decided) {
+    if (decided) fill(*decided);
+    reactor->Finish(decided ? Status::OK : status_of(decided.error()));
+  });
+  return reactor;
 }
 
 }  // namespace osteon

@@ -86,7 +86,7 @@ class PeopleServiceImpl final : public PeopleBase {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     const Result<Supervision> word = wire::from_wire(request->supervision());
     if (!word) return refuse(reactor, invalid(word.error().message));
-    const std::shared_ptr<OpenRoom> room = called(*context, reactor, request->author());
+    const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
     const AuthorId by{request->author()};
     std::vector<AuthorId> subjects{AuthorId{request->subject()}};
@@ -135,7 +135,7 @@ class PeopleServiceImpl final : public PeopleBase {
                                      v1::AnnotateResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     const AuthorId by{request->author()};
-    const std::shared_ptr<OpenRoom> room = called(*context, reactor, request->author());
+    const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
     const auto fill = [response](const RoomEvent& event) {
       response->set_room_seq(event.room_seq.value);
@@ -144,11 +144,11 @@ class PeopleServiceImpl final : public PeopleBase {
     if (request->has_drawn()) {
       const Result<Annotation> drawn = wire::from_wire(request->drawn());
       if (!drawn) return refuse(reactor, invalid(drawn.error().message));
-      return change(
+      return change_room(
           *room, reactor, [by, drawn = *drawn](Room& r) { return r.annotate(by, drawn); }, fill);
     }
     if (request->wipe_off() != 0)
-      return change(
+      return change_room(
           *room, reactor, [by, id = request->wipe_off()](Room& r) { return r.wipe_off(by, id); }, fill);
     // All of the caller's: one event each, answered with the last.
     wipe_next(room, by, reactor, response);
@@ -158,9 +158,9 @@ class PeopleServiceImpl final : public PeopleBase {
   grpc::ServerUnaryReactor* Say(grpc::CallbackServerContext* context, const v1::SayRequest* request,
                                 v1::SayResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-    const std::shared_ptr<OpenRoom> room = called(*context, reactor, request->author());
+    const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
-    return change(
+    return change_room(
         *room, reactor,
         [by = AuthorId{request->author()}, to = AuthorId{request->to()}, words = request->words()](Room& r) {
           return r.say(by, to, words);
@@ -171,7 +171,7 @@ class PeopleServiceImpl final : public PeopleBase {
   grpc::ServerUnaryReactor* Demonstrate(grpc::CallbackServerContext* context, const v1::DemonstrateRequest* request,
                                         v1::DemonstrateResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-    const std::shared_ptr<OpenRoom> room = called(*context, reactor, request->author());
+    const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
     // What was cut in another room is that room's.
     const Result<Caller> caller = caller_of(rooms_, *context);
@@ -199,7 +199,7 @@ class PeopleServiceImpl final : public PeopleBase {
                                              const v1::EndDemonstrationRequest* request,
                                              v1::EndDemonstrationResponse*) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-    const std::shared_ptr<OpenRoom> room = called(*context, reactor, request->author());
+    const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
     // Not behind those that are about to begin.
     room->host().run_slowly([room, reactor, which = AuthorId{request->demonstrator()}] {
@@ -210,32 +210,6 @@ class PeopleServiceImpl final : public PeopleBase {
   }
 
  private:
-  static grpc::ServerUnaryReactor* refuse(grpc::ServerUnaryReactor* reactor, Status status) {
-    reactor->Finish(std::move(status));
-    return reactor;
-  }
-  // The room that is called by one who has joined it; null once `reactor` was told why not.
-  std::shared_ptr<OpenRoom> called(const grpc::CallbackServerContext& context, grpc::ServerUnaryReactor* reactor,
-                                   std::uint64_t author) {
-    Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, context, AuthorId{author});
-    if (!room) {
-      reactor->Finish(status_of(room.error()));
-    } else if (!(*room)->host().knows(AuthorId{author})) {
-      reactor->Finish(invalid("author " + std::to_string(author) + " has not joined this room; call Join first"));
-    } else {
-      return std::move(*room);
-    }
-    return nullptr;
-  }
-  template <class Fill>
-  static grpc::ServerUnaryReactor* change(OpenRoom& room, grpc::ServerUnaryReactor* reactor,
-                                          std::function<Result<RoomEvent>(Room&)> event, Fill fill) {
-    room.host().queue_event(std::move(event), [reactor, fill](const Result<RoomEvent>& decided) {
-      if (decided) fill(*decided);
-      reactor->Finish(decided ? Status::OK : status_of(decided.error()));
-    });
-    return reactor;
-  }
   // Until none of the caller's is left.
   static void wipe_next(const std::shared_ptr<OpenRoom>& room, AuthorId by, grpc::ServerUnaryReactor* reactor,
                         v1::AnnotateResponse* response) {

@@ -123,7 +123,7 @@ class RoomServiceImpl final : public RoomBase {
       rooms_.refusals.count("draining");
       return refuse(reactor, {StatusCode::UNAVAILABLE, *why});
     }
-    const std::shared_ptr<OpenRoom> room = called(*context, reactor);
+    const std::shared_ptr<OpenRoom> room = room_of(rooms_, *context, reactor);
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!room || !caller) {
       rooms_.refusals.note("room", address_of(context->peer()), caller ? "there is no such room" : caller.error().message);
@@ -174,7 +174,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* GetStatus(grpc::CallbackServerContext* context, const v1::GetStatusRequest*,
                                       v1::GetStatusResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-    const std::shared_ptr<OpenRoom> room = called(*context, reactor);
+    const std::shared_ptr<OpenRoom> room = room_of(rooms_, *context, reactor);
     if (!room) return reactor;
     room->host().run_slowly([room, reactor, response] {
       const BoneStatus status = room->host().bone_status();
@@ -230,7 +230,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* ListTools(grpc::CallbackServerContext* context, const v1::ListToolsRequest* request,
                                       v1::ListToolsResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-    const std::shared_ptr<OpenRoom> room = known("ListToolsRequest", request->author(), *context, reactor);
+    const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
     for (const ToolBox::Entry* entry : room->host().tools().entries()) {
       v1::KnownTool& tool = *response->add_tools();
@@ -246,7 +246,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* GetTool(grpc::CallbackServerContext* context, const v1::GetToolRequest* request,
                                     v1::GetToolResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-    const std::shared_ptr<OpenRoom> room = known("GetToolRequest", request->author(), *context, reactor);
+    const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
     const Result<Digest> hash = wire::digest_from_wire(request->tool_hash());
     if (!hash) return refuse(reactor, invalid("tool_hash is not a digest of 32 bytes"));
@@ -352,7 +352,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* SaveFields(grpc::CallbackServerContext* context, const v1::SaveFieldsRequest* request,
                                        v1::SaveFieldsResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-    const std::shared_ptr<OpenRoom> room = known("SaveFieldsRequest", request->author(), *context, reactor);
+    const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
     if (room->save.empty())
       return refuse(reactor, {StatusCode::FAILED_PRECONDITION, "this server saves nothing; start it with --save FILE.vdb"});
@@ -406,37 +406,11 @@ class RoomServiceImpl final : public RoomBase {
     if (request.resume_author() == 0) return {};
     return rooms_.gate->check_resume(caller, room.name, request.kind(), AuthorId{request.resume_author()});
   }
-  static grpc::ServerUnaryReactor* refuse(grpc::ServerUnaryReactor* reactor, Status status) {
-    reactor->Finish(std::move(status));
-    return reactor;
-  }
-  // The room that is called; null once `reactor` was told that there is none.
-  std::shared_ptr<OpenRoom> called(const grpc::CallbackServerContext& context, grpc::ServerUnaryReactor* reactor,
-                                   std::optional<AuthorId> author = {}) {
-    Result<std::shared_ptr<OpenRoom>> room = author ? called_room(rooms_, context, *author) : called_room(rooms_, context);
-    if (room) return std::move(*room);
-    reactor->Finish(status_of(room.error()));
-    return nullptr;
-  }
-  // The same, of a caller who has joined it.
-  std::shared_ptr<OpenRoom> known(const char* message, std::uint64_t author, const grpc::CallbackServerContext& context,
-                                  grpc::ServerUnaryReactor* reactor) {
-    std::shared_ptr<OpenRoom> room = called(context, reactor, AuthorId{author});
-    if (!room || room->host().knows(AuthorId{author})) return room;
-    reactor->Finish(not_joined(message, author));
-    return nullptr;
-  }
-  // An event of the room; answered when every session has been told.
   template <class Fill>
   grpc::ServerUnaryReactor* change(const grpc::CallbackServerContext& context, grpc::ServerUnaryReactor* reactor, std::uint64_t author,
                                    std::function<Result<RoomEvent>(Room&)> event, Fill fill) {
-    const std::shared_ptr<OpenRoom> room = called(context, reactor, AuthorId{author});
-    if (!room) return reactor;
-    room->host().queue_event(std::move(event), [reactor, fill](const Result<RoomEvent>& decided) {
-      if (decided) fill(*decided);
-      reactor->Finish(decided ? Status::OK : status_of(decided.error()));
-    });
-    return reactor;
+    const std::shared_ptr<OpenRoom> room = room_of(rooms_, context, reactor, AuthorId{author});
+    return room ? change_room(*room, reactor, std::move(event), fill) : reactor;
   }
 
   Rooms& rooms_;
