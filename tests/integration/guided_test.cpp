@@ -11,6 +11,7 @@
 #include "common/geometry/mesh_file.hpp"
 #include "common/tools/guide.hpp"
 #include "common/volume/field_file.hpp"
+#include "osteon/v1/people.grpc.pb.h"
 #include "tests/integration/stage.hpp"
 #include "tests/support/scenes/bones.hpp"
 #include "tests/unit/room/members.hpp"
@@ -102,6 +103,34 @@ Answer standing_of(const std::string& line) {
       << line;
   answer.seated = line.find(", seated") != std::string::npos;
   return answer;
+}
+
+// A demonstration is a session of the server's own: nobody could ask it to leave.
+TEST(Demonstration, IsOverWhenTheServerIsToStop) {
+  const TempDir kept;
+  Stage stage(16.0, {"--journal", kept / "room.journal", "--drain-seconds", "300"});
+  constexpr std::uint64_t kCuts = 10;
+  {
+    Surgeon hand(stage.address(), stage / "cache");
+    ASSERT_TRUE(wait_until([&] { return hand.complete(); }, kPatience));
+    for (std::uint64_t i = 1; i <= kCuts; ++i) {
+      Cut cut = straight_cut(find_tool("burr-round-5").value(), {-5.0 + static_cast<double>(i), 0, 0}, {-5.0 + static_cast<double>(i), 1, 0}, {0, 0, -1}, i);
+      cut.author = hand.author();
+      ASSERT_TRUE(hand.session().send(cut));
+      ASSERT_TRUE(wait_until([&] { return hand.own() == i; }, kPatience)) << hand.rejected();
+    }
+  }
+  const wire::JoinedRoom instructor = join(stage.address(), wire::ClientKind::viewer);
+  v1::DemonstrateRequest request;
+  request.set_author(instructor.author.value);
+  request.set_speed(0.001);  // far longer than anybody waits here
+  v1::DemonstrateResponse response;
+  grpc::ClientContext context;
+  const grpc::Status shown = v1::PeopleService::NewStub(instructor.channel)->Demonstrate(&context, request, &response);
+  ASSERT_TRUE(shown.ok()) << shown.error_message();
+  ASSERT_EQ(response.cuts(), kCuts);
+  ASSERT_EQ(stage.server().terminate(60s), 0) << stage.server().err();
+  EXPECT_NE(stage.server().err().find("drained sessions_left=0"), std::string::npos) << stage.server().err();
 }
 
 // A person at a viewer's script sets down, moves, turns, drives home and takes away what stands on the bone. The block's
