@@ -1,11 +1,11 @@
-// Forged, flipped, cut, extended and replayed datagrams against a server's end of the link: how many it takes, and how many
-// bytes it answers. Takes their number (10 million if none is given) and prints JSON.
+// Forged, flipped, cut, extended and replayed datagrams against the class that a server opens them with (wire::ServerLink): how
+// many it takes, and how many bytes it answers. Takes their number (10 million if none is given) and prints JSON.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <numeric>
 
-#include "tests/unit/link/forgery.hpp"
+#include "tests/unit/wire/forgery.hpp"
 
 int main(int argc, char** argv) {
   const long long asked = argc > 1 ? std::atoll(argv[1]) : 10'000'000;
@@ -24,8 +24,11 @@ int main(int argc, char** argv) {
               number(report.answered_bytes));
   for (std::size_t i = 0; i < osteon::test::kForgeries; ++i)
     std::printf("\"%s\": %llu, ", osteon::test::kForgeryNames[i], number(report.sent[i]));
+  std::printf("\"refused_as\": {\"strangers\": %llu, \"malformed\": %llu, \"replayed\": %llu, \"forged\": %llu}, ", number(report.strangers),
+              number(report.malformed), number(report.replayed), number(report.forged));
   std::printf("\"genuine\": %llu, \"genuine_accepted\": %llu, \"genuine_answered\": %llu, ", number(report.genuine),
               number(report.genuine_accepted), number(report.genuine_answered));
+  std::printf("\"cuts\": %llu, \"cuts_told\": %llu, ", number(report.cuts), number(report.cuts_told));
   std::printf("\"moves\": %llu, \"moves_noticed\": %llu, ", number(report.moves), number(report.moves_noticed));
   std::printf("\"generations\": %llu, \"seconds\": %.3f, \"packets_per_s\": %.0f}\n", number(report.generations), seconds,
               static_cast<double>(forged) / seconds);

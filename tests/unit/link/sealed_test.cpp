@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "tests/support/allocation_counter.hpp"
-#include "tests/unit/link/forgery.hpp"
 
 namespace osteon {
 namespace {
@@ -297,21 +296,6 @@ TEST(SealedDeathTest, NeverUsesACounterTwice) {
 TEST(SealedDeathTest, TakesNoMoreThanADatagramHolds) {
   Sealer sealer(kSession, a_key());
   EXPECT_DEATH(seal(sealer, Bytes(kMostPlainBytes + 1), 0s), "kMostPlainBytes");
-}
-
-// What reaches a server from somebody without a key: nothing of it is opened, nothing is sent on its account, and the peers'
-// own datagrams go through meanwhile, over moves to other addresses. perf/forgery.cpp does the same 10 million times.
-TEST(Forgery, IsNeitherAcceptedNorAnswered) {
-  const test::ForgeryReport report = test::forge(100'000, 3);
-  EXPECT_EQ(report.accepted, 0u);
-  EXPECT_EQ(report.answered_bytes, 0u);
-  EXPECT_EQ(report.genuine_accepted, report.genuine);
-  EXPECT_GT(report.genuine, 3000u);
-  // What is answered to an address that a peer has just left is lost; nothing else.
-  EXPECT_GE(report.genuine_answered + report.moves_noticed, report.genuine);
-  EXPECT_GE(report.moves, 4u);
-  EXPECT_GE(report.moves_noticed, report.moves);
-  for (std::size_t i = 0; i < test::kForgeries; ++i) EXPECT_GT(report.sent[i], 10'000u) << test::kForgeryNames[i];
 }
 
 }  // namespace
