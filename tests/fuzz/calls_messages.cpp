@@ -152,34 +152,6 @@ void set_odd(Message& message, const FieldDescriptor* field, std::mt19937& rando
   }
 }
 
-void change_somewhere(Message& message, std::mt19937& random) {
-  const Reflection& reflect = *message.GetReflection();
-  const Descriptor& type = *message.GetDescriptor();
-  if (type.field_count() == 0) return;
-  const FieldDescriptor* field = type.field(static_cast<int>(random() % static_cast<std::uint32_t>(type.field_count())));
-  const bool many = field->is_repeated();
-  const int there = many ? reflect.FieldSize(message, field) : 0;
-  if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE && random() % 4 != 0) {
-    if (many && there > 0) {
-      const auto which = static_cast<int>(random() % static_cast<std::uint32_t>(there));
-      return change_somewhere(*reflect.MutableRepeatedMessage(&message, field, which), random);
-    }
-    if (!many && reflect.HasField(message, field))
-      return change_somewhere(*reflect.MutableMessage(&message, field), random);
-  }
-  switch (random() % 4) {
-    case 0: return reflect.ClearField(&message, field);
-    case 1:
-      if (there > 0) return reflect.RemoveLast(&message, field);
-      break;
-    case 2:
-      if (there > 1) return reflect.SwapElements(&message, field, 0, there - 1);
-      break;
-    default: break;
-  }
-  set_odd(message, field, random);
-}
-
 std::unique_ptr<Message> request_of(const MethodDescriptor& method) {
   auto& factory = *google::protobuf::MessageFactory::generated_factory();
   return std::unique_ptr<Message>(factory.GetPrototype(method.input_type())->New());
@@ -232,11 +204,39 @@ std::vector<Bytes> request_inputs(bool in_sessions) {
   return inputs;
 }
 
+void change_message(Message& message, std::mt19937& random) {
+  const Reflection& reflect = *message.GetReflection();
+  const Descriptor& type = *message.GetDescriptor();
+  if (type.field_count() == 0) return;
+  const FieldDescriptor* field = type.field(static_cast<int>(random() % static_cast<std::uint32_t>(type.field_count())));
+  const bool many = field->is_repeated();
+  const int there = many ? reflect.FieldSize(message, field) : 0;
+  if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE && random() % 4 != 0) {
+    if (many && there > 0) {
+      const auto which = static_cast<int>(random() % static_cast<std::uint32_t>(there));
+      return change_message(*reflect.MutableRepeatedMessage(&message, field, which), random);
+    }
+    if (!many && reflect.HasField(message, field))
+      return change_message(*reflect.MutableMessage(&message, field), random);
+  }
+  switch (random() % 4) {
+    case 0: return reflect.ClearField(&message, field);
+    case 1:
+      if (there > 0) return reflect.RemoveLast(&message, field);
+      break;
+    case 2:
+      if (there > 1) return reflect.SwapElements(&message, field, 0, there - 1);
+      break;
+    default: break;
+  }
+  set_odd(message, field, random);
+}
+
 void change_request(Bytes& input, std::mt19937& random) {
   if (input.empty()) return;
   const auto request = request_of(method_of(input[0]));
   if (!request->ParseFromArray(input.data() + 1, static_cast<int>(input.size() - 1))) return;
-  change_somewhere(*request, random);
+  change_message(*request, random);
   const std::string bytes = request->SerializeAsString();
   input.resize(1);
   input.insert(input.end(), bytes.begin(), bytes.end());

@@ -9,6 +9,7 @@
 #include "tests/fuzz/targets.hpp"
 
 namespace google::protobuf {
+class Message;
 class MethodDescriptor;
 }  // namespace google::protobuf
 
@@ -26,7 +27,9 @@ inline constexpr const char* kSpare = "spare";  // that calls may close or delet
 
 // Sound requests of all methods: one with everything in it, and one more for each further choice that it offers.
 [[nodiscard]] std::vector<Bytes> request_inputs(bool in_sessions);
-// Changes one field, somewhere in it, to what is rare or wrong; nothing where the bytes are no message.
+// Changes one field, somewhere in it, to what is rare or wrong.
+void change_message(google::protobuf::Message& message, std::mt19937& random);
+// The same of a request; nothing where the bytes are no message.
 void change_request(Bytes& input, std::mt19937& random);
 
 }  // namespace osteon::fuzz

@@ -1,6 +1,6 @@
 // Every target on seeded mutations of its valid inputs; OSTEON_FUZZ_RUNS in the environment asks for more of them, in all of a
-// target's seeds together, OSTEON_FUZZ_TARGET for one target alone, and OSTEON_FUZZ_INPUT, in hexadecimal digits, for nothing but
-// that input.
+// target's seeds together, OSTEON_FUZZ_TARGET for one target alone, OSTEON_FUZZ_SEED for other mutations (1 if it is not set), and
+// OSTEON_FUZZ_INPUT, in hexadecimal digits, for nothing but that input.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -53,14 +53,28 @@ Bytes changed(const Target& target, const Bytes& seed, std::mt19937& random) {
   return input;
 }
 
+// The seeds by turns, so that what they do meets: at least `count` inputs. Returns how many there were.
+long run_asked(const Target& target, long count, std::mt19937& random) {
+  const auto has = [&](const Bytes& seed, long round) { return !target.rounds || round % target.rounds(seed) == 0; };
+  long done = 0;
+  for (long round = 0; done < count; ++round)
+    for (const Bytes& seed : target.seeds)
+      if (has(seed, round)) {
+        target.run(changed(target, seed, random));
+        ++done;
+      }
+  return done;
+}
+
 TEST(Fuzz, TargetsStandMutatedInputs) {
   const char *asked = std::getenv("OSTEON_FUZZ_RUNS"), *only = std::getenv("OSTEON_FUZZ_TARGET");
+  const char* number = std::getenv("OSTEON_FUZZ_SEED");
   bool any = false;
   for (const Target& target : targets()) {
     if (only && target.name != only) continue;
     any = true;
     SCOPED_TRACE(target.name);
-    std::mt19937 random(1);
+    std::mt19937 random(number ? static_cast<std::uint32_t>(std::atol(number)) : 1u);
     const auto settle = [&] {
       if (target.settle) target.settle();
     };
@@ -71,18 +85,19 @@ TEST(Fuzz, TargetsStandMutatedInputs) {
     }
     for (const Bytes& seed : target.seeds) target.run(seed);
     settle();
-    const auto seeds = static_cast<long>(target.seeds.size());
-    const long runs = asked ? (std::atol(asked) + seeds - 1) / seeds : target.mutations;
-    double memory_mb = resident_mb();
-    // All seeds by turns, so that what they do meets.
-    for (long i = 0; i < runs; ++i) {
-      if (i == runs / 10) memory_mb = resident_mb();  // what a start takes is there by then
-      for (const Bytes& seed : target.seeds) target.run(changed(target, seed, random));
+    if (!asked) {
+      for (long i = 0; i < target.mutations; ++i)
+        for (const Bytes& seed : target.seeds) target.run(changed(target, seed, random));
+      settle();
+      continue;
     }
+    const long count = std::atol(asked);
+    long done = run_asked(target, count / 10, random);
+    const double memory_mb = resident_mb();  // what a start takes is there by then
+    done += run_asked(target, count - done, random);
     settle();
-    if (!asked) continue;
-    std::printf("fuzzed: %s %ld inputs; memory after a tenth of them %.1f MB, at the end %.1f MB\n", target.name.c_str(), runs * seeds,
-                memory_mb, resident_mb());
+    std::printf("fuzzed: %s %ld inputs; memory after a tenth of them %.1f MB, at the end %.1f MB\n", target.name.c_str(), done, memory_mb,
+                resident_mb());
     if (target.figures) std::printf("fuzzed: %s\n", target.figures().c_str());
   }
   EXPECT_TRUE(any) << "there is no such target";

@@ -13,6 +13,7 @@
 #include "common/wire/client_link.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/server_link.hpp"
+#include "tests/fuzz/calls_messages.hpp"
 #include "tests/fuzz/calls_target.hpp"
 #include "tests/fuzz/datagram_target.hpp"
 #include "tests/fuzz/journal_target.hpp"
@@ -94,6 +95,13 @@ wire::ServerLink server_end() {
   return {link_keys(), {1}, [](std::span<std::uint8_t> bytes) { std::ranges::fill(bytes, std::uint8_t{0x7e}); }};
 }
 
+// Of the packets that were given to an end, with the key: what it could read, and what a correct peer would not have said.
+struct PacketCounts {
+  std::uint64_t taken = 0, refused = 0;
+  void add(const wire::LinkCounts& counts) { ++(counts.malformed == 0 ? taken : refused); }
+};
+PacketCounts up_packets, down_packets;
+
 void as_up_packet(std::span<const std::uint8_t> plain) {
   wire::ServerLink link = server_end();
   Cut cut = a_cut();
@@ -109,6 +117,7 @@ void as_up_packet(std::span<const std::uint8_t> plain) {
     (void)link.take_state();
   }
   OSTEON_CHECK(link.acknowledged() <= 3);
+  up_packets.add(link.half().counts());
 }
 
 void as_down_packet(std::span<const std::uint8_t> plain) {
@@ -123,6 +132,7 @@ void as_down_packet(std::span<const std::uint8_t> plain) {
     OSTEON_CHECK(link.partners(now).size() <= wire::ClientLink::kMostPartners);
   }
   OSTEON_CHECK(link.acknowledged() <= 1);
+  down_packets.add(link.half().counts());
 }
 
 // Packets as the two ends make them, with everything in them that there is.
@@ -158,8 +168,28 @@ Bytes a_down_packet() {
   return bytes_of(packet.SerializeAsString());
 }
 
-Target named(std::string name, Target target) {
+// One field, somewhere in the packet; one bit of what is none, as datagrams are.
+template <class Packet>
+void change_packet(Bytes& input, std::mt19937& random) {
+  Packet packet;
+  if (input.empty()) return;
+  if (packet.ParseFromArray(input.data(), static_cast<int>(input.size()))) {
+    change_message(packet, random);
+    input = bytes_of(packet.SerializeAsString());
+  } else {
+    input[random() % input.size()] ^= static_cast<std::uint8_t>(1u << random() % 8);
+  }
+}
+
+template <class Packet>
+Target packet_target(std::string name, PlainTarget end, Bytes packet, const PacketCounts& counts) {
+  Target target = datagram_target(std::move(end), {packet});
   target.name = std::move(name);
+  target.rounds = [packet = std::move(packet)](const Bytes& seed) { return seed == packet ? 1 : 6; };
+  target.change = change_packet<Packet>;
+  target.figures = [&counts] {
+    return "packets taken " + std::to_string(counts.taken) + ", refused " + std::to_string(counts.refused);
+  };
   return target;
 }
 
@@ -176,8 +206,8 @@ std::vector<Target> targets() {
           {"look",
            parse_and_convert<v1::Look>,
            {bytes_of(wire::to_wire(a_look()).SerializeAsString())}},
-          named("up_packet", datagram_target(as_up_packet, {an_up_packet()})),
-          named("down_packet", datagram_target(as_down_packet, {a_down_packet()})),
+          packet_target<v1::UpPacket>("up_packet", as_up_packet, an_up_packet(), up_packets),
+          packet_target<v1::DownPacket>("down_packet", as_down_packet, a_down_packet(), down_packets),
           {"mesh_block", decode_any_block, {a_block().bytes, a_seamed_block().bytes}},
           ticket_target(),
           ticket_contents_target(),

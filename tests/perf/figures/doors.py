@@ -1,6 +1,8 @@
 """Figures of closed doors: strangers who knock as often as they like, and bytes of every kind. Hands are simulated."""
+import functools
 import json
 import os
+import re
 import socket
 import ssl
 import subprocess
@@ -11,6 +13,7 @@ import numpy as np
 
 import plans
 import record
+import registry
 from processes import Failure, Household
 from together import ROOM, Doors
 
@@ -22,8 +25,8 @@ PATIENCE_S = 10.0   # the server's own with who does not show who they are is ha
 SILENT_S = 0.002    # a door without TLS speaks first, and at once
 TLS_ALERT, MOST_ALERT_BYTES = 0x15, 16
 HTTP2 = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes([0, 0, 0, 4, 0, 0, 0, 0, 0])
-FUZZ_RUNS = 10_000_000
-FUZZ_CALLS = 1_000_000  # a server answers each of them, and does what it asks for
+FUZZ_SOAK = 10_000_000  # of every target
+FUZZED = re.compile(r"^fuzzed: (\w+) (\d+) inputs; ")
 
 
 def resident_mb(pid):
@@ -152,23 +155,36 @@ def knocking(run):
     }
 
 
-def door_fuzz(run):
-    values, rows = {}, []
-    for target in ("ticket", "upload", "supervision", "annotation", "requests", "calls"):
-        runs = FUZZ_RUNS if target != "calls" or run.soak else FUZZ_CALLS
-        run.say(f"{runs} changed inputs: {target}")
-        began = time.monotonic()
-        result = subprocess.run([run.programs / "fuzz.mutations", "--gtest_filter=*MutatedInputs"], capture_output=True, text=True, check=False,
-                                env={**os.environ, "OSTEON_FUZZ_TARGET": target, "OSTEON_FUZZ_RUNS": str(runs)})
-        said = [line for line in result.stdout.splitlines() if line.startswith("fuzzed: ")]
-        done = result.returncode == 0 and bool(said)  # which it says after the last of them
-        values[f"fuzzed_{target}"] = (runs if done else 0, None)
-        if not done:
-            run.tables.append((f"fuzzing {target} failed", [(line,) for line in (result.stdout + result.stderr).splitlines()[-5:]]))
-        rows.append((f"{target}, seconds", round(time.monotonic() - began)))
+def fuzz(target, inputs, run):
+    """So many changed inputs of one target, in as many processes as there are processors, each with changes of its own."""
+    inputs = max(inputs, FUZZ_SOAK) if run.soak else inputs
+    many = len(os.sched_getaffinity(0))
+    run.say(f"{inputs} changed inputs: {target}")
+    began, texts = time.monotonic(), [run.folder / f"fuzz-{target}-{i}.txt" for i in range(many)]
+    processes = []
+    try:
+        for i, text in enumerate(texts):
+            asked = {"OSTEON_FUZZ_TARGET": target, "OSTEON_FUZZ_RUNS": str(-(-inputs // many)), "OSTEON_FUZZ_SEED": str(i + 1)}
+            with text.open("w", encoding="utf-8") as out:
+                processes.append(subprocess.Popen([run.programs / "fuzz.mutations", "--gtest_filter=*MutatedInputs"], stdout=out,
+                                                  stderr=subprocess.STDOUT, env={**os.environ, **asked}))
+        codes = [process.wait() for process in processes]
+    finally:
+        for process in processes:
+            process.kill()  # those that still run: it was stopped
+            process.wait()
+    done, rows = 0, [("seconds", round(time.monotonic() - began))]
+    for code, text in zip(codes, texts):
+        lines = text.read_text(encoding="utf-8", errors="replace").splitlines()
+        said = [line for line in lines if line.startswith("fuzzed: ")]
         rows += [(target, line.removeprefix("fuzzed: ")) for line in said]
+        if code == 0 and (last := FUZZED.match(said[0]) if said else None) and last[1] == target:
+            done += int(last[2])  # which it says after the last of them
+        else:
+            run.tables.append((f"fuzzing {target} failed", [(line,) for line in lines[-5:] or ["it says nothing"]]))
     run.tables.append(("Changed inputs", rows))
-    return values
+    return {f"fuzzed_{target}": registry.Measured(done, None, threads=many)}
 
 
-GROUPS = {"knocking": knocking, "door_fuzz": door_fuzz}
+GROUPS = {"knocking": knocking,
+          **{f"fuzz_{target}": functools.partial(fuzz, target, inputs) for target, _, _, inputs in registry.FUZZED}}
