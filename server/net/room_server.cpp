@@ -45,7 +45,7 @@ constexpr int kMostMetadataBytes = 8 * 1024;       // of one call; a ticket is b
 constexpr int kHandshakeMs = 5'000;                // for those who have not shown who they are
 constexpr std::size_t kMostTransportBytes = std::size_t{512} << 20;  // of all connections, in gRPC
 constexpr const char* kStopping = "the server is stopping; come again in a few seconds";
-constexpr std::chrono::milliseconds kComeAgainAfter{1000}, kDrainLook{20};
+constexpr std::chrono::milliseconds kComeAgainAfter{1000}, kDrainLook{5};
 
 }  // namespace
 
@@ -167,8 +167,6 @@ DoorHealth RoomServer::door_health() const {
 LinkServerHealth RoomServer::link_health() const { return impl_->links ? impl_->links->health() : LinkServerHealth{}; }
 
 void RoomServer::drain(std::chrono::milliseconds most, const std::function<bool(std::chrono::milliseconds)>& give_up) {
-  impl_->rooms->begin_drain(kComeAgainAfter, kStopping);
-  impl_->health->look();
   const auto sessions = [&] {
     std::size_t open = 0;
     for (const std::shared_ptr<OpenRoom>& room : impl_->rooms->open_rooms()) open += room->host().health().sessions;
@@ -176,6 +174,8 @@ void RoomServer::drain(std::chrono::milliseconds most, const std::function<bool(
   };
   const auto until = std::chrono::steady_clock::now() + most;
   log::info("draining", {{"sessions", sessions()}, {"most_ms", most.count()}});
+  impl_->rooms->begin_drain(kComeAgainAfter, kStopping);
+  impl_->health->look();
   while (sessions() > 0 && std::chrono::steady_clock::now() < until)
     if (give_up(kDrainLook)) break;
   log::info("drained", {{"sessions_left", sessions()}});
