@@ -22,7 +22,8 @@ struct Arguments {
 void print(const RoomLine& room) {
   std::string about = room.open ? "open, at event " + std::to_string(room.room_seq.value) + ", " + std::to_string(room.sessions) +
                                       " sessions, " + std::to_string(room.watchers) + " watchers"
-                                : "closed";
+                      : room.room_seq ? "stopped, at event " + std::to_string(room.room_seq.value) + ": takes no more cuts"
+                                      : "closed";
   if (!room.kept && !room.replay) about += ", not kept";
   if (!room.parent.empty())
     about += (room.replay ? ", shows " : ", branch of ") + room.parent + (room.replay ? " up to " : " at ") +

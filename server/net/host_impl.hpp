@@ -155,6 +155,7 @@ struct RoomHost::Impl {
   std::map<std::string, std::uint32_t> persons;  // of the tick thread: by name, where no journal numbers them
   std::vector<Queued> batch;              // of the tick thread
   std::vector<Committer::Tell> tells;     // of the tick thread
+  bool closing_told = false;              // of the tick thread: sessions are told that the journal is closed to rows
   std::chrono::nanoseconds next_kept{};   // of the tick thread: when it is next said how much is kept
   Committer committer;                    // the last member with a thread: it tells the others
 

@@ -31,6 +31,14 @@ bool RoomHost::Impl::tick(std::chrono::nanoseconds now, bool last) {
   for (Queued& queued : batch) std::visit([this](auto& one) { decide(one); }, queued);
   const bool decided = player ? play(now) : !batch.empty();
   batch.clear();
+  // A commit that fails says so itself. What else closes a journal: damage that was found when it was opened, a witness, a
+  // name or a checkpoint that could not be written.
+  if (keeper && keeper->closed_to_rows() && !closing_told) {
+    closing_told = true;
+    later([this](const Result<void>&) {
+      if (!committer.failure()) close_room(*keeper->closed_to_rows());
+    });
+  }
   committer.commit(room.take_rows(), std::exchange(tells, {}));
   board.publish(RoomSeq{room_seq});
   people.publish(RoomSeq{room_seq}, Clock::time_point(std::chrono::duration_cast<Clock::duration>(now)));
@@ -107,6 +115,7 @@ void RoomHost::Impl::close_room(const Error& why) {
 
 std::optional<Error> RoomHost::Impl::closed() const {
   std::optional<Error> why = committer.failure();
+  if (!why && keeper && keeper->closed_to_rows()) why = *keeper->closed_to_rows();
   if (why) *why = {ErrorCode::unavailable, "the room takes no more cuts: " + why->message};
   return why;
 }
@@ -218,7 +227,7 @@ void RoomHost::queue_event(std::function<Result<RoomEvent>(Room&)> change,
   answer(failure(ErrorCode::unavailable, "the room is closed"));
 }
 
-bool RoomHost::stopped() const { return impl_->stopping || impl_->committer.failure(); }
+bool RoomHost::stopped() const { return impl_->stopping || impl_->closed(); }
 
 std::vector<FieldLeaf> RoomHost::all_leaves() const { return impl_->room.all_leaves(); }
 

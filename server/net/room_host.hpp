@@ -162,7 +162,7 @@ class RoomHost {
   // by then every session has been told. Error unavailable: the room has stopped.
   void queue_event(std::function<Result<RoomEvent>(Room&)> change, std::function<void(const Result<RoomEvent>&)> answer);
 
-  [[nodiscard]] bool stopped() const;        // takes no more
+  [[nodiscard]] bool stopped() const;        // takes no more, also where its keeper's journal does not
   // The process is about to stop: sessions, also those that are opened from now on, are told to come again after that time,
   // and go on until they have.
   void ask_to_redial(std::chrono::milliseconds after, const std::string& why);

@@ -81,6 +81,13 @@ tl::unexpected<Error> RoomKeeper::is_closed() const {
   return failure(ErrorCode::unavailable, "the room " + genesis_.room + " is closed; open it again");
 }
 
+void RoomKeeper::note_closing() {
+  const Error* why = journal_ ? journal_->closed_because() : nullptr;
+  if (why == nullptr || closed_to_rows_ != nullptr) return;
+  why_closed_to_rows_ = *why;
+  closed_to_rows_ = &*why_closed_to_rows_;
+}
+
 Result<KeptRoom> RoomKeeper::open(const std::filesystem::path& file, const Case& bone, const Options& options,
                                   const std::function<void(double)>& progress) {
   Result<Journal> journal = Journal::open(file, options.journal);
@@ -111,6 +118,7 @@ Result<KeptRoom> RoomKeeper::open(const std::filesystem::path& file, const Case&
   Result<Room> room = keeper->replay(bone, options.limits, fields, progress);
   if (!room) return failure(room.error().code, file.string() + ": " + room.error().message);
   keeper->evaluated_ = keeper->journal_->head().place.value - fields.place.value;
+  keeper->note_closing();
   return KeptRoom{std::move(*room), std::move(keeper), made};
 }
 

@@ -95,6 +95,9 @@ class RoomKeeper {
   // Returns when the rows are safe on the disk: for a Committer. Places go on from the last one.
   [[nodiscard]] Result<void> write(std::span<const RoomRow> rows);
   [[nodiscard]] JournalHead head() const;  // once closed: the last one
+  // Why its journal takes no more rows, for good: damage, a write that failed, a witness that knows more. Null: it takes rows.
+  // Never waits.
+  [[nodiscard]] const Error* closed_to_rows() const { return closed_to_rows_; }
   // Rises with every opening.
   [[nodiscard]] std::uint64_t server_epoch() const { return server_epoch_; }
   // Rows that were evaluated again when it was opened.
@@ -164,8 +167,11 @@ class RoomKeeper {
   auto with_journal(const Do& what) -> decltype(what(std::declval<Journal&>())) {
     const std::lock_guard in_turn(turn_);
     if (!journal_) return is_closed();
-    return what(*journal_);
+    auto done = what(*journal_);
+    note_closing();
+    return done;
   }
+  void note_closing();  // [in turn]
   [[nodiscard]] tl::unexpected<Error> is_closed() const;
   // The register is made by the first opening that finds none.
   [[nodiscard]] Result<void> find_witness_key(const Options& options);
@@ -181,6 +187,8 @@ class RoomKeeper {
   mutable InTurn turn_;
   std::optional<Journal> journal_;  // nothing: closed
   JournalHead last_;                // its head then
+  std::optional<Error> why_closed_to_rows_;                // set once, before the next, which points to it
+  std::atomic<const Error*> closed_to_rows_ = nullptr;
   const std::filesystem::path file_;
   const RoomGenesis genesis_;
   const double pitch_mm_;

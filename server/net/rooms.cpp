@@ -146,7 +146,7 @@ RoomSummary OpenRoom::close() {
 }
 
 void OpenRoom::keep_up(const std::function<bool()>& stop) {
-  if (!keeper_) return;
+  if (!keeper_ || keeper_->closed_to_rows()) return;
   if (Clock::now() - forgotten_ > std::chrono::hours(24)) {
     forgotten_ = Clock::now();
     if (const Result<std::size_t> gone = keeper_->forget_old(); !gone)
@@ -269,7 +269,7 @@ std::vector<RoomListing> Rooms::list() const {
     const HostHealth health = room->host().health();
     if (room->keeper()) tell_origin(listing, room->keeper()->genesis());
     listing.name = room->name;
-    listing.open = true;
+    listing.open = health.serving;
     listing.kept = room->keeper() != nullptr;
     listing.case_hash = room->host().bone().hash();
     listing.case_title = room->host().bone().info().title;
@@ -320,7 +320,10 @@ std::shared_ptr<OpenRoom> Rooms::take_in(std::shared_ptr<OpenRoom> room) {
     to_open_.erase(room->name);
   }
   note_open();
-  log::info("room open", {{"room", room->name}, {"room_seq", room->host().room_seq().value}, {"kept", room->keeper() != nullptr}});
+  log::info("room open", {{"room", room->name},
+                          {"room_seq", room->host().room_seq().value},
+                          {"kept", room->keeper() != nullptr},
+                          {"serving", !room->host().stopped()}});
   return room;
 }
 
@@ -388,7 +391,12 @@ Result<std::shared_ptr<OpenRoom>> Rooms::create(const std::string& name, const D
 
 Result<std::shared_ptr<OpenRoom>> Rooms::resume(const std::string& name, const std::function<void(double)>& progress) {
   const std::lock_guard changing(changing_);
-  if (const Result<std::shared_ptr<OpenRoom>> already = find(name); already && !name.empty()) return already;
+  if (const Result<std::shared_ptr<OpenRoom>> already = find(name); already && !name.empty()) {
+    const RoomKeeper* keeper = (*already)->keeper();
+    if (const Error* why = keeper ? keeper->closed_to_rows() : nullptr)
+      return failure(ErrorCode::unavailable, "the room " + name + " is there and takes no more cuts: " + why->message);
+    return already;
+  }
   const Result<fs::path> file = kept_file(name);
   if (!file) return tl::unexpected(file.error());
   const Result<RoomGenesis> genesis = peek_genesis(*file);
@@ -404,7 +412,7 @@ Result<std::shared_ptr<OpenRoom>> Rooms::resume(const std::string& name, const s
 // [with changing_]
 Result<std::shared_ptr<OpenRoom>> Rooms::open(const std::string& name, const LoadedCase& of, bool is_new,
                                               const std::function<void(double)>& progress) {
-  RoomKeeper::Options keeping{.name = name, .limits = options_.limits, .tools = {}, .journal = {}, .today = {}};
+  RoomKeeper::Options keeping{.name = name, .limits = options_.limits, .tools = {}, .journal = {}, .today = {}, .random = {}};
   keeping.retention_days = options_.retention_days;
   if (is_new) keeping.tools = options_.tools();
   // Half of the work is the events, half the surface, more or less.

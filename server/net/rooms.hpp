@@ -98,10 +98,11 @@ class OpenRoom {
 
 struct RoomListing {
   std::string name;
-  bool open = false, kept = false, replay = false;
+  bool open = false;          // one can join it: not where it has stopped, whose journal takes no more
+  bool kept = false, replay = false;
   Digest case_hash;
   std::string case_title;     // empty: the server has no such case
-  RoomSeq room_seq;           // of an open one, as the next two
+  RoomSeq room_seq;           // of an open or stopped one, as the next two
   std::size_t sessions = 0, watchers = 0;
   std::string parent;         // of a branch or a playback
   RoomSeq parent_room_seq;

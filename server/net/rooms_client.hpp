@@ -22,7 +22,8 @@ namespace osteon {
 // As proto/osteon/v1/rooms.proto has it.
 struct RoomLine {
   std::string name;
-  bool open = false, kept = false, replay = false;
+  bool open = false;   // one that is not, and is at an event, has stopped: it takes no more cuts
+  bool kept = false, replay = false;
   std::string case_title;
   RoomSeq room_seq;
   std::uint32_t sessions = 0, watchers = 0;

@@ -18,7 +18,8 @@ namespace osteon::test {
 struct KeptCuts {
   // A new one, or, where there is a journal, that one gone on with.
   KeptCuts(const std::filesystem::path& file, Disk* disk, const std::string& name, unsigned seed = 1)
-      : options{.name = name, .limits = {}, .tools = nullptr, .journal = {.disk = disk}, .retention_days = 0, .today = {}} {
+      : options{.name = name, .limits = {}, .tools = nullptr, .journal = {.disk = disk}, .retention_days = 0, .today = {},
+                .random = {}} {
     open(file);
     hand = room->join(MemberKind::surgeon, 1);
     cuts = strokes(hand, 400, seed);

@@ -131,6 +131,96 @@ TEST(HealthWatch, ARoomServesUntilItIsClosedOrKeepsNothingAnyMore) {
   }
 }
 
+// A hand's stream, which hears why it ends.
+class Hand final : public SessionSink {
+ public:
+  explicit Hand(AuthorId author) : author_(author) {}
+  AuthorId author() const override { return author_; }
+  void begin(RoomSeq, MessageParts, Bytes) override {}
+  void set_leaves(std::vector<FieldLeaf>) override {}
+  void offer(RoomSeq, const Bytes&) override {}
+  void answer(const Bytes&) override {}
+  void refuse(const Error&) override {}
+  void decided() override {}
+  void end(const std::string& why) override {
+    const std::lock_guard lock(mutex_);
+    ended_ = why;
+  }
+  std::size_t waiting() const override { return 0; }
+  [[nodiscard]] std::string ended() const {
+    const std::lock_guard lock(mutex_);
+    return ended_;
+  }
+
+ private:
+  const AuthorId author_;
+  mutable std::mutex mutex_;
+  std::string ended_;
+};
+
+// Of a journal that takes no row nothing is known to be safe that is decided now, however it came to that.
+TEST(HealthWatch, ARoomWhoseJournalIsDamagedIsOpenToNobody) {
+  TempDir dir;
+  MemoryDisk disk{1};
+  const std::filesystem::path file = "/rooms/femur.journal";
+  KeptCuts kept(file, &disk, "femur");
+  kept.cut(3);
+  ASSERT_TRUE(kept.room->mark(kept.hand, "before the reamer"));
+  kept.keep();
+  const JournalHead head = kept.keeper->head();
+  ASSERT_TRUE(kept.keeper->close());
+  const std::size_t at = disk.image().at(file).find("before the reamer");
+  ASSERT_NE(at, std::string::npos);
+  disk.flip_bit(file, 8 * at + 1);
+  kept.open(file);
+  ASSERT_EQ(kept.keeper->head().place.value, head.place.value - 1) << "the rest can be looked at";
+  Rooms rooms(RoomsOptions{.cases = {{test_block(), dir / "case"}}});
+  ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.keeper), {}, [](double) {}));
+  RoomHost& host = (*rooms.find("femur"))->host();
+  EXPECT_TRUE(host.stopped());
+  EXPECT_FALSE(host.health().serving);
+  Told told;
+  HealthWatch watch(rooms, told);
+  watch.look();
+  EXPECT_EQ(told.of("femur"), false);
+  EXPECT_EQ(told.of(""), true);
+  ASSERT_EQ(rooms.list().size(), 1u);
+  EXPECT_FALSE(rooms.list()[0].open) << "nobody can join it";
+  EXPECT_EQ(rooms.list()[0].room_seq.value, head.place.value - 1);
+  const auto joined = host.join(MemberKind::watcher);
+  ASSERT_FALSE(joined);
+  EXPECT_EQ(joined.error().code, ErrorCode::unavailable);
+  EXPECT_NE(joined.error().message.find("takes no more cuts: " + file.string()), std::string::npos) << joined.error().message;
+  const auto again = rooms.resume("femur");
+  ASSERT_FALSE(again);
+  EXPECT_NE(again.error().message.find(file.string()), std::string::npos) << again.error().message;
+  // Who was in it before is told too, also where the session is opened before the first tick.
+  const auto hand = std::make_shared<Hand>(kept.hand);
+  (void)host.open_session(hand);
+  EXPECT_TRUE(wait_until([&] { return hand->ended().starts_with("the room takes no more cuts"); }, kPatience)) << hand->ended();
+  host.leave(*hand);
+}
+
+TEST(HealthWatch, ARoomStopsWhenItsJournalIsClosedBesideACommit) {
+  TempDir dir;
+  MemoryDisk disk{1};
+  KeptCuts kept("/rooms/femur.journal", &disk, "femur");
+  kept.cut(1);
+  Rooms rooms(RoomsOptions{.cases = {{test_block(), dir / "case"}}});
+  ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.keeper), {}, [](double) {}));
+  RoomHost& host = (*rooms.find("femur"))->host();
+  const auto hand = std::make_shared<Hand>(kept.hand);
+  ASSERT_TRUE(host.open_session(hand));
+  EXPECT_TRUE(host.health().serving);
+  disk.fail_sync_at(1, EIO, MemoryDisk::Lasting::from_then_on);
+  ASSERT_FALSE(host.join(MemberKind::watcher, "Ada")) << "her name is kept before her place";
+  EXPECT_TRUE(host.stopped());
+  EXPECT_FALSE(host.health().serving);
+  EXPECT_FALSE(rooms.list()[0].open);
+  EXPECT_TRUE(wait_until([&] { return hand->ended().starts_with("the room takes no more cuts"); }, kPatience)) << hand->ended();
+  host.leave(*hand);
+}
+
 // As the server's upkeep asks it, every few seconds.
 TEST(Upkeep, AnIdleRoomsLogIsCut) {
   TempDir dir;
