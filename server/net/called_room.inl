@@ -65,15 +65,16 @@ inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const g
 }
 
 inline Status status_of(const Error& error) {
+  std::string said = short_words(error.message);
   switch (error.code) {
-    case ErrorCode::invalid_input: return invalid(error.message);
-    case ErrorCode::not_found: return {StatusCode::NOT_FOUND, error.message};
-    case ErrorCode::denied: return {StatusCode::PERMISSION_DENIED, error.message};
-    case ErrorCode::exhausted: return {StatusCode::RESOURCE_EXHAUSTED, error.message};
-    case ErrorCode::exists: return {StatusCode::ALREADY_EXISTS, error.message};
+    case ErrorCode::invalid_input: return invalid(std::move(said));
+    case ErrorCode::not_found: return {StatusCode::NOT_FOUND, std::move(said)};
+    case ErrorCode::denied: return {StatusCode::PERMISSION_DENIED, std::move(said)};
+    case ErrorCode::exhausted: return {StatusCode::RESOURCE_EXHAUSTED, std::move(said)};
+    case ErrorCode::exists: return {StatusCode::ALREADY_EXISTS, std::move(said)};
     case ErrorCode::unavailable:
-    case ErrorCode::unsupported: return {StatusCode::FAILED_PRECONDITION, error.message};
-    default: return {StatusCode::INTERNAL, error.message};
+    case ErrorCode::unsupported: return {StatusCode::FAILED_PRECONDITION, std::move(said)};
+    default: return {StatusCode::INTERNAL, std::move(said)};
   }
 }
 

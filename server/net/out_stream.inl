@@ -40,7 +40,18 @@ std::optional<Message> parse(const ByteBuffer& bytes) {
   return message;
 }
 
-inline Status invalid(std::string why) { return {StatusCode::INVALID_ARGUMENT, std::move(why)}; }
+// What a status says may quote what came, however long that is. A client's gRPC reads 8 kB of it with three bytes for each of some
+// letters, and drops the line behind more.
+inline std::string short_words(std::string why) {
+  constexpr std::size_t kMost = 1000;
+  if (why.size() <= kMost) return why;
+  std::size_t size = kMost;
+  while (size > 0 && (static_cast<unsigned char>(why[size]) & 0xc0u) == 0x80u) --size;  // no letter in halves
+  why.resize(size);
+  return why + " ...";
+}
+
+inline Status invalid(std::string why) { return {StatusCode::INVALID_ARGUMENT, short_words(std::move(why))}; }
 
 inline Status status_of(const Refusal& why) {
   return {why.is_known ? StatusCode::PERMISSION_DENIED : StatusCode::UNAUTHENTICATED, why.sentence};
