@@ -162,6 +162,13 @@ Bytes PeopleBoard::news(PeopleCursor& cursor, AuthorId reader, const PeopleRight
     least = absent[absent.size() - kMostAbsent];
   }
 
+  // A person's hand and their window are authors of their own: what is about the one is the other's as well.
+  const auto self = people_.find(reader);
+  const std::string name = self == people_.end() ? std::string() : self->second.name;
+  const auto is_readers = [&](AuthorId author) {
+    const auto one = people_.find(author);
+    return author == reader || (!name.empty() && one != people_.end() && one->second.name == name);
+  };
   v1::WatchPeopleResponse out;
   for (const auto& [author, entry] : people_) {
     if (!rights.people || entry.revision <= cursor.revision || (entry.streams == 0 && entry.last_here < least)) continue;
@@ -173,7 +180,7 @@ Bytes PeopleBoard::news(PeopleCursor& cursor, AuthorId reader, const PeopleRight
     person.set_hand(entry.hand);
     person.set_session_cuts(entry.cuts);
     if (entry.look) *person.mutable_look() = wire::to_wire(*entry.look);
-    if (!(author == reader ? rights.own_supervision : rights.others_supervision)) continue;
+    if (!(is_readers(author) ? rights.own_supervision : rights.others_supervision)) continue;
     if (entry.decided) *person.mutable_supervision() = wire::to_wire(entry.supervision);
     person.set_decided_room_seq(entry.decided.value);
     person.set_decided_by(entry.decided_by.value);
@@ -187,7 +194,7 @@ Bytes PeopleBoard::news(PeopleCursor& cursor, AuthorId reader, const PeopleRight
   for (const std::uint32_t known : cursor.annotations)
     if (rights.drawings && !drawn.contains(known)) out.add_wiped(known);
   for (const Said& said : words_) {
-    const bool own = !said.to || said.to == reader || said.from == reader;
+    const bool own = !said.to || is_readers(said.to) || is_readers(said.from);
     if (said.number <= cursor.words || !(own ? rights.own_words : rights.others_words)) continue;
     v1::Words& words = *out.add_words();
     words.set_room_seq(said.place.value);

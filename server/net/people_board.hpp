@@ -32,7 +32,7 @@ struct PeopleCursor {
   bool begun = false;
 };
 
-// What a reader may be told.
+// What a reader may be told. Own is what concerns anyone of the reader's name: who has come by it is one person.
 struct PeopleRights {
   bool people = true, drawings = true, own_supervision = true, others_supervision = true, own_words = true, others_words = true;
 };

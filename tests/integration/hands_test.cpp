@@ -223,5 +223,40 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
   EXPECT_GT(high.y_mm - low.y_mm, 10.0) << "of the 18 mm that the expert went to and fro";
 }
 
+// Who gives no name is nobody's second coming: what holds for one unnamed hand does not hold for the next. Of a name it does.
+TEST(Hands, WithoutANameArePersonsOfTheirOwn) {
+  Stage stage(24.0);
+  Process console = stage.start("osteon-viewer", {"--console", "--server", stage.address(), "--name", "Ada"});
+  const auto ask = [&](const std::string& command) {
+    console.write(command + "\n");
+    return console.read_line(60s).value_or("");
+  };
+  const auto there = [&](const std::string& person) {
+    return wait_until([&] { return std::regex_search(ask("people"), std::regex(person)); }, 60s);
+  };
+  ASSERT_TRUE(there("#1 \"Ada\" here you")) << console.err();
+  const json steps = json::array({drill_at(0, 0, "rig"), drill_at(0, 8, "rig")});
+  // Each in its turn, so that their numbers are known: 1 is the console's.
+  Process first = stage.start_haptic("first", {{"steps", steps}});
+  ASSERT_TRUE(there("#2 \"\" here hand")) << first.err();
+  ASSERT_TRUE(ask("freeze #2").starts_with("ok"));
+  Process second = stage.start_haptic("second", {{"steps", steps}});
+  ASSERT_TRUE(there("#3 \"\" here hand")) << second.err();
+  EXPECT_TRUE(there("#2 \"\" here hand frozen"));
+  EXPECT_EQ(ask("people").find("#3 \"\" here hand frozen"), std::string::npos) << "nobody has stopped this one";
+  ASSERT_TRUE(second.terminate(20s).has_value());
+
+  Process ben = start_hand(stage, "ben", steps);
+  ASSERT_TRUE(there("#4 \"ben\" here hand")) << ben.err();
+  ASSERT_TRUE(ask("freeze ben").starts_with("ok"));
+  ASSERT_TRUE(ben.terminate(20s).has_value());
+  std::filesystem::remove(stage / "ben.h5");
+  Process again = start_hand(stage, "ben", steps);
+  EXPECT_TRUE(there("#5 \"ben\" here hand frozen")) << "one person, by the name";
+  ASSERT_TRUE(again.terminate(20s).has_value());
+  ASSERT_TRUE(first.terminate(20s).has_value());
+  EXPECT_EQ(ask("quit"), "ok");
+}
+
 }  // namespace
 }  // namespace osteon::test

@@ -267,6 +267,18 @@ TEST(PeopleHost, AReaderIsToldWhatConcernsThem) {
   EXPECT_TRUE(Lesson::person(told(lesson.trainee, trainees), lesson.trainee)->has_supervision()) << "their own";
   EXPECT_TRUE(Lesson::person(told(lesson.instructor, {}), lesson.trainee)->has_supervision());
   EXPECT_EQ(told(lesson.trainee, trainees).words_size(), 1);
+  // A window beside a hand is of the same person, whoever else may look.
+  const auto window = [&](const std::string& name) {
+    AuthorId author;
+    lesson.host.join(MemberKind::watcher, name, {}, Role::trainee, [&](const Result<AuthorId>& given) { author = given.value(); });
+    lesson.tick();
+    return author;
+  };
+  const auto bens = window("Ben"), nobodys = window("");
+  EXPECT_TRUE(Lesson::person(told(bens, trainees), lesson.trainee)->has_supervision());
+  EXPECT_FALSE(Lesson::person(told(nobodys, trainees), lesson.trainee)->has_supervision());
+  EXPECT_EQ(told(window("Cy"), trainees).words_size(), 3) << "what is said to the hand is said to its window";
+  EXPECT_EQ(told(bens, trainees).words_size(), 1);
   EXPECT_EQ(told(lesson.other, trainees).words_size(), 3);
   EXPECT_EQ(told(lesson.instructor, {}).words_size(), 3);
 }
