@@ -289,7 +289,8 @@ int main(int argc, char** argv) {
   app.add_option("--server", options.room.address, "HOST:PORT of osteon-server")->required();
   app.add_option("--room", options.room.room, "Name of the room; not needed where the server has one");
   wire::add_door_options(app, options.door);
-  app.add_option("--name", options.room.name, "How others in the room see you called; over plain text also who you are, so that without it nobody is you again");
+  app.add_option("--name", options.room.name,
+                 "How others in the room see you called; over plain text also who you are, so that without it nobody is you again");
   app.add_option("--plan", options.hand.plan, "JSON file with the steps of a simulated surgeon");
   app.add_option("--tool", options.hand.tool,
                  "The tool for your own hand, of the box or of the server's --tools, e.g. drill-3.2; no --plan then");

@@ -270,7 +270,8 @@ TEST(PeopleHost, AReaderIsToldWhatConcernsThem) {
   // A window beside a hand is of the same person, whoever else may look.
   const auto window = [&](const std::string& name) {
     AuthorId author;
-    lesson.host.join(MemberKind::watcher, name, {}, Role::trainee, [&](const Result<AuthorId>& given) { author = given.value(); });
+    lesson.host.join(MemberKind::watcher, name, {}, Role::trainee,
+                     [&](const Result<AuthorId>& given) { author = given.value(); });
     lesson.tick();
     return author;
   };
