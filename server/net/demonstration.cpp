@@ -27,6 +27,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kMostUndecided = 64;
 constexpr Clock::duration kLongestPause = 3s;  // somebody thought, or the room was closed
+constexpr Clock::time_point kNever = Clock::time_point::max();
 
 struct Recorded {
   Cut cut;
@@ -73,6 +74,8 @@ class Demonstration final : public SessionSink, public std::enable_shared_from_t
   }
 
   AuthorId author() const override { return author_; }
+  // Its tool goes where it went on the bone, wherever that is on a mount, and no force is recorded.
+  bool feels_bone() const override { return false; }
   void begin(RoomSeq, MessageParts, Bytes complete) override {
     v1::SessionResponse said;
     (void)said.ParseFromString(*complete);
@@ -140,7 +143,7 @@ class Demonstration final : public SessionSink, public std::enable_shared_from_t
       if (has_next && now >= due_) return {Step::What::cut, next_cut()};
       if (seen_at_work && (stopped_ || now >= *seen_at_work)) return {Step::What::rest};
       if (has_next || seen_at_work)
-        wake_.wait_until(lock, std::min(has_next ? due_ : Clock::time_point::max(), seen_at_work.value_or(Clock::time_point::max())));
+        wake_.wait_until(lock, std::min(has_next ? due_ : kNever, seen_at_work.value_or(kNever)));
       else
         wake_.wait(lock);
     }

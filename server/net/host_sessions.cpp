@@ -267,7 +267,7 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, co
     open = sink.get();
     impl_->sessions.add(*sink);
     if (!again) impl_->people.came(sink->author());  // before it can leave
-    if (impl_->mount) impl_->mount->join(sink->author());
+    if (impl_->mount && sink->feels_bone()) impl_->mount->join(sink->author());
     sink->begin(impl_->room.room_seq(), std::move(before), serialised(complete));
     for (const ToolBox::Entry* entry : tools) sink->know_tool(impl_->number_of(entry->hash), entry->hash);
     if (held.place)

@@ -41,6 +41,8 @@ class SessionSink : public StreamSink {
   virtual void offer(RoomSeq place, const Bytes& row, const wire::SessionRow& /*fast*/) { offer(place, row); }
   // [thread of the tools' states] All tools' newest states. True: some of it is owed, and wants to be told again soon.
   virtual bool show_partners(const std::vector<CuttingState>& /*states*/) { return false; }
+  // Whether it pushes the bone on its mount and is pushed by it: whoever is not takes nothing of what others put into it.
+  [[nodiscard]] virtual bool feels_bone() const { return true; }
   // [tick] Where the bone stands on its mount, to this one.
   virtual void show_bone(const BoneSeen& /*seen*/) {}
   // What holds for the hand from the beginning, as a row that has no number: after begin().

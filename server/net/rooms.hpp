@@ -161,8 +161,8 @@ class Rooms {
   [[nodiscard]] bool ending() const { return ending_; }
   [[nodiscard]] std::map<std::string, RoomSummary> close_all();  // those that are open stay so in the folder's list
 
-  // For calls that take long: a thread for each kind, so that a slow one holds up none but its own. What concerns one room alone runs
-  // on that room's thread for slow requests.
+  // For calls that take long: a thread for each kind, so that a slow one holds up none but its own. What concerns one room
+  // alone runs on that room's thread for slow requests.
   JobThread jobs;        // whatever changes the rooms: one at a time, and opening one may take minutes
   JobThread files;       // what everybody asks for who comes: the lists of rooms and of cases, a case's files piece by piece
   JobThread recordings;  // journals that are read for demonstrations; that of a closed room waits until no room is being changed

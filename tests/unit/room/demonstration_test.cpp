@@ -57,6 +57,34 @@ class SeenTools final : public CuttingSink {
   std::map<std::uint64_t, std::vector<v1::CuttingState>> states_;
 };
 
+// A hand at the bone on its mount.
+class MountedHand final : public SessionSink {
+ public:
+  explicit MountedHand(AuthorId author) : author_(author) {}
+  AuthorId author() const override { return author_; }
+  void begin(RoomSeq, MessageParts, Bytes) override {}
+  void set_leaves(std::vector<FieldLeaf>) override {}
+  void offer(RoomSeq, const Bytes&) override {}
+  void answer(const Bytes&) override {}
+  void refuse(const Error& why) override { ADD_FAILURE() << why.message; }
+  void decided() override {}
+  void end(const std::string&) override {}
+  std::size_t waiting() const override { return 0; }
+  void show_bone(const BoneSeen& seen) override {
+    const std::lock_guard lock(mutex_);
+    seen_ = seen;
+  }
+  BoneSeen seen() const {
+    const std::lock_guard lock(mutex_);
+    return seen_;
+  }
+
+ private:
+  const AuthorId author_;
+  mutable std::mutex mutex_;
+  BoneSeen seen_;
+};
+
 // A server with the rooms "ward", open, and "shown" and "other", closed, each with a recording of 240 cuts in 2.4 s.
 class DemonstrationTest : public ::testing::Test {
  protected:
@@ -74,6 +102,7 @@ class DemonstrationTest : public ::testing::Test {
     auto store = CaseStore::open(dir_ / "cases", dir_ / "checker", {});
     ASSERT_TRUE(store.has_value()) << store.error().message;
     RoomsOptions options{.cases = {{test_block(), dir_ / "case"}}, .folder = dir_ / "rooms", .store = std::move(*store)};
+    options.rates.mount = true;
     auto rooms = std::make_unique<Rooms>(std::move(options));
     ASSERT_TRUE(rooms->resume("ward"));
     auto started = RoomServer::start(std::move(rooms), "127.0.0.1:0");
@@ -164,6 +193,29 @@ TEST_F(DemonstrationTest, EndsWhenTheServerIsToStop) {
     ASSERT_FALSE(late);
     EXPECT_EQ(late.error().code, ErrorCode::unavailable) << late.error().message;
   }
+}
+
+// What one hand puts into the bone is for the others who are pushed by it, and a demonstrator's tool is where it was on the bone.
+TEST_F(DemonstrationTest, NeitherMovesTheBoneOnItsMountNorTakesOfItsEnergy) {
+  const auto open = [&] {
+    auto hand = std::make_shared<MountedHand>(room_->host().join(MemberKind::surgeon).value());
+    EXPECT_TRUE(room_->host().open_session(hand));
+    return hand;
+  };
+  const auto one = open(), other = open();
+  const Result<Shown> shown = show(0.06);
+  ASSERT_TRUE(shown) << shown.error().message;
+  ASSERT_TRUE(wait_until([&] { return seen_.at_work(shown->demonstrator); }, kPatience));
+  for (const std::uint64_t number : {1u, 2u}) {
+    room_->host().push_bone(one->author(), {.push_seq = number, .load = {}, .energy_mj = number == 1 ? 5.0 : 8.0});
+    ASSERT_TRUE(wait_until([&] { return one->seen().push_seq == number; }, kPatience));
+  }
+  EXPECT_TRUE(wait_until([&] { return other->seen().energy_mj > 0; }, kPatience));
+  EXPECT_DOUBLE_EQ(other->seen().energy_mj, 3.0);
+  EXPECT_EQ(other->seen().shift.place_mm, Vec3(Vec3::Zero()));
+  EXPECT_TRUE(seen_.at_work(shown->demonstrator));
+  room_->host().leave(*one);
+  room_->host().leave(*other);
 }
 
 // Calls that everybody makes who comes.
