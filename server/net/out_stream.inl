@@ -40,8 +40,8 @@ std::optional<Message> parse(const ByteBuffer& bytes) {
   return message;
 }
 
-// What a status says may quote what came, however long that is. A client's gRPC reads 8 kB of it with three bytes for each of some
-// letters, and drops the line behind more.
+// What a status says may quote what came, however long that is. A client's gRPC reads 8 kB of it, with three bytes for each of
+// some letters, and after more it reads no answer on that line.
 inline std::string short_words(std::string why) {
   constexpr std::size_t kMost = 1000;
   if (why.size() <= kMost) return why;

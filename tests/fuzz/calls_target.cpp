@@ -248,11 +248,12 @@ class Server {
     const bool sound = code != StatusCode::INTERNAL && code != StatusCode::UNKNOWN && code != StatusCode::DEADLINE_EXCEEDED;
     // Bytes that are no message at all are refused by gRPC itself, which says no more than that.
     // Where they are refused by the server it says a sentence, which no client's limit of 8 kB cuts off.
-    const bool told = (call.status.ok() || call.answered || !call.status.error_message().empty() || code == StatusCode::UNIMPLEMENTED) &&
-                      call.status.error_message().size() <= kMostSaidBytes;
+    const std::string said = call.status.error_message();
+    const bool told = (call.status.ok() || call.answered || !said.empty() || code == StatusCode::UNIMPLEMENTED) &&
+                      said.size() <= kMostSaidBytes;
     if (!sound || !told) {
       std::fprintf(stderr, "%s was answered with status %d, %s: OSTEON_FUZZ_INPUT=%s\n", call.method->full_name().c_str(), code,
-                   call.status.error_message().c_str(), hex_of(call.input).c_str());
+                   said.c_str(), hex_of(call.input).c_str());
       OSTEON_CHECK(sound && told);
     }
     call.line.reset();

@@ -1,6 +1,6 @@
 // Every target on seeded mutations of its valid inputs; OSTEON_FUZZ_RUNS in the environment asks for more of them, in all of a
-// target's seeds together, OSTEON_FUZZ_TARGET for one target alone, OSTEON_FUZZ_SEED for other mutations (1 if it is not set), and
-// OSTEON_FUZZ_INPUT, in hexadecimal digits, for nothing but that input.
+// target's seeds together, OSTEON_FUZZ_TARGET for one target alone, OSTEON_FUZZ_SEED for other mutations (1 if it is not set),
+// and OSTEON_FUZZ_INPUT, in hexadecimal digits, for nothing but that input.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -96,8 +96,8 @@ TEST(Fuzz, TargetsStandMutatedInputs) {
     const double memory_mb = resident_mb();  // what a start takes is there by then
     done += run_asked(target, count - done, random);
     settle();
-    std::printf("fuzzed: %s %ld inputs; memory after a tenth of them %.1f MB, at the end %.1f MB\n", target.name.c_str(), done, memory_mb,
-                resident_mb());
+    std::printf("fuzzed: %s %ld inputs; memory after a tenth of them %.1f MB, at the end %.1f MB\n", target.name.c_str(), done,
+                memory_mb, resident_mb());
     if (target.figures) std::printf("fuzzed: %s\n", target.figures().c_str());
   }
   EXPECT_TRUE(any) << "there is no such target";
