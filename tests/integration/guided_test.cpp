@@ -114,7 +114,8 @@ TEST(Demonstration, IsOverWhenTheServerIsToStop) {
     Surgeon hand(stage.address(), stage / "cache");
     ASSERT_TRUE(wait_until([&] { return hand.complete(); }, kPatience));
     for (std::uint64_t i = 1; i <= kCuts; ++i) {
-      Cut cut = straight_cut(find_tool("burr-round-5").value(), {-5.0 + static_cast<double>(i), 0, 0}, {-5.0 + static_cast<double>(i), 1, 0}, {0, 0, -1}, i);
+      const double x_mm = static_cast<double>(i) - 5.0;
+      Cut cut = straight_cut(find_tool("burr-round-5").value(), {x_mm, 0, 0}, {x_mm, 1, 0}, {0, 0, -1}, i);
       cut.author = hand.author();
       ASSERT_TRUE(hand.session().send(cut));
       ASSERT_TRUE(wait_until([&] { return hand.own() == i; }, kPatience)) << hand.rejected();

@@ -118,7 +118,8 @@ class DemonstrationTest : public ::testing::Test {
     server_.reset();
   }
   Result<Shown> show(double speed, const std::string& of = {}) {
-    return room_->demonstrations().begin(server_->rooms(), *room_, instructor_, {}, {.room = of, .of = {}, .from = {}, .to = {}, .speed = speed});
+    const WhatToShow what{.room = of, .of = {}, .from = {}, .to = {}, .speed = speed};
+    return room_->demonstrations().begin(server_->rooms(), *room_, instructor_, {}, what);
   }
   void decide(AuthorId about, const Supervision& word) {
     std::promise<Result<RoomEvent>> answer;
@@ -226,8 +227,10 @@ class CallsOfOthers {
   std::string fail() const {
     v1::ListRoomsResponse rooms;
     v1::ListCasesResponse cases;
-    const grpc::Status listed = ask([&](auto* context) { return v1::RoomsService::NewStub(room_.channel)->ListRooms(context, {}, &rooms); });
-    const grpc::Status asked = ask([&](auto* context) { return v1::CaseService::NewStub(room_.channel)->ListCases(context, {}, &cases); });
+    const auto of_rooms = v1::RoomsService::NewStub(room_.channel);
+    const auto of_cases = v1::CaseService::NewStub(room_.channel);
+    const grpc::Status listed = ask([&](auto* context) { return of_rooms->ListRooms(context, {}, &rooms); });
+    const grpc::Status asked = ask([&](auto* context) { return of_cases->ListCases(context, {}, &cases); });
     const grpc::Status fetched = ask([&](auto* context) {
       v1::GetCaseRequest request;
       request.set_case_hash(wire::to_wire(room_.case_hash));
