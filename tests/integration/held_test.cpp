@@ -43,13 +43,13 @@ void expect_held(Stage& stage) {
   // Numbers are known: 1 is the instructor's.
   constexpr std::uint64_t kFirst = 2, kAgain = 3;
   const json plan = {{"steps", json::array({drill_at(-8.0, 0.0, "expert"), drill_at(-8.0, 8.0, "expert")})}};
-  Process first = stage.start_haptic("first", plan);
+  Process first = stage.start_haptic("first", plan, "Ben");
   ASSERT_TRUE(wait_until([&] { return ada.cuts(kFirst) >= 5; }, 60s)) << first.err();
   ASSERT_TRUE(ada.ask("freeze #2 wait for me").starts_with("ok at "));
   ASSERT_TRUE(ada.ask("limit force #2 3").starts_with("ok at "));
   ASSERT_TRUE(first.terminate(20s).has_value());
 
-  Process again = stage.start_haptic("again", plan);
+  Process again = stage.start_haptic("again", plan, "Ben");
   const auto held = [&] { return ada.person(kAgain).find("frozen force 3.000 words \"wait for me\" heard") != std::string::npos; };
   ASSERT_TRUE(wait_until(held, 60s)) << ada.person(kAgain) << again.err();
   std::this_thread::sleep_for(1s);

@@ -47,8 +47,8 @@ class Stage {
   // Another server on the same case, after the first has ended; the stage's address is its own now.
   void start_server(std::vector<std::string> more);
   [[nodiscard]] Process start(const std::string& name, std::vector<std::string> arguments, ProcessOptions options = {}) const;
-  // A haptic client that carries out a plan and leaves NAME.csv, NAME-cuts.csv and NAME.json.
-  [[nodiscard]] Process start_haptic(const std::string& name, const nlohmann::json& plan) const;
+  // A haptic client that carries out a plan and leaves NAME.csv, NAME-cuts.csv and NAME.json, of a person or of nobody known.
+  [[nodiscard]] Process start_haptic(const std::string& name, const nlohmann::json& plan, const std::string& person = {}) const;
 
  private:
   TempDir temp_;
