@@ -233,9 +233,12 @@ Result<std::unique_ptr<DiskLock>> take_rooms_folder(const std::filesystem::path&
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) return failure(ErrorCode::internal, "the folder --rooms " + folder.string() + " cannot be made: " + error.message());
-  if (Result<void> usable = check_writable(folder / "open-rooms", "which rooms are open", "--rooms"); !usable)
-    return tl::unexpected(usable.error());
-  return lock_rooms(folder);
+  Result<std::unique_ptr<DiskLock>> taken = lock_rooms(folder);
+  // Of another's folder nothing is touched; why one cannot be written, this says in the words of the option.
+  if (taken || taken.error().code != ErrorCode::exists)
+    if (Result<void> usable = check_writable(folder / "open-rooms", "which rooms are open", "--rooms"); !usable)
+      return tl::unexpected(usable.error());
+  return taken;
 }
 
 // The only room's own, or one for each by its name.

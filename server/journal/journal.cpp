@@ -169,11 +169,16 @@ Result<void> Journal::write(const std::function<Result<void>()>& work) {
   if (state.closed) return tl::unexpected(*state.closed);
   Result<void> done = work();
   if (done) return done;
-  state.closed = Error{ErrorCode::unavailable, state.path.string() + " takes no more rows, since a write to it failed: " +
-                                                   done.error().message + "; recover it into a new journal"};
+  close_for_good({ErrorCode::unavailable, state.path.string() + " takes no more rows, since a write to it failed: " +
+                                              done.error().message + "; recover it into a new journal"});
+  return tl::unexpected(*state.closed);
+}
+
+void Journal::close_for_good(Error reason) {
+  State& state = *state_;
+  close_to_rows(std::move(reason));
   if (auto note = DurableFile::begin(*state.disk, failed_of(state.path)); note && note->write(state.closed->message))
     static_cast<void>(note->finish());  // best effort: the disk may take nothing at all
-  return tl::unexpected(*state.closed);
 }
 
 Result<void> Journal::append(std::span<const JournalRow> rows) {
@@ -247,9 +252,10 @@ Result<void> Journal::check_witness(const JournalHead& witness) {
                    file + " was recovered to place " + std::to_string(state.recovered_to->value) +
                        ", and a client knows place " + place + ": what it knows beyond is lost, it has to join anew");
   if (witness.place > state.head.place) {
-    close_to_rows({ErrorCode::unavailable,
-                   file + " goes to place " + std::to_string(state.head.place.value) + ", but a client was told that place " +
-                       place + " is safe: rows were lost; recover it into a new journal, or go on from a backup"});
+    // Also for the next process: whoever knows more may not come again to say so.
+    close_for_good({ErrorCode::unavailable,
+                    file + " goes to place " + std::to_string(state.head.place.value) + ", but a client was told that place " +
+                        place + " is safe: rows were lost; recover it into a new journal, or go on from a backup"});
     return tl::unexpected(*state.closed);
   }
   const auto chain = state.file.chain_at(witness.place);

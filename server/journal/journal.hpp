@@ -75,7 +75,7 @@ class Journal {
   [[nodiscard]] JournalSlice read_slice(const JournalHead& after, RoomSeq last, std::size_t most_rows);
 
   // What somebody was told was safe, a client's last acknowledged row, say. Error unavailable: the journal is behind it, and
-  // from now on closed to rows, unless it was recovered with losses (see recovered_to); or it is closed to rows, and its file
+  // from now on closed to rows for good, unless it was recovered with losses (see recovered_to); or it is closed to rows, and its file
   // does not show what the witness knows. Error invalid_input: the witness knows another history.
   [[nodiscard]] Result<void> check_witness(const JournalHead& witness);
   // Where it was cut off when it was recovered from a damaged one: what a witness knows beyond is lost for good.
@@ -115,6 +115,7 @@ class Journal {
   [[nodiscard]] static Result<Journal> open_locked(const std::filesystem::path& file, const JournalOptions& options,
                                                    std::unique_ptr<DiskLock> lock);
   [[nodiscard]] Result<void> write(const std::function<Result<void>()>& work);
+  void close_for_good(Error reason);  // with a note beside the file for the next process
   [[nodiscard]] Result<std::size_t> keep_people(const std::function<bool(const Person&)>& kept);
   std::unique_ptr<State> state_;
 };

@@ -287,9 +287,8 @@ Demonstrations::Demonstrations() = default;
 Demonstrations::~Demonstrations() { end_all(); }
 
 Result<Shown> Demonstrations::begin(Rooms& rooms, OpenRoom& in, AuthorId by, const Caller& caller, const WhatToShow& what) {
-  if (!(what.speed > 0 && what.speed <= kMostSpeed))
-    return failure(ErrorCode::invalid_input,
-                   "the speed is not more than 0 and at most " + std::to_string(static_cast<int>(kMostSpeed)));
+  if (!(what.speed >= kLeastSpeed && what.speed <= kMostSpeed))
+    return failure(ErrorCode::invalid_input, "the speed is not from 0.001 to " + std::to_string(static_cast<int>(kMostSpeed)));
   if (const std::optional<std::string> why = rooms.draining()) return failure(ErrorCode::unavailable, *why);
   Result<Recording> recording = read_recording(rooms, in, what, over_);
   if (!recording) return tl::unexpected(recording.error());

@@ -34,7 +34,7 @@ struct Shown {
 class Demonstrations {
  public:
   static constexpr std::size_t kMost = 4, kMostCuts = 100'000;
-  static constexpr double kMostSpeed = 100.0;
+  static constexpr double kLeastSpeed = 0.001, kMostSpeed = 100.0;
 
   Demonstrations();
   ~Demonstrations();
@@ -53,7 +53,7 @@ class Demonstrations {
   void end_all();
 
  private:
-  std::mutex mutex_;  // never held with another that is taken within, but that of a demonstration
+  std::mutex mutex_;  // taken before those of the room, the gate and a demonstration, within none
   std::vector<std::shared_ptr<Demonstration>> going_on_;  // shared with the cuts that they have queued
   std::atomic<bool> over_{false};
 };

@@ -134,7 +134,7 @@ class OutStream : public Reactor {
   // Ends the stream after the message in flight; an OK end sends what waits first, unless there comes a reason not to.
   void close_locked(Status status) {
     const bool cuts_off = !status.ok() && !finished_ && !failing();
-    if (!closing_ || cuts_off) closing_ = std::move(status);
+    if (!closing_ || cuts_off) closing_ = Status(status.error_code(), short_words(status.error_message()));
     if (cuts_off) {
       drop_waiting();
       let_go_later();

@@ -67,9 +67,10 @@ struct RoomReport {
   [[nodiscard]] bool sound() const { return faults.empty(); }
 };
 
-// When a reopened room's time goes on. Nobody knows how long it was away, and its hands worked on for the two seconds after
-// which they hold the server for silent: their cuts come when it is back, and the time that they took must have passed.
-inline constexpr std::chrono::nanoseconds kTimeAway = std::chrono::milliseconds(2500);
+// When a reopened room's time goes on. Nobody knows how long it was away, and its hands worked on: for two seconds where they
+// heard nothing, up to the most cuts that they leave unconfirmed (3.6 s) where they heard something else. Their cuts come when
+// it is back, and the time that these took must have passed.
+inline constexpr std::chrono::nanoseconds kTimeAway = std::chrono::seconds(4);
 [[nodiscard]] std::chrono::nanoseconds reopened_time(const Room& room);
 
 // Any thread. What takes long holds the journal for a slice of rows at a time, between which rows are written. After close()

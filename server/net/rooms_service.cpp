@@ -69,7 +69,6 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
       response->mutable_room()->set_name(request->name());
       for (const RoomListing& listing : rooms_.list())
         if (listing.name == request->name()) *response->mutable_room() = to_wire(listing);
-      response->mutable_room()->set_room_seq(closed->bone.room_seq.value);
       return Status(Status::OK);
     });
   }

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <thread>
 
+#include "haptic_client/control/cut_recorder.hpp"
 #include "haptic_client/control/room_watch.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/support/temp_dir.hpp"
@@ -115,10 +116,16 @@ TEST_F(KeeperTest, BelievesWhatItSealedAndNothingElseOfWhatItLacks) {
   kept.open(kFile);
   EXPECT_EQ(kept.keeper->check_witness(late).error().code, ErrorCode::unavailable);
   EXPECT_FALSE(kept.keeper->write(plain_rows(kept.keeper->head().place, 1))) << "rows were lost: it takes no more";
+  kept.keeper.reset();
+  kept.open(kFile);
+  EXPECT_FALSE(kept.keeper->write(plain_rows(kept.keeper->head().place, 1))) << "nor when it is opened again";
 }
 
 TEST_F(KeeperTest, TimeGoesOnByMoreThanHandsWorkInSilence) {
-  static_assert(std::chrono::duration<double>(kTimeAway).count() > haptic::RoomWatch::kSilence_s);
+  // What a hand may have done since the last row: cuts until it hears nothing for so long, or leaves so many unconfirmed.
+  constexpr double kTick_s = 0.001, kAway_s = std::chrono::duration<double>(kTimeAway).count();
+  static_assert(kAway_s > haptic::RoomWatch::kSilence_s);
+  static_assert(kAway_s > haptic::RoomWatch::kMostUnconfirmed * haptic::CutRecorder::kTicksPerCut * kTick_s);
   KeptCuts kept(kFile, &disk_, "femur");
   EXPECT_EQ(reopened_time(Room(test_block())), 0ns) << "a new one";
   kept.cut(3);
