@@ -147,8 +147,12 @@ Crossed run_touch(const OverseenRun& run, std::uint64_t seed, int seconds) {
     // Now and then it is drawn out, as a hand does whose tool is held by bone that came back.
     if (i % 5000 == 4000) down = -1500.0;
     if (down < 0.0) {
-      hand.command.mode = HandMode::carry;
       const Vec3 at_mm = hand.handle_mm();
+      // From what it pushed with: no hand lets go of that within a tick, and what the ledger promises is for hands that
+      // accelerate a handle by no more than 10 m/s^2 (deploy/decisions/0021).
+      if (hand.command.mode == HandMode::push)
+        hand.command.target_mm.z() = at_mm.z() + expert_hand().push_n / expert_hand().stiffness_n_per_mm;
+      hand.command.mode = HandMode::carry;
       hand.command.target_mm = Vec3(at_mm.x(), at_mm.y(), std::max(-8.0, hand.command.target_mm.z() - 0.02));
     } else if (drills) {
       hand.command.mode = HandMode::push;

@@ -112,7 +112,7 @@ def knocking(run):
         host, port = address.rsplit(":", 1)
         plan = out / "plan.json"
         # Slow enough that it is at work all the while.
-        plan.write_text(json.dumps(plans.drill("rig", feed_mm_per_s=0.25, beyond_mm=1)), encoding="utf-8")
+        plan.write_text(json.dumps(plans.drill("rig", feed_mm_per_s=0.14, beyond_mm=1)), encoding="utf-8")
         hand = household.start("hand", [run.programs / "osteon-haptic", "--server", address, *doors.person("anna", "trainee"),
                                         "--room", ROOM, "--plan", plan, "--cut-log", out / "cuts.csv", "--summary", out / "hand.json",
                                         "--session-log", out / "hand.csv"])
