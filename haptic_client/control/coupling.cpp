@@ -30,6 +30,11 @@ void Coupling::let_go_all(const Vec3& handle_mm, const Vec3& proxy_mm) noexcept 
   extension_mm_.setZero();
 }
 
+void Coupling::turn(const Eigen::Quaterniond& now_before) noexcept {
+  slack_mm_ = now_before * slack_mm_;
+  returned_mm_ = now_before * returned_mm_;
+}
+
 void Coupling::let_go(Vec3& offset_mm, Vec3& extension_mm, const Vec3& to_mm) noexcept {
   const Vec3 change_mm = to_mm - extension_mm;
   offset_mm += change_mm;

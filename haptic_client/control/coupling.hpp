@@ -43,6 +43,8 @@ class Coupling {
   void reset(const Vec3& handle_mm, const Vec3& proxy_mm) noexcept;
   // [haptic] The handle was found elsewhere, as after a device came back: the tool stays, what lies between is slack.
   void let_go_all(const Vec3& handle_mm, const Vec3& proxy_mm) noexcept;
+  // [haptic] The bone's frame turned, by this into its new axes: the offset is the hand's and does not turn with the bone.
+  void turn(const Eigen::Quaterniond& now_before) noexcept;
   // [haptic] One tick, after the proxy's step towards handle + offset(). Keeps the ledger's stored energy.
   CouplingForce step(const CouplingMoment& moment, const ProxyStep& proxy, EnergyLedger& ledger, double dt_s,
                      double smooth_s) noexcept;

@@ -90,7 +90,13 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
     ramp_ = 0.0;
   }
   device_was_ok_ = input.device_ok;
-  const Motion hand = between(device_, pose_bone_device);
+  // The spring hangs at handle + offset. Seen from the bone that place moves also where a bone that turns leaves the offset
+  // behind; were it to turn along, a hand with much slack would get, or lose, work that nobody reckons.
+  Motion hand = between(device_, pose_bone_device);
+  const Vec3 offset_before_mm = coupling_.offset_mm();
+  if (bone_.rotation.coeffs() != bone_before_.rotation.coeffs())
+    coupling_.turn(bone_.rotation.conjugate() * bone_before_.rotation);
+  hand.move_mm += coupling_.offset_mm() - offset_before_mm;
   ledger_.observe(hand.move_mm / mapping_.scale(), hand.turn_rad);
 
   // A guide lets the tool go only where its opening does; the hand feels the guide as the way that it is kept from.

@@ -248,6 +248,31 @@ TEST(MountedBone, TurnsForcesWithTheBone) {
   }
 }
 
+// What a hand is deeper in bone than its device can show lies between hand and tool and stays with them: a bone that turns under
+// the tip of the tool does not swing it about.
+TEST(MountedBone, TurnsUnderSlackWithoutIt) {
+  User user({}, true, 1);
+  user.push_mm = 25.0;
+  const auto run = [&](double angle, int ticks) {
+    const Pose bone{Vec3::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(angle, Vec3::UnitX()))};
+    for (int i = 0; i < ticks; ++i) {
+      user.loop->see_bone(bone);
+      user.tick();
+    }
+    return bone.point(user.last.pose_bone_proxy.position_mm);
+  };
+  const Vec3 tip_mm = run(0.0, 3000);
+  ASSERT_GT(user.last.offset_mm.norm(), 10.0);
+  const double before_n = user.force_n();
+  for (int i = 1; i <= 100; ++i) {
+    const double angle = 1e-3 * i;
+    const Vec3 moved_mm = run(angle, 20) - tip_mm;
+    // It slides a little on a face that tilts, and the hand gives way; the slack would carry it by its whole length.
+    if (angle > 0.01) ASSERT_LE(moved_mm.norm(), 0.5 * angle * user.last.offset_mm.norm()) << angle;
+  }
+  EXPECT_GT(user.force_n(), 0.9 * before_n);
+}
+
 // A bone that comes at the hand as fast as one is ever shown, 60 mm/s: what would be 3 N more in every millisecond comes slowly.
 TEST(MountedBone, WhatMovesTheBoneRaisesTheForceSlowly) {
   User user({}, true, 1);
