@@ -16,6 +16,19 @@ Vec3 clamped(const Vec3& v, double most) {
   return size > most ? Vec3(v * (most / size)) : v;
 }
 
+// The longest step that comes to no more than that way with all after it, each shorter by `less`: whole ones of it, and a part.
+double braking(double way, double less) {
+  const double whole = std::floor(0.5 * (std::sqrt(1.0 + 8.0 * way / less) - 1.0));
+  return less * whole + (way - 0.5 * less * whole * (whole + 1.0)) / (whole + 1.0);
+}
+
+// A step against the load only so long that funds pay for it and for braking after it.
+Vec3 slowed(const Vec3& step, const Vec3& load, double less, double funds_mj) {
+  const double size = load.norm(), against = size > 0.0 ? -step.dot(load) / size : 0.0;
+  const double most = against > 0.0 ? braking(funds_mj / size, less) : 0.0;
+  return against > most ? Vec3(step + load * ((against - most) / size)) : step;
+}
+
 Eigen::Quaterniond quaternion(const Vec3& turn_rad) {
   const double angle = turn_rad.norm();
   return angle > 0.0 ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, turn_rad / angle)) : Eigen::Quaterniond::Identity();
@@ -125,7 +138,6 @@ void ShownBone::step(const Load& load, double dt_s) noexcept {
   load_ = load.finite() ? load : Load{};
   now_s_ += dt_s;
   since_seen_s_ += dt_s;
-  held_back_ = false;
 
   // Two passes, so that neither the pose nor its speed jumps at a pose told.
   low_pass_s_ = std::clamp(params_.per_lag * (std::max(lag_s_, slowest_s_) + mount_lag_s_), params_.least_s, params_.most_s);
@@ -138,6 +150,13 @@ void ShownBone::step(const Load& load, double dt_s) noexcept {
   }
   Vec3 move_mm = clamped(share_again * (smooth_.mm - shown_.mm), params_.most_mm_per_s * dt_s);
   Vec3 turn_rad = clamped(share_again * rotation_vector(smooth_.turn * shown_.turn.conjugate()), params_.most_rad_per_s * dt_s);
+  // Slowed ahead of what funds compel, and setting out and stopping no faster than a bone does.
+  const double most_mm = params_.most_mm_per_s2 * dt_s * dt_s, most_rad = params_.most_rad_per_s2 * dt_s * dt_s;
+  const Vec3 paid_mm = slowed(move_mm, load_.force_n, most_mm, funds_mj());
+  const Vec3 paid_rad = slowed(turn_rad, load_.moment_nmm, most_rad, funds_mj());
+  held_back_ = paid_mm != move_mm || paid_rad != turn_rad;
+  move_mm = move_mm_ + clamped(paid_mm - move_mm_, most_mm);
+  turn_rad = turn_rad_ + clamped(paid_rad - turn_rad_, most_rad);
 
   // What the step takes from the hand, and what it gives: only along force and moment, and only as far as there are funds.
   double by_move_mj = load_.force_n.dot(move_mm), by_turn_mj = load_.moment_nmm.dot(turn_rad);
@@ -152,6 +171,8 @@ void ShownBone::step(const Load& load, double dt_s) noexcept {
     by_move_mj = load_.force_n.dot(move_mm);
     by_turn_mj = load_.moment_nmm.dot(turn_rad);
   }
+  move_mm_ = move_mm;
+  turn_rad_ = turn_rad;
   shown_.mm += move_mm;
   shown_.turn = (quaternion(turn_rad) * shown_.turn).normalized();
 

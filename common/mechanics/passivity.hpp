@@ -9,8 +9,10 @@
 //
 //   funds = allowance + put in - released - given away + granted >= 0
 //
-// A step of the shown bone that would overdraw it is held back as far as it gives energy. Nothing is forgotten by that: the
-// pose told is where the bone goes as soon as that is paid for, or costs nothing as the hand lets go. What its hand has put in,
+// A step of the shown bone that would overdraw it is held back as far as it gives energy, and ahead of that it is slowed, so
+// that it seldom stops at once. Nothing is forgotten by that: the pose told is where the bone goes as soon as that is paid for,
+// or costs nothing as the hand lets go. Nor does it set out at once: the hand's own ledger, which looks a tick ahead, reckons
+// with no more than what hands and bones can accelerate. What its hand has put in,
 // but for a little, a client gives away; the server grants it to the others, who need it to be pushed back and hand on what
 // they do not. Totals that never fall are told, so that loss and order do no harm. Over all users, for any line and any hand:
 //
@@ -91,6 +93,7 @@ struct ShownBoneParams {
   double least_s = 0.03, most_s = 2.0;   // time constant of the low pass
   double per_lag = 4.0;                  // it is this many times the lag of the slowest line and of the mount itself
   double most_mm_per_s = 60.0, most_rad_per_s = 1.0;
+  double most_mm_per_s2 = 5000.0, most_rad_per_s2 = 50.0;  // but for a stop that funds compel [A]
   double allowance_mj = 2.0;             // that may be released unpaid, in all
   double kept_mj = 2.0;                  // of what this hand put in; the rest is given away at once
   double granted_most_mj = 50.0;         // of what others gave, at hand
@@ -132,6 +135,7 @@ class ShownBone {
 
   ShownBoneParams params_;
   Place told_, smooth_, shown_;     // the newest pose, after one pass, after both
+  Vec3 move_mm_ = Vec3::Zero(), turn_rad_ = Vec3::Zero();  // of the last step
   Load load_;
   double own_mj_, others_mj_ = 0;   // funds: of what this hand put in, and of what was granted
   double put_in_mj_ = 0, released_mj_ = 0, given_mj_ = 0, granted_mj_ = 0;

@@ -343,7 +343,13 @@ Motion Proxy::allowed(const Tick& tick, const Motion& piece, Against against, co
     const Pose there = moved(pose_, motion);
     ++tries_;
     look(tick, there, against, there_);
-    if (!there_.values.covered) return {};  // not known there: the tool waits for its patch
+    // Not known there: the tool waits for its patch, at the edge of what is. A patch is about the tool, so a tool that did not
+    // go a part of the way would wait for ever.
+    if (!there_.values.covered) {
+      if (attempt == kMostHere) return {};
+      motion = 0.5 * motion;
+      continue;
+    }
     const int before = conditions_->count();
     add_conditions(tick, there_, there, motion, 0.0, true);
     if (conditions_->count() == before) {

@@ -141,22 +141,30 @@ Crossed run_touch(const OverseenRun& run, std::uint64_t seed, int seconds) {
   hand.pedal = true;
   hand.run(400);
   Supervision now;
+  constexpr double kThrough_mm = 11.0, kOut_mm = -4.0;  // of bone from 0 to 12
+  Vec3 place_mm(0, 0, -3), from_mm = place_mm;  // where it drills, and where it is drawn out
   std::uint64_t seq = 0;
   double down = 0;
   for (int i = 0; i < 1000 * seconds; ++i, ++down) {
-    // Now and then it is drawn out, as a hand does whose tool is held by bone that came back.
-    if (i % 5000 == 4000) down = -1500.0;
+    // Now and then it is drawn out, as a hand does whose tool is held by bone that came back, or has come through, and goes to
+    // another place.
+    const Vec3 at_mm = hand.handle_mm();
+    if (i % 5000 == 4000 || (drills && down >= 0.0 && at_mm.z() > kThrough_mm)) {
+      down = -1500.0;
+      place_mm = Vec3(18.0 * random.unit() - 9.0, 8.0 * random.unit() - 4.0, -3.0);
+      from_mm = at_mm;
+    }
     if (down < 0.0) {
-      const Vec3 at_mm = hand.handle_mm();
       // From what it pushed with: no hand lets go of that within a tick, and what the ledger promises is for hands that
       // accelerate a handle by no more than 10 m/s^2 (deploy/decisions/0021).
       if (hand.command.mode == HandMode::push)
         hand.command.target_mm.z() = at_mm.z() + expert_hand().push_n / expert_hand().stiffness_n_per_mm;
       hand.command.mode = HandMode::carry;
-      hand.command.target_mm = Vec3(at_mm.x(), at_mm.y(), std::max(-8.0, hand.command.target_mm.z() - 0.02));
+      const Vec3& over_mm = !drills ? at_mm : at_mm.z() < kOut_mm ? place_mm : from_mm;
+      hand.command.target_mm = Vec3(over_mm.x(), over_mm.y(), std::max(-8.0, hand.command.target_mm.z() - 0.02));
     } else if (drills) {
       hand.command.mode = HandMode::push;
-      hand.command.target_mm = Vec3(0, 0, -3);
+      hand.command.target_mm = place_mm;
     } else {
       hand.command.mode = HandMode::carry;
       hand.command.target_mm = Vec3(5.0 * std::sin(2e-3 * i), 0, std::min(6e-3 * down - 3.0, 0.2e-3 * i + 0.5));

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "tests/support/allocation_counter.hpp"
 #include "tests/support/mount/two_users.hpp"
@@ -123,6 +124,34 @@ TEST(ShownBone, ForgetsNothingThatItHeldBack) {
   run({}, 20.0);
   EXPECT_NEAR(bone.shift().place_mm.x(), -3.0, 1e-6);
   EXPECT_FALSE(bone.held_back());
+}
+
+// The ledger of a hand at it looks a tick ahead and reckons with no more: where what it may give comes to its end, and where a
+// hand that held it lets go at once.
+TEST(ShownBone, SetsOutAndStopsNoFasterThanABoneDoes) {
+  const ShownBoneParams params;
+  const Load loads[] = {{{20.0, 0, 0}, Vec3::Zero()}, {Vec3::Zero(), {0, 800.0, 0}}};
+  for (const Load& load : loads) {
+    ShownBone bone(params);
+    Shift before, last;
+    double most_mm = 0.0, most_rad = 0.0;
+    for (int i = 0; i < 3000; ++i) {
+      if (i % 8 == 0) bone.see({static_cast<std::uint64_t>(i + 1), {{-8.0, 0, 0}, {0, -0.2, 0}}, 0.0, 0, 0.0});
+      bone.step(i < 1500 ? load : Load{}, kTick);
+      const Shift now = bone.shift();
+      most_mm = std::max(most_mm, (now.place_mm - 2.0 * last.place_mm + before.place_mm).norm());
+      most_rad = std::max(most_rad, (now.turn_rad - 2.0 * last.turn_rad + before.turn_rad).norm());
+      before = std::exchange(last, now);
+      if (i == 1499) {
+        EXPECT_NEAR(bone.released_mj(), params.allowance_mj, 1e-3);
+        EXPECT_TRUE(bone.held_back());
+      }
+    }
+    EXPECT_LE(most_mm, 1.0001 * params.most_mm_per_s2 * kTick * kTick);
+    EXPECT_LE(most_rad, 1.0001 * params.most_rad_per_s2 * kTick * kTick);
+    EXPECT_NEAR(last.place_mm.x(), -8.0, 1e-6);
+    EXPECT_NEAR(last.turn_rad.y(), -0.2, 1e-6);
+  }
 }
 
 TEST(ShownBone, FollowsTheNewestAndStandsInSilence) {
