@@ -64,6 +64,24 @@ TEST_F(LoopOnBlock, FreeAirHasNoForce) {
   EXPECT_EQ(report.phase, CuttingPhase::idle);
 }
 
+// A tool that was held far from bone while its hand went on, as by a room that stopped: where it is wanted nothing is known of
+// the bone, and what is built about the tool never reaches there. It goes as far as is known, patch by patch.
+TEST_F(LoopOnBlock, AToolFarBehindItsHandInTheAirComesUp) {
+  for (const double height_mm : {-5.0, -20.0, -45.0}) {
+    const Vec3 tool_mm(-40, 3, height_mm), hand_mm(30, -10, height_mm);
+    loop_->take_up(0, {tool_mm, Eigen::Quaterniond::Identity()}, WorkspaceMapping{});
+    input_.pose_device_tool.position_mm = hand_mm;
+    Vec3 at_mm = tool_mm;
+    for (int i = 0; i < 400; ++i) {
+      if (i % 10 == 0) builder_.build(field_, loop_->tool(0), {at_mm, Eigen::Quaterniond::Identity()}, patch_);
+      const LoopReport report = tick();
+      EXPECT_EQ(report.force_device_n.norm(), 0.0);
+      at_mm = report.pose_bone_proxy.position_mm;
+    }
+    EXPECT_LT((at_mm - hand_mm).norm(), 1e-6) << height_mm;
+  }
+}
+
 // Spindle off: the tip stays on the surface and the coupling's spring pushes back, K_c times the penetration.
 TEST_F(LoopOnBlock, ASpringWallWhereNothingTurns) {
   LoopReport report = move_to({0, 0, 0.3});
