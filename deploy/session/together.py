@@ -342,7 +342,18 @@ def recorded_steps(file: Path):
         scale = float(np.min(rows["burr_change/scale"][:], initial=1.0))
         stiffness = min(float(about["force_scale"]) * COUPLING_N_PER_MM, float(about["device_stiffness_n_per_mm"]) / scale)
         force = rows["drill_force_feedback/wrench"][:count, :3].astype(float) - rows["drill_force_feedback/motor_force"][:count]
-        return force_steps(force, rows["high_frequency_poses/device_pose/pose"][:count, :3], rows["data/mono_ns"][:count], stiffness)
+        handle_mm = rows["high_frequency_poses/device_pose/pose"][:count, :3]
+        names = [name.decode() for name in rows["metadata/event_bits"][:]]
+        led = led_mm(rows["data/events"][:count].astype(np.int64), names, handle_mm)
+        return {**force_steps(force, handle_mm, rows["data/mono_ns"][:count], stiffness), "led_mm": led}
+
+
+def led_mm(events, names, handle_mm):
+    """How far a handle went at most from where it was when another's hand began to lead it, and was led."""
+    led = (events >> names.index("hand guided")) & 1
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], led, [0]))))
+    return round(max((float(np.linalg.norm(handle_mm[begin:end] - handle_mm[begin], axis=1).max())
+                      for begin, end in zip(edges[::2], edges[1::2])), default=0.0), 2)
 
 
 def is_gentle(forces):
@@ -372,7 +383,7 @@ def write_report(out: Path, numbers, title):
     rows = "".join(f"<tr><td class=n>{at:.2f}</td><td>{html.escape(who)}</td><td>{html.escape(what)}</td></tr>" for at, who, what in told_of["events"])
     hands = "".join(f"<tr><td>{html.escape(name)}</td><td class=n>{told_of['cuts'].get(name, 0)}</td>"
                     f"<td class=n>{force['most_n']:.2f}</td><td class=n>{force['most_growth_n_per_ms']:.3f}</td>"
-                    f"<td class=n>{force['steps_beyond_slew']}</td></tr>"
+                    f"<td class=n>{force['steps_beyond_slew']}</td><td class=n>{force['led_mm']:.1f}</td></tr>"
                     for name, force in numbers["forces"].items())
     facts = [
         report.fact("one bone" if numbers["one_bone"] else "DIFFERENT bones", "in server, hands, viewer, console and journal at the end (hashes)"),
@@ -400,7 +411,7 @@ own; they prove who they are by certificates and tickets.</p>
 <p>Force that no hand causes grows by at most {SLEW_N_PER_MS:g} N in a millisecond; a hand that moves into bone may raise it faster.</p>
 {report.picture(out, 'forces.png', 'Force on each hand over time', wide=True)}
 <table><tr><th>hand</th><th class=n>cuts</th><th class=n>largest force, N</th><th class=n>largest growth in 1 ms, N</th>
-<th class=n>steps beyond the limit</th></tr>{hands}</table>
+<th class=n>steps beyond the limit</th><th class=n>led by another's hand, mm of the handle</th></tr>{hands}</table>
 <p class=lead>All numbers are in <a href="session.json">session.json</a>.</p>
 </main></body></html>
 """
@@ -417,6 +428,7 @@ def run(programs, case, sides, out, say, device, title):
     say("Server, hands, viewer, console and journal hold " + ("the same bone" if numbers["one_bone"] else "DIFFERENT bones") + " at the end.")
     for name, force in numbers["forces"].items():
         say(f"{name} felt at most {force['most_n']:.1f} N; {force['steps_beyond_slew']} of {force['rows']} steps in a millisecond were "
-            f"larger than the hand's movement and the slew limit allow, by {force['most_beyond_slew_n']:.3f} N at most")
+            f"larger than the hand's movement and the slew limit allow, by {force['most_beyond_slew_n']:.3f} N at most"
+            + (f"; led by another's hand it went {force['led_mm']:.1f} mm" if force["led_mm"] > 0.0 else ""))
     say(f"Report: {out / 'report.html'}")
     return 0 if numbers["one_bone"] and numbers["cuts_while_frozen"] == 0 and is_gentle(numbers["forces"]) else 1

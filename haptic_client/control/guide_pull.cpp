@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "haptic_client/control/slew.hpp"
 #include "haptic_client/device/haptic_device.hpp"
 
 namespace osteon::haptic {
@@ -89,10 +90,9 @@ Vec3 GuidePull::step(const GuideMoment& moment) noexcept {
       clamped(-params_.damping_s * k_n_per_mm_ / params_.dt_s * moved_mm, share * params_.most_n);
   const Vec3 spring_n = k_n_per_mm_ * (far_mm_ - moment.handle_mm);
   Vec3 wanted_n = clamped(spring_n + damping_n, std::min(share * params_.most_n, moment.room_n));
-  // What there is may be lessened at once; beyond that it grows slowly, whoever causes it.
-  const double square = force_n_.squaredNorm();
-  const Vec3 kept_n = square > 0.0 ? Vec3(std::clamp(wanted_n.dot(force_n_) / square, 0.0, 1.0) * force_n_) : Vec3(Vec3::Zero());
-  wanted_n = kept_n + clamped(wanted_n - kept_n, moment.slew_n);
+  const Vec3 grown_n = growth(wanted_n, force_n_);
+  wanted_n += clamped(grown_n, moment.slew_n) - grown_n;
+  wanted_n = held_to(moment.together_slew_n, wanted_n, moment.rest_n, moment.together_n);
   const double asked_n = (spring_n + damping_n).norm();
   const Vec3 shown_damping_n = asked_n > 0.0 ? Vec3(std::min(1.0, wanted_n.norm() / asked_n) * damping_n) : Vec3(Vec3::Zero());
   force_n_ = ledger_.limited({.force_n = wanted_n}, {.force_n = shown_damping_n}, true).force_n;

@@ -8,6 +8,7 @@
 // energy the same, the rest is the energy ledger's, an account of this pull's own.
 #pragma once
 #include <cstdint>
+#include <limits>
 
 #include "common/geometry/pose.hpp"
 #include "haptic_client/control/energy_ledger.hpp"
@@ -41,6 +42,9 @@ struct GuideMoment {
   double share = 0;               // 0 … 1
   double room_n = 0;              // that the device's limit leaves
   double slew_n = 0;              // growth of force in this tick
+  Vec3 rest_n = Vec3::Zero();     // shown besides it
+  Vec3 together_n = Vec3::Zero(); // shown in the last tick, the pull too
+  double together_slew_n = std::numeric_limits<double>::infinity();  // growth of both together
   bool safe = true;               // false: no force, and the pull begins anew
 };
 
@@ -56,6 +60,7 @@ class GuidePull {
   [[nodiscard]] const Vec3& smoothed_mm() const noexcept { return second_mm_; }
   // [haptic] Force on the handle, held for this tick.
   [[nodiscard]] Vec3 step(const GuideMoment& moment) noexcept;
+  [[nodiscard]] const Vec3& force_n() const noexcept { return force_n_; }  // of the last step
   [[nodiscard]] bool pulls() const noexcept { return k_n_per_mm_ > 0.0; }
   [[nodiscard]] const EnergyReport& energy() const noexcept { return ledger_.report(); }
 

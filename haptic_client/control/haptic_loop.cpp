@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/mechanics/drilling.hpp"
+#include "haptic_client/control/slew.hpp"
 #include "haptic_client/device/haptic_device.hpp"
 
 namespace osteon::haptic {
@@ -48,6 +49,7 @@ void HapticLoop::take_up(int tool, const Pose& pose_rest_tool, const WorkspaceMa
   partner_contact_.reset();
   partner_n_.setZero();
   if (!effects_.empty()) effects_[static_cast<std::size_t>(tool)].take_up();
+  together_n_.setZero();
   shown_ = {};
   motor_nmm_.setZero();
   device_ = pose_bone_tool;
@@ -116,7 +118,9 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   // Of the force that is felt and cut with, as physical force.
   const double s = params_.force_scale;
   const double device_n = (input.device_warm ? params_.continuous_n : params_.peak_n) / s;
-  const double limit_n = overseer_.limit_n(device_n, shown_.force_n.norm() / s, slow_n(input) / s);
+  // A limit comes down from all that is felt: from the contact's alone it would leave nothing to the pull at once.
+  const double felt_n = shown_.force_n.norm() + guide_pull_.force_n().norm() + partner_n_.norm();
+  const double limit_n = overseer_.limit_n(device_n, felt_n / s, slow_n(input) / s);
 
   const Pose proxy_before = proxy_.pose();
   double paid_n_per_mm = coupling_n_per_mm_;
@@ -287,9 +291,9 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   // What the contact leaves of the growth that nobody's hand causes is the pull's.
   const double grown_n = growth(shown_.force_n, before_n).norm() - by_hand_n;
   const double room_n = std::max(0.0, limit_n - shown_.force_n.norm() - motor_n.norm());
-  const double left_n = meet(input, room_n, std::clamp(slow - grown_n, 0.0, slow), report);
-  lead(input, room_n - partner_n_.norm(), left_n, report);
-  report.force_device_n = report.coupling_device_n + report.motor_device_n + report.guide_device_n + report.partner_device_n;
+  lead(input, meet(input, {room_n, std::clamp(slow - grown_n, 0.0, slow), by_hand_n + slow}, report), report);
+  together_n_ = report.coupling_device_n + report.guide_device_n + report.partner_device_n;
+  report.force_device_n = together_n_ + report.motor_device_n;
 
   // So too the moment of the cut, never a force: no more than the force shown would be at the arm of a turn, and no faster
   // than force grows that the hand did not cause.
@@ -307,12 +311,12 @@ void HapticLoop::feel_partners() {
   for (const ToolModel& model : tools_) touch_points_.emplace_back(model.tool);
 }
 
-double HapticLoop::meet(const LoopInput& input, double room_n, double slew_n, LoopReport& report) noexcept {
+HapticLoop::Left HapticLoop::meet(const LoopInput& input, const Left& left, LoopReport& report) noexcept {
   const bool safe = placed_ && input.device_ok && input.periods <= 3 && !input.clutch && input.room != RoomLink::over;
   if (touch_points_.empty() || !safe) {
     partner_contact_.reset();
     partner_n_.setZero();
-    return slew_n;
+    return left;
   }
   // A hand whose tool is held by somebody has none that others could push: whoever holds it may do so from a console and have
   // a hand of another number. And whoever leads this hand is where it is.
@@ -324,14 +328,17 @@ double HapticLoop::meet(const LoopInput& input, double room_n, double slew_n, Lo
   const PartnerForce felt = partner_contact_.step(touch_points_[static_cast<std::size_t>(tool_)], report.pose_bone_proxy,
                                                   std::span(others).first(count), params_.dt_s);
   if (felt.author != 0) report.events |= kPartnerTouched;
-  const Vec3 wanted_n = clamped(params_.force_scale * felt.force_n, room_n), step_n = growth(wanted_n, partner_n_);
-  const Vec3 less_n = step_n - clamped(step_n, slew_n);
-  partner_n_ = wanted_n - less_n;
-  report.partner_device_n = to_device(partner_n_);
-  return slew_n - (step_n - less_n).norm();
+  Vec3 wanted_n = to_device(clamped(params_.force_scale * felt.force_n, left.room_n));
+  const Vec3 grown_n = growth(wanted_n, partner_n_);
+  wanted_n += clamped(grown_n, left.slew_n) - grown_n;
+  if (felt.author != 0 || !partner_n_.isZero())
+    wanted_n = held_to(left.together_n, wanted_n, report.coupling_device_n + guide_pull_.force_n(), together_n_);
+  const double slew_n = std::max(0.0, left.slew_n - growth(wanted_n, partner_n_).norm());
+  report.partner_device_n = partner_n_ = wanted_n;
+  return {left.room_n - partner_n_.norm(), slew_n, left.together_n};
 }
 
-void HapticLoop::lead(const LoopInput& input, double room_n, double slew_n, LoopReport& report) noexcept {
+void HapticLoop::lead(const LoopInput& input, const Left& left, LoopReport& report) noexcept {
   const Oversight& oversight = overseer_.now();
   GuideSeen seen = guide_seen_;
   seen.there &= static_cast<bool>(oversight.guide);
@@ -341,8 +348,11 @@ void HapticLoop::lead(const LoopInput& input, double room_n, double slew_n, Loop
   moment.handle_mm = input.pose_device_tool.position_mm;
   moment.guide_mm = mapping_.pose_device_tool({bone_.point(guide_mm), Eigen::Quaterniond::Identity()}).position_mm;
   moment.share = input.room == RoomLink::over ? 0.0 : oversight.guide_share;
-  moment.room_n = room_n;
-  moment.slew_n = slew_n;
+  moment.room_n = left.room_n;
+  moment.slew_n = left.slew_n;
+  moment.rest_n = report.coupling_device_n + report.partner_device_n;
+  moment.together_n = together_n_;
+  moment.together_slew_n = left.together_n;
   moment.safe = placed_ && input.device_ok && input.periods <= 3 && !input.clutch;
   report.guide_device_n = guide_pull_.step(moment);
   if (!guide_pull_.pulls()) return;
@@ -352,12 +362,6 @@ void HapticLoop::lead(const LoopInput& input, double room_n, double slew_n, Loop
 
 double HapticLoop::slow_n(const LoopInput& input) const noexcept {
   return params_.slew_n_per_ms * 1e3 * params_.dt_s * input.periods;
-}
-
-// Lessening what there is comes at once: what counts is the way from the nearest part of what is shown now.
-Vec3 HapticLoop::growth(const Vec3& wanted, const Vec3& now) noexcept {
-  const double square = now.squaredNorm();
-  return wanted - (square > 0.0 ? std::clamp(wanted.dot(now) / square, 0.0, 1.0) : 0.0) * now;
 }
 
 Vec3 HapticLoop::slewed(const Vec3& wanted, const Vec3& now, double most, LoopReport& report) noexcept {

@@ -159,13 +159,16 @@ class HapticLoop {
   // the cut, physical.
   void show(const LoopInput& input, const ToolModel& model, const CouplingForce& coupling, const CouplingMoment& moment,
             const Vec3& cut_nmm, LoopReport& report) noexcept;
-  // The pull of another's hand, in what limit and slew leave.
-  void lead(const LoopInput& input, double room_n, double slew_n, LoopReport& report) noexcept;
-  // What others' tools do to this one, likewise; what is left of the slew.
-  double meet(const LoopInput& input, double room_n, double slew_n, LoopReport& report) noexcept;
+  // What the contact leaves of limit and slew to forces besides it, and how fast all of them together may grow.
+  struct Left {
+    double room_n, slew_n, together_n;
+  };
+  // The pull of another's hand.
+  void lead(const LoopInput& input, const Left& left, LoopReport& report) noexcept;
+  // What others' tools do to this one; what that leaves.
+  Left meet(const LoopInput& input, const Left& left, LoopReport& report) noexcept;
   // Growth of force on the device in this tick that no hand caused.
   [[nodiscard]] double slow_n(const LoopInput& input) const noexcept;
-  [[nodiscard]] static Vec3 growth(const Vec3& wanted, const Vec3& now) noexcept;
   // A force or torque, `now` what is shown, that rises by no more than `most`.
   [[nodiscard]] static Vec3 slewed(const Vec3& wanted, const Vec3& now, double most, LoopReport& report) noexcept;
 
@@ -196,7 +199,8 @@ class HapticLoop {
   std::vector<TouchPoints> touch_points_; // of each tool; none: partners are not felt
   PartnerContact partner_contact_;
   std::span<const PartnerTool> partners_;
-  Vec3 partner_n_ = Vec3::Zero();         // shown in the last tick, bone frame
+  Vec3 partner_n_ = Vec3::Zero();         // shown in the last tick, device frame
+  Vec3 together_n_ = Vec3::Zero();        // coupling, pull and others' tools in the last tick, device frame
   Wrench shown_;                          // of the coupling, rendered in the last tick, bone frame
   Vec3 motor_nmm_ = Vec3::Zero();         // of the motor, likewise
   double turn_arm_mm_ = 0;                // of a turn that does work at the handle; zero where no torque is shown

@@ -42,6 +42,13 @@ class ForceSteps(unittest.TestCase):
         self.assertEqual(judged([0.0, 0.0, 1.5, 1.5], apart_ms=[1.0, 1.0, 3.0, 1.0]), 0)
         self.assertEqual(judged([0.0, 0.0, 2.5, 2.5], apart_ms=[1.0, 1.0, 3.0, 1.0]), 1)
 
+    def test_how_far_a_hand_was_led_counts_from_where_that_began(self):
+        names = ["uncovered", "hand guided"]
+        way = np.zeros((7, 3))
+        way[:, 0] = [0.0, 5.0, 6.0, 8.5, 20.0, 30.0, 31.0]
+        self.assertEqual(together.led_mm(np.array([0, 2, 3, 2, 1, 2, 2]), names, way), 3.5)
+        self.assertEqual(together.led_mm(np.zeros(7, dtype=int), names, way), 0.0)
+
     def test_whoever_was_not_recorded_is_not_called_gentle(self):
         gentle = {"rows": 5000, "steps_beyond_slew": 0}
         self.assertTrue(together.is_gentle({"anna": gentle, "ben": gentle}))

@@ -161,15 +161,15 @@ void OverseenHand::run(int ticks, const std::function<void(const LoopReport&)>& 
 void OverseenHand::see(const LoopReport& report, const Vec3& handle_mm) {
   const LoopParams& params = loop_->params();
   const Vec3 moved_mm = seen_ ? Vec3(handle_mm - handle_mm_) : Vec3(Vec3::Zero());
-  // The hand's motion raises the coupling's spring and damping; the pull it does not raise at all.
+  // The hand's motion raises the coupling's spring and damping, and nothing else. It feels the sum: where one force lessens at
+  // once another that it held back would come at once.
   const double k = params.force_scale * loop_->coupling_n_per_mm() * loop_->mapping().scale();
   const double by_hand_n = k * (2.0 * moved_mm.norm() + moved_before_mm_);
-  const double coupling_n = std::max(0.0, growth(report.coupling_device_n, coupling_n_).norm() - by_hand_n);
-  const double guide_n = growth(report.guide_device_n, guide_n_).norm();
-  const double partner_n = growth(report.partner_device_n, partner_n_).norm();
+  const Vec3 together_n = report.coupling_device_n + report.guide_device_n + report.partner_device_n;
+  const double grown_n = std::max(growth(report.coupling_device_n, coupling_n_).norm(), growth(together_n, together_n_).norm());
   // Against what is meant to be the limit, whatever the loop was told.
   constexpr double kSlew_n = 0.5;
-  crossed_.step_over_slew = std::max(crossed_.step_over_slew, (coupling_n + guide_n + partner_n) / kSlew_n);
+  crossed_.step_over_slew = std::max(crossed_.step_over_slew, (grown_n - by_hand_n) / kSlew_n);
   crossed_.fall_n = std::max(crossed_.fall_n, force_n_.norm() - report.force_device_n.norm());
 
   const double to_bone_mj = report.cutting_work_mj + (yielding_ ? yielding_->by_hand_mj : 0.0);
@@ -184,8 +184,7 @@ void OverseenHand::see(const LoopReport& report, const Vec3& handle_mm) {
   crossed_.led_mj = std::max(crossed_.led_mj, loop_->guide_energy().worst_mj);
 
   coupling_n_ = report.coupling_device_n;
-  guide_n_ = report.guide_device_n;
-  partner_n_ = report.partner_device_n;
+  together_n_ = together_n;
   force_n_ = report.force_device_n;
   handle_mm_ = handle_mm;
   moved_before_mm_ = moved_mm.norm();

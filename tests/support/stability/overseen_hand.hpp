@@ -32,7 +32,7 @@ struct InContact {
 
 // Of what crossed the handle.
 struct Crossed {
-  double step_over_slew = 0;  // largest growth of coupling, pull and others' tools in a tick, the hand's motion apart
+  double step_over_slew = 0;  // largest growth of the coupling, or of it with pull and others' tools, in a tick, the hand's motion apart
   double worst_mj = 0;        // most that one contact has given the hand, the cut and a bone that yields beyond what it got
   double led_mj = 0;          // the same of the pull, beyond what its far end's motion has paid
   double fall_n = 0;          // largest fall of the whole force in a tick
@@ -119,7 +119,7 @@ class OverseenHand {
   Eigen::Quaterniond rotation_;
 
   Crossed crossed_;
-  Vec3 handle_mm_, coupling_n_ = Vec3::Zero(), guide_n_ = Vec3::Zero(), partner_n_ = Vec3::Zero(), force_n_ = Vec3::Zero();
+  Vec3 handle_mm_, coupling_n_ = Vec3::Zero(), together_n_ = Vec3::Zero(), force_n_ = Vec3::Zero();
   double moved_before_mm_ = 0, episode_mj_ = 0;
   bool seen_ = false;
 };

@@ -1,0 +1,47 @@
+// What of a force is growth, and what a part of it is to be so that the whole grows slowly.
+#include "haptic_client/control/slew.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/support/scenes/random.hpp"
+
+namespace osteon::haptic {
+namespace {
+
+TEST(Slew, LesseningIsNoGrowth) {
+  const Vec3 now(4, 0, 0);
+  EXPECT_EQ(growth(Vec3::Zero(), now).norm(), 0.0);
+  EXPECT_EQ(growth(Vec3(1, 0, 0), now).norm(), 0.0);
+  EXPECT_EQ(growth(Vec3(6, 0, 0), now), Vec3(2, 0, 0));
+  EXPECT_EQ(growth(Vec3(3, 1, 0), now), Vec3(0, 1, 0));
+  EXPECT_EQ(growth(Vec3(-1, 0, 0), now), Vec3(-1, 0, 0));  // it comes down to nothing at once, and grows from there
+  EXPECT_EQ(growth(Vec3(1, 2, 3), Vec3::Zero()), Vec3(1, 2, 3));
+}
+
+// A hand is led by 2 N against bone that holds it with as much; the bone gives way to a half, or to nothing.
+TEST(Slew, APullIsLessenedAsWhatHeldItBack) {
+  const Vec3 pull(2, 0, 0);
+  EXPECT_EQ(held_to(0.25, pull, -pull, Vec3::Zero()), pull);
+  EXPECT_EQ(held_to(0.25, pull, -0.5 * pull, Vec3::Zero()), Vec3(1.25, 0, 0));
+  EXPECT_EQ(held_to(0.25, pull, Vec3::Zero(), Vec3::Zero()), Vec3(0.25, 0, 0));
+  EXPECT_EQ(held_to(0.0, pull, Vec3::Zero(), Vec3(3, 0, 0)), pull);  // what is less than before is shown whole
+}
+
+TEST(Slew, TheWholeNeverGrowsFasterNorLargerThanItMay) {
+  test::Random random(5);
+  double most_n = 0.0;
+  for (int i = 0; i < 100'000; ++i) {
+    const Vec3 before = random.in_cube(4.0), rest = random.in_cube(4.0), pull = random.in_cube(4.0);
+    const double may_n = random.unit();
+    const Vec3 whole = rest + held_to(may_n, pull, rest, before);
+    ASSERT_LE(growth(whole, before).norm(), may_n + 1e-12);
+    ASSERT_LE(whole.norm(), std::max(before.norm(), (rest + pull).norm()) + 1e-12);
+    most_n = std::max(most_n, growth(rest + pull, before).norm());
+  }
+  EXPECT_GT(most_n, 3.0) << "where the pull stays as it is";
+}
+
+}  // namespace
+}  // namespace osteon::haptic
