@@ -16,17 +16,29 @@ Vec3 clamped(const Vec3& v, double most) {
   return size > most ? Vec3(v * (most / size)) : v;
 }
 
-// The longest step that comes to no more than that way with all after it, each shorter by `less`: whole ones of it, and a part.
-double braking(double way, double less) {
+// Way of a step with all after it, each shorter by `less`.
+double braking_way(double step, double less) {
+  const double whole = std::floor(step / less);
+  return (whole + 1.0) * (step - 0.5 * less * whole);
+}
+
+// The longest step of such a way: whole ones of `less`, and a part.
+double braking_step(double way, double less) {
   const double whole = std::floor(0.5 * (std::sqrt(1.0 + 8.0 * way / less) - 1.0));
   return less * whole + (way - 0.5 * less * whole * (whole + 1.0)) / (whole + 1.0);
 }
 
+double against(const Vec3& step, const Vec3& load) { return load.isZero() ? 0.0 : std::max(0.0, -step.dot(load) / load.norm()); }
+
+// What the load is given by braking after a step.
+double braking_mj(const Vec3& last, const Vec3& load, double less) {
+  return load.norm() * braking_way(std::max(0.0, against(last, load) - less), less);
+}
+
 // A step against the load only so long that funds pay for it and for braking after it.
 Vec3 slowed(const Vec3& step, const Vec3& load, double less, double funds_mj) {
-  const double size = load.norm(), against = size > 0.0 ? -step.dot(load) / size : 0.0;
-  const double most = against > 0.0 ? braking(funds_mj / size, less) : 0.0;
-  return against > most ? Vec3(step + load * ((against - most) / size)) : step;
+  const double size = load.norm(), wanted = against(step, load), most = wanted > 0.0 ? braking_step(funds_mj / size, less) : 0.0;
+  return wanted > most ? Vec3(step + load * ((wanted - most) / size)) : step;
 }
 
 Eigen::Quaterniond quaternion(const Vec3& turn_rad) {
@@ -112,6 +124,7 @@ BoneSeen SharedBone::seen(std::uint64_t author) noexcept {
 ShownBone::ShownBone(const ShownBoneParams& params)
     : params_(params), own_mj_(params.allowance_mj), mount_lag_s_(lag_of(params.mount)), low_pass_s_(params.least_s) {
   OSTEON_CHECK(params.mount.good() && params.least_s > 0.0 && params.most_s >= params.least_s && params.per_lag >= 0.0);
+  OSTEON_CHECK(params.most_mm_per_s2 > 0.0 && params.most_rad_per_s2 > 0.0);
   OSTEON_CHECK(params.allowance_mj >= 0.0 && params.kept_mj >= 0.0 && params.granted_most_mj >= 0.0);
 }
 
@@ -152,8 +165,20 @@ void ShownBone::step(const Load& load, double dt_s) noexcept {
   Vec3 turn_rad = clamped(share_again * rotation_vector(smooth_.turn * shown_.turn.conjugate()), params_.most_rad_per_s * dt_s);
   // Slowed ahead of what funds compel, and setting out and stopping no faster than a bone does.
   const double most_mm = params_.most_mm_per_s2 * dt_s * dt_s, most_rad = params_.most_rad_per_s2 * dt_s * dt_s;
-  const Vec3 paid_mm = slowed(move_mm, load_.force_n, most_mm, funds_mj());
-  const Vec3 paid_rad = slowed(turn_rad, load_.moment_nmm, most_rad, funds_mj());
+  // Move and turn each get what they need for braking, and a half of what is left of the funds where both ask for it.
+  double funds_move_mj = braking_mj(move_mm_, load_.force_n, most_mm);
+  double funds_turn_mj = braking_mj(turn_rad_, load_.moment_nmm, most_rad);
+  const double needed_mj = funds_move_mj + funds_turn_mj, left_mj = funds_mj() - needed_mj;
+  if (left_mj < 0.0) {
+    funds_move_mj *= funds_mj() / needed_mj;
+    funds_turn_mj *= funds_mj() / needed_mj;
+  } else {
+    const bool moves = against(move_mm, load_.force_n) > 0.0, turns = against(turn_rad, load_.moment_nmm) > 0.0;
+    funds_move_mj += left_mj * (turns ? 0.5 : 1.0);
+    funds_turn_mj += left_mj * (moves ? 0.5 : 1.0);
+  }
+  const Vec3 paid_mm = slowed(move_mm, load_.force_n, most_mm, funds_move_mj);
+  const Vec3 paid_rad = slowed(turn_rad, load_.moment_nmm, most_rad, funds_turn_mj);
   held_back_ = paid_mm != move_mm || paid_rad != turn_rad;
   move_mm = move_mm_ + clamped(paid_mm - move_mm_, most_mm);
   turn_rad = turn_rad_ + clamped(paid_rad - turn_rad_, most_rad);

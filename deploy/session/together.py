@@ -411,7 +411,7 @@ own; they prove who they are by certificates and tickets.</p>
 <p>Force that no hand causes grows by at most {SLEW_N_PER_MS:g} N in a millisecond; a hand that moves into bone may raise it faster.</p>
 {report.picture(out, 'forces.png', 'Force on each hand over time', wide=True)}
 <table><tr><th>hand</th><th class=n>cuts</th><th class=n>largest force, N</th><th class=n>largest growth in 1 ms, N</th>
-<th class=n>steps beyond the limit</th><th class=n>led by another's hand, mm of the handle</th></tr>{hands}</table>
+<th class=n>steps beyond the limit</th><th class=n>way of the handle while led by another's hand, mm</th></tr>{hands}</table>
 <p class=lead>All numbers are in <a href="session.json">session.json</a>.</p>
 </main></body></html>
 """
@@ -429,6 +429,6 @@ def run(programs, case, sides, out, say, device, title):
     for name, force in numbers["forces"].items():
         say(f"{name} felt at most {force['most_n']:.1f} N; {force['steps_beyond_slew']} of {force['rows']} steps in a millisecond were "
             f"larger than the hand's movement and the slew limit allow, by {force['most_beyond_slew_n']:.3f} N at most"
-            + (f"; led by another's hand it went {force['led_mm']:.1f} mm" if force["led_mm"] > 0.0 else ""))
+            + (f"; while another's hand led it, it went {force['led_mm']:.1f} mm" if force["led_mm"] > 0.0 else ""))
     say(f"Report: {out / 'report.html'}")
     return 0 if numbers["one_bone"] and numbers["cuts_while_frozen"] == 0 and is_gentle(numbers["forces"]) else 1

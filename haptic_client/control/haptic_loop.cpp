@@ -75,6 +75,13 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   if (!may_work) report.events |= kForbidden;
   const bool works = follows && may_work;
 
+  // The spring hangs at handle + offset. Seen from the bone that place moves also where a bone that turns leaves the offset
+  // behind; were it to turn along, a hand with much slack would get, or lose, work that nobody reckons.
+  const Vec3 offset_before_mm = coupling_.offset_mm();
+  if (bone_.rotation.coeffs() != bone_before_.rotation.coeffs())
+    coupling_.turn(bone_.rotation.conjugate() * bone_before_.rotation);
+  const Vec3 left_behind_mm = coupling_.offset_mm() - offset_before_mm;
+
   // While the clutch is held the tool stays; letting go ties the handle to the tool where it now is, without force.
   if (clutched_ && !input.clutch) mapping_.anchor(input.pose_device_tool.position_mm, bone_.point(proxy_.pose().position_mm));
   clutched_ = input.clutch;
@@ -92,13 +99,8 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
     ramp_ = 0.0;
   }
   device_was_ok_ = input.device_ok;
-  // The spring hangs at handle + offset. Seen from the bone that place moves also where a bone that turns leaves the offset
-  // behind; were it to turn along, a hand with much slack would get, or lose, work that nobody reckons.
   Motion hand = between(device_, pose_bone_device);
-  const Vec3 offset_before_mm = coupling_.offset_mm();
-  if (bone_.rotation.coeffs() != bone_before_.rotation.coeffs())
-    coupling_.turn(bone_.rotation.conjugate() * bone_before_.rotation);
-  hand.move_mm += coupling_.offset_mm() - offset_before_mm;
+  hand.move_mm += left_behind_mm;
   ledger_.observe(hand.move_mm / mapping_.scale(), hand.turn_rad);
 
   // A guide lets the tool go only where its opening does; the hand feels the guide as the way that it is kept from.
@@ -331,11 +333,8 @@ HapticLoop::Left HapticLoop::meet(const LoopInput& input, const Left& left, Loop
   Vec3 wanted_n = to_device(clamped(params_.force_scale * felt.force_n, left.room_n));
   const Vec3 grown_n = growth(wanted_n, partner_n_);
   wanted_n += clamped(grown_n, left.slew_n) - grown_n;
-  if (felt.author != 0 || !partner_n_.isZero())
-    wanted_n = held_to(left.together_n, wanted_n, report.coupling_device_n + guide_pull_.force_n(), together_n_);
-  const double slew_n = std::max(0.0, left.slew_n - growth(wanted_n, partner_n_).norm());
   report.partner_device_n = partner_n_ = wanted_n;
-  return {left.room_n - partner_n_.norm(), slew_n, left.together_n};
+  return {std::max(0.0, left.room_n - wanted_n.norm()), std::max(0.0, left.slew_n - grown_n.norm()), left.together_n};
 }
 
 void HapticLoop::lead(const LoopInput& input, const Left& left, LoopReport& report) noexcept {

@@ -130,7 +130,7 @@ TEST(ShownBone, ForgetsNothingThatItHeldBack) {
 // hand that held it lets go at once.
 TEST(ShownBone, SetsOutAndStopsNoFasterThanABoneDoes) {
   const ShownBoneParams params;
-  const Load loads[] = {{{20.0, 0, 0}, Vec3::Zero()}, {Vec3::Zero(), {0, 800.0, 0}}};
+  const Load loads[] = {{{20.0, 0, 0}, Vec3::Zero()}, {Vec3::Zero(), {0, 800.0, 0}}, {{20.0, 0, 0}, {0, 800.0, 0}}};
   for (const Load& load : loads) {
     ShownBone bone(params);
     Shift before, last;
