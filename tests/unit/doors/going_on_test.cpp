@@ -253,7 +253,7 @@ TEST_F(GoingOn, ASessionComesAgainAfterTheLongestThatThereIs) {
   for (int i = 0; sue->interruptions() < 2 && i < 1000 && !HasFatalFailure(); ++i) cut(*sue, 1);
   EXPECT_GE(sue->interruptions(), 2);
   EXPECT_EQ(sue->lost(), "");
-  EXPECT_TRUE(test::wait_until([&] { return sue->stands() && sue->seq() == host().room_seq(); }, test::kPatience));
+  EXPECT_TRUE(test::wait_until([&] { return sue->stands() && test::settled(host(), {sue.get()}); }, test::kPatience));
   EXPECT_EQ(wire::to_wire(sue->hash()), test::status_of(sue->session().room()).field_hash());
 }
 
