@@ -12,9 +12,11 @@
 // A step of the shown bone that would overdraw it is held back as far as it gives energy, and ahead of that it is slowed, so
 // that it seldom stops at once. Nothing is forgotten by that: the pose told is where the bone goes as soon as that is paid for,
 // or costs nothing as the hand lets go. Nor does it set out at once: the hand's own ledger, which looks a tick ahead, reckons
-// with accelerations of some m/s². What its hand has put in,
-// but for a little, a client gives away; the server grants it to the others, who need it to be pushed back and hand on what
-// they do not. Totals that never fall are told, so that loss and order do no harm. Over all users, for any line and any hand:
+// with accelerations of some m/s².
+//
+// What its hand has put in, but for a little, a client gives away; the server grants it to the others, who need it to be pushed
+// back and hand on what they do not. Totals that never fall are told, so that loss and order do no harm. Over all users, for
+// any line and any hand:
 //
 //   sum of put in >= sum of released - sum of allowances
 //

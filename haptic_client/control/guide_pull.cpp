@@ -89,7 +89,7 @@ Vec3 GuidePull::step(const GuideMoment& moment) noexcept {
   const Vec3 damping_n =
       clamped(-params_.damping_s * k_n_per_mm_ / params_.dt_s * moved_mm, share * params_.most_n);
   const Vec3 spring_n = k_n_per_mm_ * (far_mm_ - moment.handle_mm);
-  Vec3 wanted_n = clamped(spring_n + damping_n, std::min(share * params_.most_n, std::max(0.0, moment.room_n)));
+  Vec3 wanted_n = clamped(spring_n + damping_n, std::min(share * params_.most_n, moment.room_n));
   const Vec3 grown_n = growth(wanted_n, force_n_);
   wanted_n += clamped(grown_n, moment.slew_n) - grown_n;
   wanted_n = held_to(moment.together_slew_n, wanted_n, moment.rest_n, moment.together_n);

@@ -5,7 +5,8 @@
 // The far end a begins at the handle h, goes along with the other's place, low-passed, and makes up the way between them at a
 // bounded speed; it is never farther off than the force's bound over k. So nothing jumps wherever the pull begins or ends. What
 // the handle is given is what the far end's own motion has put into the spring: raising k shortens a - h as much as keeps the
-// energy the same, the rest is the energy ledger's, an account of this pull's own.
+// energy the same, the rest is the energy ledger's, an account of this pull's own. Where contact lessens at once that held the
+// pull back, the pull is what makes the sum of both grow slowly (slew.hpp), in whatever direction, for as long as that takes.
 #pragma once
 #include <cstdint>
 #include <limits>

@@ -151,7 +151,9 @@ class HapticLoop {
 
  private:
   [[nodiscard]] Pose from_rest(const Pose& pose_rest) const noexcept { return moved_ ? bone_.inverse() * pose_rest : pose_rest; }
-  [[nodiscard]] Vec3 to_device(const Vec3& bone) const noexcept { return mapping_.to_device(moved_ ? bone_.direction(bone) : bone); }
+  [[nodiscard]] Vec3 to_device(const Vec3& bone) const noexcept {
+    return mapping_.to_device(moved_ ? bone_.direction(bone) : bone);
+  }
   void record(const ToolModel& model, const ProxyStep& step, LoopReport& report) noexcept;
   void wear_and_clog(const ToolModel& model, const ProxyStep& step, const Vec3& spring_n) noexcept;
   [[nodiscard]] double load_nmm(const ProxyStep& step, double pressed_n) noexcept;

@@ -35,7 +35,11 @@ Vec3 growth(const Vec3& now, const Vec3& before) {
 }  // namespace
 
 OverseenHand::OverseenHand(const OverseenRun& run)
-    : run_(run), bone_(block()), replica_(bone_, BodyId{}), room_(bone_, run.delay_ms), rotation_(Eigen::Quaterniond::Identity()) {
+    : run_(run),
+      bone_(block()),
+      replica_(bone_, BodyId{}),
+      room_(bone_, run.delay_ms),
+      rotation_(Eigen::Quaterniond::Identity()) {
   const SimulatedDeviceParams device = run.weak ? *find_simulated_device("simulated-3.3N") : SimulatedDeviceParams{};
   LoopParams params = loop_params(device.limits, 0.0);
   params.ramp_s = 1e-9;

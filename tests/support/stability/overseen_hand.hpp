@@ -32,12 +32,13 @@ struct InContact {
 
 // Of what crossed the handle.
 struct Crossed {
-  double step_over_slew = 0;  // largest growth of the coupling, or of it with pull and others' tools, in a tick, the hand's motion apart
-  double worst_mj = 0;        // most that one contact has given the hand, the cut and a bone that yields beyond what it got
-  double led_mj = 0;          // the same of the pull, beyond what its far end's motion has paid
-  double fall_n = 0;          // largest fall of the whole force in a tick
-  double made_mj = 0;         // most that a bone on its mount ever gave the hand and the other user beyond what both put in
-  double carried_mm = 0;      // way of such a bone under the tool while that touched it
+  // Largest growth in a tick of the coupling, or of it with pull and others' tools, the hand's own motion apart.
+  double step_over_slew = 0;
+  double worst_mj = 0;    // most that one contact has given the hand, the cut and a bone that yields beyond what it got
+  double led_mj = 0;      // the same of the pull, beyond what its far end's motion has paid
+  double fall_n = 0;      // largest fall of the whole force in a tick
+  double made_mj = 0;     // most that a bone on its mount ever gave the hand and the other user beyond what both put in
+  double carried_mm = 0;  // way of such a bone under the tool while that touched it
   InContact in_contact;
   std::int64_t allocations = 0, cutting = 0, touching = 0;
 };

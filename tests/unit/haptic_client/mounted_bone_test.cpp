@@ -249,21 +249,30 @@ TEST(MountedBone, TurnsForcesWithTheBone) {
 }
 
 // What a hand is deeper in bone than its device can show lies between hand and tool and stays with them: a bone that turns under
-// the tip of the tool does not swing it about.
+// the tip of the tool does not swing it about, and the loop counts what that does to hand and bone as one does outside.
 TEST(MountedBone, TurnsUnderSlackWithoutIt) {
   User user({}, true, 1);
   user.push_mm = 25.0;
+  double given_mj = 0.0;
+  Pose bone;
   const auto run = [&](double angle, int ticks) {
-    const Pose bone{Vec3::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(angle, Vec3::UnitX()))};
+    const Pose before = bone;
+    bone.rotation = Eigen::AngleAxisd(angle, Vec3::UnitX());
     for (int i = 0; i < ticks; ++i) {
+      // To the bone as it turns, under what pressed on it until then; to the hand as it moves.
+      const Vec3 held_n = user.last.coupling_device_n, tip_mm = user.last.pose_bone_proxy.position_mm;
+      if (i == 0) given_mj -= user.loop->mapping().to_bone(held_n).dot(bone.point(tip_mm) - before.point(tip_mm));
+      const Vec3 handle_mm = user.handle_before_mm;
       user.loop->see_bone(bone);
       user.tick();
+      given_mj += held_n.dot(user.handle_before_mm - handle_mm);
     }
     return bone.point(user.last.pose_bone_proxy.position_mm);
   };
   const Vec3 tip_mm = run(0.0, 3000);
   ASSERT_GT(user.last.offset_mm.norm(), 10.0);
-  const double before_n = user.force_n();
+  const double before_n = user.force_n(), before_mj = user.last.energy.episode_mj;
+  given_mj = 0.0;
   for (int i = 1; i <= 100; ++i) {
     const double angle = 1e-3 * i;
     const Vec3 moved_mm = run(angle, 20) - tip_mm;
@@ -271,6 +280,9 @@ TEST(MountedBone, TurnsUnderSlackWithoutIt) {
     if (angle > 0.01) ASSERT_LE(moved_mm.norm(), 0.5 * angle * user.last.offset_mm.norm()) << angle;
   }
   EXPECT_GT(user.force_n(), 0.9 * before_n);
+  EXPECT_GT(std::abs(given_mj), 1.0);
+  std::printf("  given %.4f mJ outside, %.4f mJ by the ledger\n", given_mj, user.last.energy.episode_mj - before_mj);
+  EXPECT_NEAR(user.last.energy.episode_mj - before_mj, given_mj, 0.02 * std::abs(given_mj));
 }
 
 // A bone that comes at the hand as fast as one is ever shown, 60 mm/s: what would be 3 N more in every millisecond comes slowly.

@@ -172,6 +172,44 @@ TEST(GuidePull, AHandleThatIsThrownAboutGetsNothingForNothing) {
   EXPECT_LE(pull.energy().worst_mj, kBudget_mj);
 }
 
+// The same where contact comes and goes at once beside the pull, which makes up for that (slew.hpp) in whatever direction. The
+// handle stays so near that the far end stands where the guide does: work that the hand gets is all the spring's, whose store was
+// empty.
+TEST(GuidePull, MakesUpForContactOutOfWhatTheHandHasPaid) {
+  Random random(9);
+  GuidePull pull;
+  GuideSeen seen{true, 1, Vec3::Zero()};
+  GuideMoment moment{.share = 1.0, .room_n = 60.0, .slew_n = kSlew_n};
+  const auto step = [&](int i) {
+    if (i % 16 == 0) ++seen.state_seq;
+    pull.see(seen);
+    moment.guide_mm = pull.smoothed_mm();
+    return pull.step(moment);
+  };
+  Vec3 force = Vec3::Zero(), v = Vec3::Zero();
+  for (int i = 0; i < 1000; ++i) force = step(i);
+  ASSERT_EQ(force.norm(), 0.0);
+  double given_mj = 0.0, most_mj = 0.0, aside_n = 0.0, far_mm = 0.0;
+  for (int i = 0; i < 100'000; ++i) {
+    const Vec3 a = random.in_cube(5000.0) - 20.0 * v - 1e3 * moment.handle_mm;
+    v += a * kT;
+    moment.handle_mm += v * kT;
+    given_mj += force.dot(v * kT);
+    most_mj = std::max(most_mj, given_mj);
+    far_mm = std::max(far_mm, moment.handle_mm.norm());
+    moment.together_n = moment.rest_n + force;
+    moment.together_slew_n = kSlew_n;
+    if (i % 30 == 0) moment.rest_n = random.unit() < 0.5 ? Vec3(Vec3::Zero()) : random.in_cube(8.0);
+    force = step(i);
+    aside_n = std::max(aside_n, force.cross(moment.handle_mm.normalized()).norm());
+  }
+  ASSERT_GT(far_mm, 1.0);
+  ASSERT_LT(far_mm, 5.0);
+  EXPECT_GT(aside_n, 2.0) << "it makes up for contact";
+  EXPECT_LE(most_mj, kBudget_mj);
+  std::printf("  %.2f mm away, %.5f mJ given at most, %.2f mJ in the end; %.2f N aside\n", far_mm, most_mj, given_mj, aside_n);
+}
+
 // A device that is gone, a clutch, a loop that comes late: no force at once, and the pull begins anew from where the handle is.
 TEST(GuidePull, BeginsAnewAfterASafetyZero) {
   Led led(0.02);
@@ -233,6 +271,40 @@ TEST_P(LedAtTheBone, PullAndContactTogetherStayWithinTheLimits) {
   EXPECT_LE(crossed.led_mj, kBudget_mj);
   EXPECT_EQ(crossed.allocations, 0);
 }
+
+// A hand is led into bone that holds it; a limit is set on what it feels. Both forces come down, neither first.
+TEST(LimitOfForce, LetsNeitherContactNorPullGoAtOnce) {
+  OverseenHand hand({});
+  Supervision led;
+  led.stopped = true;  // the bur rubs
+  led.guide = AuthorId{2};
+  led.guide_share = 1000;
+  hand.decide(led);
+  LoopReport now;
+  const auto run = [&](int ticks) {
+    for (int i = 0; i < ticks; ++i) {
+      if (i % 16 == 0) ++hand.guide.state_seq;
+      now = hand.tick();
+    }
+  };
+  hand.command.target_mm = Vec3(0, 0, 1.0);
+  hand.guide = {true, 1, Vec3(0, 0, 6.0)};
+  run(4000);
+  const Vec3 contact_n = now.coupling_device_n, pull_n = now.guide_device_n;
+  ASSERT_GT(pull_n.norm(), 5.0);
+  ASSERT_GT(contact_n.norm(), pull_n.norm());
+  ASSERT_LT(contact_n.dot(pull_n), 0.0);
+  led.force_limit = 400;
+  hand.decide(led);
+  run(1);
+  EXPECT_GT(now.guide_device_n.norm(), pull_n.norm() - 2.0 * kSlew_n);
+  EXPECT_GT(now.coupling_device_n.norm(), contact_n.norm() - 2.0 * kSlew_n);
+  run(2000);
+  EXPECT_LE((now.coupling_device_n.norm() + now.guide_device_n.norm()) / hand.loop().params().force_scale, 4.0 + 1e-9);
+  EXPECT_LE(hand.crossed().step_over_slew, 1.0 + 1e-6);
+  EXPECT_LE(hand.crossed().worst_mj, kBudget_mj);
+}
+
 // Another's bur beside the own one pushes it aside, within the same limit together with all else; who leads the hand, or has its
 // tool, by whatever program and with whatever hand, is where it is and pushes nothing.
 TEST(PartnersTool, PushesTheHandUnlessItLeadsIt) {
