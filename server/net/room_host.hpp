@@ -96,7 +96,7 @@ class RoomHost {
   using Clock = std::chrono::steady_clock;
 
   // Makes the whole surface, then starts the threads. `progress` hears fractions from one thread at a time.
-  // `keeper` makes rows durable before anyone hears of them, and outlives the host; without it nothing is kept.
+  // `keeper` makes rows durable before any hand hears of them, and outlives the host; without it nothing is kept.
   // `playback`: rows after those of `room` happen at their times; whoever joins may watch and nothing else.
   RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress, Detail detail = Detail::automatic,
            RoomKeeper* keeper = nullptr, std::optional<Playback> playback = {});
