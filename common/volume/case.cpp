@@ -39,8 +39,17 @@ constexpr int kClearanceLeaves = 12;
 
 float to_quantum(float mm) { return std::round(mm * 1024.0f) / 1024.0f + 0.0f; }
 
+// Samples of a part; the labels are empty where the importer has none.
+struct PartSamples {
+  CoordBox box;
+  std::span<const float> surface_mm, density_g_cm3;
+  std::span<const std::uint8_t> bone;
+  std::span<const Tissue> tissue;
+};
+
 // The leaf's samples out of a part, with `outside` where the part ends.
-void read_leaf(const CoordBox& part, std::span<const float> from, Coord origin, float outside, std::span<float, kLeafVoxels> out) {
+template <class T>
+void read_leaf(const CoordBox& part, std::span<const T> from, Coord origin, T outside, std::span<T, kLeafVoxels> out) {
   const Coord dims = part.dims();
   const std::int32_t first = std::max(origin.z, part.min.z), last = std::min(origin.z + kLeafSize - 1, part.max.z);
   std::ranges::fill(out, outside);
@@ -64,29 +73,37 @@ void store_leaf(SparseVolume& volume, Coord origin, std::span<const float, kLeaf
 }
 
 // One leaf of bone from the samples of a part. False: the density is not a number.
-bool add_leaf(Case::Grids& grids, const CoordBox& part, std::span<const float> surface, std::span<const float> density, Coord origin) {
+bool add_leaf(Case::Grids& grids, const PartSamples& part, Coord origin) {
   const float band = grids.surface.background();
   std::array<float, kLeafVoxels> s, rho, tissue, bone;
-  read_leaf(part, surface, origin, band, s);
+  std::array<std::uint8_t, kLeafVoxels> number;
+  std::array<Tissue, kLeafVoxels> known;
+  number.fill(1);
+  known.fill(Tissue::none);
+  read_leaf<float>(part.box, part.surface_mm, origin, band, s);
   for (float& value : s) {
     if (std::isnan(value)) return false;
     value = std::clamp(to_quantum(std::clamp(value, -2.0f * band, 2.0f * band)), -band, band);
   }
   if (std::ranges::all_of(s, [&](float v) { return v == band; })) return true;
-  std::ranges::transform(s, bone.begin(), [](float v) { return v < 0.0f ? 1.0f : 0.0f; });
+  if (!part.bone.empty()) read_leaf<std::uint8_t>(part.box, part.bone, origin, 0, number);
+  if (!part.tissue.empty()) read_leaf<Tissue>(part.box, part.tissue, origin, Tissue::none, known);
+  // A sample inside the surface without a number lies between the voxels of the scan: it counts as bone 1.
+  for (std::size_t i = 0; i < kLeafVoxels; ++i) bone[i] = s[i] < 0.0f ? std::max(1.0f, static_cast<float>(number[i])) : 0.0f;
   // A leaf of the surface that is not all inside stays one, also if its samples are equal.
   if (std::ranges::all_of(s, [&](float v) { return v == -band; })) {
     grids.surface.set_constant(origin, -band);
-    grids.bone.set_constant(origin, 1.0f);
+    store_leaf(grids.bone, origin, bone);
   } else {
     std::ranges::copy(s, grids.surface.edit_leaf(origin));
     std::ranges::copy(bone, grids.bone.edit_leaf(origin));
   }
-  read_leaf(part, density, origin, 0.0f, rho);
+  read_leaf<float>(part.box, part.density_g_cm3, origin, 0.0f, rho);
   for (std::size_t i = 0; i < kLeafVoxels; ++i) {
     if (!std::isfinite(rho[i])) return false;
     rho[i] = std::max(0.0f, rho[i]) + 0.0f;
-    const Tissue found = s[i] >= 0.0f ? Tissue::none : rho[i] >= kCorticalFrom_g_cm3 ? Tissue::cortical : Tissue::trabecular;
+    const Tissue by_density = rho[i] >= kCorticalFrom_g_cm3 ? Tissue::cortical : Tissue::trabecular;
+    const Tissue found = s[i] >= 0.0f ? Tissue::none : known[i] != Tissue::none ? known[i] : by_density;
     tissue[i] = static_cast<float>(found);
   }
   store_leaf(grids.tissue, origin, tissue);
@@ -238,49 +255,53 @@ json to_json(const Case::Grids& grids) {
 
 }  // namespace
 
-Result<Case> Case::build(CaseInfo info, const DenseVolume<float>& surface_mm, const DenseVolume<float>& density_g_cm3) {
-  OSTEON_CHECK(surface_mm.box == density_g_cm3.box);
-  const auto copy_part = [&](const CoordBox& part, std::span<float> surface, std::span<float> density) {
-    const auto row = static_cast<std::size_t>(part.dims().z);
-    std::size_t to = 0;
-    for (std::int32_t x = part.min.x; x <= part.max.x; ++x)
-      for (std::int32_t y = part.min.y; y <= part.max.y; ++y, to += row) {
-        const std::size_t from = surface_mm.index({x, y, part.min.z});
-        std::copy_n(surface_mm.values.data() + from, row, surface.data() + to);
-        std::copy_n(density_g_cm3.values.data() + from, row, density.data() + to);
-      }
-    return PartKind::samples;
-  };
-  return build(std::move(info), surface_mm.box, copy_part);
+namespace {
+
+// A box of samples out of a volume over more; empty out of an empty one.
+template <class T>
+void copy_part(const DenseVolume<T>& from, const CoordBox& part, std::vector<T>& out) {
+  out.clear();
+  if (from.values.empty()) return;
+  const auto row = static_cast<std::size_t>(part.dims().z);
+  for (std::int32_t x = part.min.x; x <= part.max.x; ++x)
+    for (std::int32_t y = part.min.y; y <= part.max.y; ++y) {
+      const T* first = from.values.data() + from.index({x, y, part.min.z});
+      out.insert(out.end(), first, first + row);
+    }
 }
 
-Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillPart& fill, const KeepGoing& keep_going) {
+// The samples of one part after the other, always in the same order.
+struct PartBuffers {
+  std::vector<float> surface_mm, density_g_cm3;
+  std::vector<std::uint8_t> bone;
+  std::vector<Tissue> tissue;
+};
+using FillBuffers = std::function<PartKind(const CoordBox& part, PartBuffers& buffers)>;
+
+Result<std::shared_ptr<Case::Grids>> build_grids(CaseInfo info, const CoordBox& box, const FillBuffers& fill, const KeepGoing& keep_going) {
   if (!(info.pitch_mm > 0.0)) return failure(ErrorCode::invalid_input, "a case needs a pitch above zero");
   const float band = band_mm(info.pitch_mm);
-  auto grids = std::make_shared<Grids>(Grids{std::move(info), {}, SparseVolume(band), SparseVolume(0.0f), SparseVolume(0.0f),
-                                             SparseVolume(0.0f), SparseVolume(0.0f), {}, 0.0});
-  std::vector<float> surface, density;
-  const Coord first = floor_to(box.min, kPartSamples), last = box.max;
-  for (std::int32_t px = first.x; px <= last.x; px += kPartSamples) {
+  auto grids = std::make_shared<Case::Grids>(Case::Grids{std::move(info), {}, SparseVolume(band), SparseVolume(0.0f), SparseVolume(0.0f),
+                                                         SparseVolume(0.0f), SparseVolume(0.0f), {}, 0.0});
+  PartBuffers buffers;
+  constexpr std::int32_t kPart = Case::kPartSamples;
+  const Coord first = floor_to(box.min, kPart), last = box.max;
+  for (std::int32_t px = first.x; px <= last.x; px += kPart) {
     const double done = static_cast<double>(px - first.x) / std::max(1, last.x - first.x);
     if (keep_going && !keep_going(done)) return failure(ErrorCode::cancelled, "stopped while building the case");
-    for (std::int32_t py = first.y; py <= last.y; py += kPartSamples)
-      for (std::int32_t pz = first.z; pz <= last.z; pz += kPartSamples) {
+    for (std::int32_t py = first.y; py <= last.y; py += kPart)
+      for (std::int32_t pz = first.z; pz <= last.z; pz += kPart) {
         const CoordBox part{{std::max(px, box.min.x), std::max(py, box.min.y), std::max(pz, box.min.z)},
-                            {std::min(px + kPartSamples - 1, box.max.x), std::min(py + kPartSamples - 1, box.max.y),
-                             std::min(pz + kPartSamples - 1, box.max.z)}};
-        const Coord dims = part.dims();
-        const std::size_t samples = static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z);
-        surface.resize(samples);
-        density.resize(samples);
-        const PartKind kind = fill(part, surface, density);
+                            {std::min(px + kPart - 1, box.max.x), std::min(py + kPart - 1, box.max.y), std::min(pz + kPart - 1, box.max.z)}};
+        const PartKind kind = fill(part, buffers);
         if (kind == PartKind::outside) continue;
-        if (kind == PartKind::inside) std::ranges::fill(surface, -band);
+        if (kind == PartKind::inside) std::ranges::fill(buffers.surface_mm, -band);
+        const PartSamples samples{part, buffers.surface_mm, buffers.density_g_cm3, buffers.bone, buffers.tissue};
         const Coord leaf = floor_to(part.min, kLeafSize);
         for (std::int32_t x = leaf.x; x <= part.max.x; x += kLeafSize)
           for (std::int32_t y = leaf.y; y <= part.max.y; y += kLeafSize)
             for (std::int32_t z = leaf.z; z <= part.max.z; z += kLeafSize)
-              if (!add_leaf(*grids, part, surface, density, {x, y, z}))
+              if (!add_leaf(*grids, samples, {x, y, z}))
                 return failure(ErrorCode::invalid_input, "the bone's distance or density has values that are not numbers");
       }
   }
@@ -289,8 +310,42 @@ Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillPart& fil
     return failure(ErrorCode::invalid_input, "there is no bone at or above the threshold; choose a lower --threshold");
   grids->clearance = make_clearance(grids->surface, grids->info.pitch_mm);
   grids->hash = content_hash(*grids);
+  return grids;
+}
+
+}  // namespace
+
+Result<Case> Case::build(CaseInfo info, const DenseVolume<float>& surface_mm, const DenseVolume<float>& density_g_cm3,
+                         const SampleLabels& labels, const KeepGoing& keep_going) {
+  OSTEON_CHECK(surface_mm.box == density_g_cm3.box);
+  OSTEON_CHECK(labels.bone.values.empty() || labels.bone.box == surface_mm.box);
+  OSTEON_CHECK(labels.tissue.values.empty() || labels.tissue.box == surface_mm.box);
+  const auto fill = [&](const CoordBox& part, PartBuffers& to) {
+    copy_part(surface_mm, part, to.surface_mm);
+    copy_part(density_g_cm3, part, to.density_g_cm3);
+    copy_part(labels.bone, part, to.bone);
+    copy_part(labels.tissue, part, to.tissue);
+    return PartKind::samples;
+  };
+  auto grids = build_grids(std::move(info), surface_mm.box, fill, keep_going);
+  if (!grids) return tl::unexpected(grids.error());
   Case result;
-  result.grids_ = std::move(grids);
+  result.grids_ = std::move(*grids);
+  return result;
+}
+
+Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillPart& fill, const KeepGoing& keep_going) {
+  const auto fill_buffers = [&](const CoordBox& part, PartBuffers& to) {
+    const Coord dims = part.dims();
+    const std::size_t samples = static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z);
+    to.surface_mm.resize(samples);
+    to.density_g_cm3.resize(samples);
+    return fill(part, to.surface_mm, to.density_g_cm3);
+  };
+  auto grids = build_grids(std::move(info), box, fill_buffers, keep_going);
+  if (!grids) return tl::unexpected(grids.error());
+  Case result;
+  result.grids_ = std::move(*grids);
   return result;
 }
 
@@ -400,6 +455,7 @@ double Case::clearance_mm(const Vec3& point_mm) const {
 }
 
 Tissue Case::tissue(Coord sample) const { return static_cast<Tissue>(static_cast<int>(grids_->tissue.value(sample))); }
+int Case::bone_number(Coord sample) const { return static_cast<int>(grids_->bone.value(sample)); }
 
 bool Case::has_surface(const CoordBox& box) const {
   const Coord first = floor_to(box.min, kLeafSize);

@@ -32,7 +32,15 @@ struct CaseInfo {
   friend bool operator==(const CaseInfo&, const CaseInfo&) = default;
 };
 
-enum class Tissue : std::uint8_t { none = 0, cortical = 1, trabecular = 2 };
+// Enamel is all that a scan shows denser than compact bone and that is no metal. Tools cut it as compact bone. No tool cuts metal.
+enum class Tissue : std::uint8_t { none = 0, cortical = 1, trabecular = 2, metal = 3, enamel = 4 };
+
+// What an importer knows about the samples beyond their distance and density. Each volume has the box of the distance, or
+// is empty.
+struct SampleLabels {
+  DenseVolume<std::uint8_t> bone;  // number of the bone, from 1; read inside the surface. Empty: all samples are bone 1.
+  DenseVolume<Tissue> tissue;      // metal, enamel, or none: the density decides. Empty: the density decides everywhere.
+};
 
 // What a part of a bone holds, so that a builder need not look at every sample of what is all one.
 enum class PartKind {
@@ -50,7 +58,8 @@ class Case {
   // From the signed distance to the bone surface (mm, negative inside; only the band of 4 voxels matters, beyond it
   // the sign) and the density (g/cm³), both over the same box.
   [[nodiscard]] static Result<Case> build(CaseInfo info, const DenseVolume<float>& surface_mm,
-                                          const DenseVolume<float>& density_g_cm3);
+                                          const DenseVolume<float>& density_g_cm3, const SampleLabels& labels = {},
+                                          const KeepGoing& keep_going = {});
   // The same from parts of at most kPartSamples³, without ever holding the whole in memory: for large bones. Leaves of
   // one density are kept as one number. `keep_going` is asked between parts, and with a false answer the error is cancelled.
   static constexpr std::int32_t kPartSamples = 64;
@@ -81,6 +90,8 @@ class Case {
   // A lower bound of the distance to the bone, mm, zero in and near it.
   [[nodiscard]] double clearance_mm(const Vec3& point_mm) const;
   [[nodiscard]] Tissue tissue(Coord sample) const;
+  // Number of the bone that the sample belongs to, from 1; 0: no bone.
+  [[nodiscard]] int bone_number(Coord sample) const;
   // Whether any sample of level 0 in the box is within the band of the surface; if none is, all are on one side of it.
   [[nodiscard]] bool has_surface(const CoordBox& box) const;
   // Whether any sample of level 0 in the box is bone or in the band around it.
