@@ -1,5 +1,6 @@
 #include "common/imaging/hu_volume.hpp"
 
+#include <algorithm>
 #include <cstdio>
 
 namespace osteon::imaging {
@@ -9,6 +10,25 @@ std::string describe(const HuVolume& volume) {
   std::snprintf(text, sizeof text, "%dx%dx%d, %.3gx%.3gx%.3g mm", volume.dims[0], volume.dims[1], volume.dims[2],
                 volume.spacing_mm.x(), volume.spacing_mm.y(), volume.spacing_mm.z());
   return text;
+}
+
+HuVolume cropped(HuVolume volume, const std::array<int, 3>& first, const std::array<int, 3>& last) {
+  HuVolume part;
+  part.spacing_mm = volume.spacing_mm;
+  part.directions = volume.directions;
+  part.origin_mm = volume.position_mm(Vec3(first[0], first[1], first[2]));
+  for (std::size_t axis = 0; axis < 3; ++axis) part.dims[axis] = last[axis] - first[axis] + 1;
+  // Rows only move towards the beginning, so the memory is used again.
+  std::int16_t* to = volume.values.data();
+  for (int slice = first[2]; slice <= last[2]; ++slice)
+    for (int row = first[1]; row <= last[1]; ++row) {
+      const std::int16_t* from = volume.values.data() + volume.index(first[0], row, slice);
+      to = std::copy(from, from + part.dims[0], to);
+    }
+  volume.values.resize(part.count());
+  volume.values.shrink_to_fit();
+  part.values = std::move(volume.values);
+  return part;
 }
 
 Box enclosing_box(const HuVolume& volume, const Vec3& first, const Vec3& last) {

@@ -1,113 +1,79 @@
 #include "common/imaging/islands.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
-#include <vector>
+
+#include "common/imaging/calibration.hpp"
 
 namespace osteon::imaging {
 namespace {
 
-// A stretch of bone voxels within one row of the volume.
-struct Run {
-  std::int32_t first = 0;
-  std::int32_t last = 0;
-};
-
-// Union-find over runs; the smaller number is the root, so results do not depend on the order of unions.
-class Forest {
- public:
-  void add() { parent_.push_back(static_cast<std::uint32_t>(parent_.size())); }
-  std::uint32_t root(std::uint32_t i) {
-    while (parent_[i] != i) {
-      parent_[i] = parent_[parent_[i]];
-      i = parent_[i];
-    }
-    return i;
-  }
-  void unite(std::uint32_t a, std::uint32_t b) {
-    a = root(a);
-    b = root(b);
-    if (a != b) parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
+constexpr int kMostNumbers = 255;
 
 }  // namespace
 
-Result<IslandReport> keep_largest_island(HuVolume& volume, double threshold_hu, const KeepGoing& keep_going) {
-  const auto [columns, rows, slices] = volume.dims;
-  const auto stopped = [] { return failure(ErrorCode::cancelled, "stopped while looking for the bone"); };
+Result<Islands> find_islands(const HuVolume& volume, const VoxelMask& bone, const DensityCalibration& calibration, const KeepGoing& keep_going) {
+  std::bitset<256> not_zero;
+  not_zero.set().reset(0);
+  auto components = find_components(bone, not_zero, Connectivity::corners, [&](double done) { return keep_going(0.6 * done); });
+  if (!components) return tl::unexpected(components.error());
 
-  // Runs row by row; row_begin[r] is the first run of row r = slice · rows + row.
-  std::vector<Run> runs;
-  std::vector<std::uint32_t> row_begin;
-  row_begin.reserve(static_cast<std::size_t>(rows) * static_cast<std::size_t>(slices) + 1);
-  Forest forest;
-  for (int slice = 0; slice < slices; ++slice) {
-    if (!keep_going(0.8 * slice / slices)) return stopped();
-    for (int row = 0; row < rows; ++row) {
-      row_begin.push_back(static_cast<std::uint32_t>(runs.size()));
-      const std::int16_t* hu = volume.values.data() + volume.index(0, row, slice);
-      for (int i = 0; i < columns; ++i) {
-        if (hu[i] < threshold_hu) continue;
-        const int first = i;
-        while (i + 1 < columns && hu[i + 1] >= threshold_hu) ++i;
-        runs.push_back({first, i});
-        forest.add();
-      }
-      // Touching runs of the four rows before this one: a column more at either end, for the diagonals.
-      const auto end = static_cast<std::uint32_t>(runs.size());
-      const auto join = [&, rows = rows](int other_row, int other_slice) {
-        if (other_row < 0 || other_row >= rows || other_slice < 0) return;
-        const std::size_t r = static_cast<std::size_t>(other_slice) * static_cast<std::size_t>(rows) + static_cast<std::size_t>(other_row);
-        std::uint32_t a = row_begin[r];
-        const std::uint32_t a_end = row_begin[r + 1];
-        std::uint32_t b = row_begin.back();
-        while (a < a_end && b < end) {
-          if (runs[a].first <= runs[b].last + 1 && runs[b].first <= runs[a].last + 1) forest.unite(a, b);
-          (runs[a].last < runs[b].last) ? ++a : ++b;
-        }
-      };
-      join(row - 1, slice);
-      for (int other = row - 1; other <= row + 1; ++other) join(other, slice - 1);
-    }
+  struct Sums {
+    Island island;
+    double density = 0.0;
+    Vec3 voxels = Vec3::Zero();
+  };
+  std::vector<Sums> sums(components->count);
+  for (Sums& s : sums) {
+    s.island.first = volume.dims;
+    s.island.last = {-1, -1, -1};
   }
-  row_begin.push_back(static_cast<std::uint32_t>(runs.size()));
-
-  IslandReport report;
-  if (runs.empty())
-    return failure(ErrorCode::invalid_input, "no voxel reaches the bone threshold of " +
-                                                 std::to_string(std::lround(threshold_hu)) + " HU; give a lower --threshold");
-
-  std::vector<std::int64_t> size(runs.size(), 0);
-  for (std::uint32_t i = 0; i < runs.size(); ++i) size[forest.root(i)] += runs[i].last - runs[i].first + 1;
-  const auto largest = static_cast<std::uint32_t>(std::max_element(size.begin(), size.end()) - size.begin());
-  report.islands = std::count_if(size.begin(), size.end(), [](std::int64_t n) { return n > 0; });
-  report.kept_voxels = size[largest];
-  report.removed_voxels = std::accumulate(size.begin(), size.end(), std::int64_t{0}) - report.kept_voxels;
-
-  report.first = volume.dims;
-  report.last = {-1, -1, -1};
-  const auto below = static_cast<std::int16_t>(std::ceil(threshold_hu) - 1);
-  for (int slice = 0; slice < slices; ++slice) {
-    if (!keep_going(0.8 + 0.2 * slice / slices)) return stopped();
-    for (int row = 0; row < rows; ++row) {
-      const std::size_t r = static_cast<std::size_t>(slice) * static_cast<std::size_t>(rows) + static_cast<std::size_t>(row);
-      for (std::uint32_t i = row_begin[r]; i < row_begin[r + 1]; ++i) {
-        if (forest.root(i) == largest) {
-          report.first = {std::min(report.first[0], runs[i].first), std::min(report.first[1], row), std::min(report.first[2], slice)};
-          report.last = {std::max(report.last[0], runs[i].last), std::max(report.last[1], row), std::max(report.last[2], slice)};
-        } else {
-          const auto begin = volume.values.begin() + static_cast<std::ptrdiff_t>(volume.index(runs[i].first, row, slice));
-          std::fill(begin, begin + (runs[i].last - runs[i].first + 1), below);
-        }
-      }
+  std::size_t done = 0;
+  for (const VoxelRun& run : components->runs) {
+    if ((done++ & 0xffff) == 0 && !keep_going(0.6 + 0.4 * static_cast<double>(done) / static_cast<double>(components->runs.size())))
+      return failure(ErrorCode::cancelled, "stopped while measuring the islands of bone");
+    Sums& s = sums[run.component];
+    const std::array<int, 3> low{run.first, run.row, run.slice}, high{run.last, run.row, run.slice};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      s.island.first[axis] = std::min(s.island.first[axis], low[axis]);
+      s.island.last[axis] = std::max(s.island.last[axis], high[axis]);
     }
+    const int count = run.last - run.first + 1;
+    s.island.voxels += count;
+    s.voxels += count * Vec3(0.5 * (run.first + run.last), run.row, run.slice);
+    for (int x = run.first; x <= run.last; ++x) s.density += bone_density_g_cm3(calibration, volume.at(x, run.row, run.slice));
   }
-  return report;
+
+  Islands islands;
+  std::vector<std::uint32_t> order(sums.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::ranges::stable_sort(order, std::ranges::greater{}, [&](std::uint32_t i) { return sums[i].island.voxels; });
+  islands.number.resize(order.size());
+  for (const std::uint32_t i : order) {
+    Sums& s = sums[i];
+    const auto voxels = static_cast<double>(s.island.voxels);
+    s.island.volume_cm3 = voxels * volume.spacing_mm.prod() * 1e-3;
+    s.island.density_g_cm3 = s.density / voxels;
+    s.island.centre_mm = volume.position_mm(s.voxels / voxels);
+    islands.list.push_back(s.island);
+    islands.number[i] = static_cast<int>(islands.list.size());
+  }
+  islands.components = std::move(*components);
+  return islands;
+}
+
+VoxelMask number_bones(const Islands& islands, std::span<const int> kept, bool merge, const std::array<int, 3>& dims) {
+  std::vector<std::uint8_t> bone_of(islands.list.size() + 1, 0);
+  int next = 1;
+  for (const int island : kept) bone_of[static_cast<std::size_t>(island)] = static_cast<std::uint8_t>(merge ? 1 : std::min(next++, kMostNumbers));
+  VoxelMask bones(dims);
+  for (const VoxelRun& run : islands.components.runs) {
+    const std::uint8_t bone = bone_of[static_cast<std::size_t>(islands.number[run.component])];
+    if (bone == 0) continue;
+    std::uint8_t* row = bones.values.data() + bones.index(0, run.row, run.slice);
+    std::fill(row + run.first, row + run.last + 1, bone);
+  }
+  return bones;
 }
 
 }  // namespace osteon::imaging

@@ -1,25 +1,39 @@
-// Which of the bright voxels are the bone: the largest 26-connected island above a threshold.
+// The separate pieces of bone in a scan, and which of them are kept.
 #pragma once
 #include <array>
 #include <cstdint>
+#include <span>
+#include <vector>
 
+#include "common/imaging/components.hpp"
 #include "common/imaging/hu_volume.hpp"
-#include "common/volume/iso_surface.hpp"
+#include "common/volume/case.hpp"
 
 namespace osteon::imaging {
 
-struct IslandReport {
-  std::int64_t islands = 0;         // how many there were
-  std::int64_t kept_voxels = 0;
-  std::int64_t removed_voxels = 0;
-  std::array<int, 3> first{};       // voxel box of the kept one, both ends included
+// An island: voxels of bone that are connected across faces, edges or corners.
+struct Island {
+  std::int64_t voxels = 0;
+  double volume_cm3 = 0.0;          // of its voxels
+  double density_g_cm3 = 0.0;       // mean over its voxels
+  Vec3 centre_mm = Vec3::Zero();    // of its voxels, LPS
+  std::array<int, 3> first{};       // voxel box, both ends included
   std::array<int, 3> last{};
 };
 
-// Pulls the voxels of every other island to the last whole HU below the threshold. A trilinear cell with a voxel of
-// the kept island has no voxel of another (they would be 26-neighbours), so the kept surface does not move. What lies
-// below the threshold, marrow inside the bone too, stays as it is.
-// Errors: invalid_input (nothing reaches the threshold), cancelled.
-[[nodiscard]] Result<IslandReport> keep_largest_island(HuVolume& volume, double threshold_hu, const KeepGoing& keep_going);
+struct Islands {
+  std::vector<Island> list;         // largest first; among equals the first in memory. Number N is list[N - 1].
+  Components components;
+  std::vector<int> number;          // of each component, from 1
+};
+
+// Islands of the voxels that are not 0. Error: cancelled.
+[[nodiscard]] Result<Islands> find_islands(const HuVolume& volume, const VoxelMask& bone, const DensityCalibration& calibration,
+                                           const KeepGoing& keep_going);
+
+// Numbers of bones, from 1: what voxels of the kept islands get in a mask of the volume's dims; others get 0. The islands
+// `kept`, by number, become bones 1, 2, 3 ... in this order, all of them bone 1 where `merge` is true. From the 255th on they
+// share the number 255.
+[[nodiscard]] VoxelMask number_bones(const Islands& islands, std::span<const int> kept, bool merge, const std::array<int, 3>& dims);
 
 }  // namespace osteon::imaging

@@ -1,5 +1,7 @@
 // From the scanner's grid to the bone's lattice.
 #pragma once
+#include <span>
+
 #include "common/imaging/hu_volume.hpp"
 #include "common/volume/iso_surface.hpp"
 
@@ -9,5 +11,8 @@ namespace osteon::imaging {
 // the value goes on as at the nearest of them. Error: cancelled.
 [[nodiscard]] Result<DenseVolume<float>> resample(const HuVolume& volume, const CoordBox& box, double pitch_mm,
                                                   const KeepGoing& keep_going);
+
+// The same of one box into memory for all its samples, z fastest.
+void resample(const HuVolume& volume, const CoordBox& box, double pitch_mm, std::span<float> out);
 
 }  // namespace osteon::imaging

@@ -270,21 +270,15 @@ void copy_part(const DenseVolume<T>& from, const CoordBox& part, std::vector<T>&
     }
 }
 
-// The samples of one part after the other, always in the same order.
-struct PartBuffers {
-  std::vector<float> surface_mm, density_g_cm3;
-  std::vector<std::uint8_t> bone;
-  std::vector<Tissue> tissue;
-};
-using FillBuffers = std::function<PartKind(const CoordBox& part, PartBuffers& buffers)>;
+}  // namespace
 
-Result<std::shared_ptr<Case::Grids>> build_grids(CaseInfo info, const CoordBox& box, const FillBuffers& fill, const KeepGoing& keep_going) {
+Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillLabelledPart& fill, const KeepGoing& keep_going) {
   if (!(info.pitch_mm > 0.0)) return failure(ErrorCode::invalid_input, "a case needs a pitch above zero");
   const float band = band_mm(info.pitch_mm);
-  auto grids = std::make_shared<Case::Grids>(Case::Grids{std::move(info), {}, SparseVolume(band), SparseVolume(0.0f), SparseVolume(0.0f),
-                                                         SparseVolume(0.0f), SparseVolume(0.0f), {}, 0.0});
+  auto grids = std::make_shared<Grids>(Grids{std::move(info), {}, SparseVolume(band), SparseVolume(0.0f), SparseVolume(0.0f),
+                                             SparseVolume(0.0f), SparseVolume(0.0f), {}, 0.0});
   PartBuffers buffers;
-  constexpr std::int32_t kPart = Case::kPartSamples;
+  constexpr std::int32_t kPart = kPartSamples;
   const Coord first = floor_to(box.min, kPart), last = box.max;
   for (std::int32_t px = first.x; px <= last.x; px += kPart) {
     const double done = static_cast<double>(px - first.x) / std::max(1, last.x - first.x);
@@ -310,43 +304,35 @@ Result<std::shared_ptr<Case::Grids>> build_grids(CaseInfo info, const CoordBox& 
     return failure(ErrorCode::invalid_input, "there is no bone at or above the threshold; choose a lower --threshold");
   grids->clearance = make_clearance(grids->surface, grids->info.pitch_mm);
   grids->hash = content_hash(*grids);
-  return grids;
+  Case result;
+  result.grids_ = std::move(grids);
+  return result;
 }
-
-}  // namespace
 
 Result<Case> Case::build(CaseInfo info, const DenseVolume<float>& surface_mm, const DenseVolume<float>& density_g_cm3,
                          const SampleLabels& labels, const KeepGoing& keep_going) {
   OSTEON_CHECK(surface_mm.box == density_g_cm3.box);
   OSTEON_CHECK(labels.bone.values.empty() || labels.bone.box == surface_mm.box);
   OSTEON_CHECK(labels.tissue.values.empty() || labels.tissue.box == surface_mm.box);
-  const auto fill = [&](const CoordBox& part, PartBuffers& to) {
+  const FillLabelledPart fill = [&](const CoordBox& part, PartBuffers& to) {
     copy_part(surface_mm, part, to.surface_mm);
     copy_part(density_g_cm3, part, to.density_g_cm3);
     copy_part(labels.bone, part, to.bone);
     copy_part(labels.tissue, part, to.tissue);
     return PartKind::samples;
   };
-  auto grids = build_grids(std::move(info), surface_mm.box, fill, keep_going);
-  if (!grids) return tl::unexpected(grids.error());
-  Case result;
-  result.grids_ = std::move(*grids);
-  return result;
+  return build(std::move(info), surface_mm.box, fill, keep_going);
 }
 
 Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillPart& fill, const KeepGoing& keep_going) {
-  const auto fill_buffers = [&](const CoordBox& part, PartBuffers& to) {
+  const FillLabelledPart fill_buffers = [&](const CoordBox& part, PartBuffers& to) {
     const Coord dims = part.dims();
     const std::size_t samples = static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z);
     to.surface_mm.resize(samples);
     to.density_g_cm3.resize(samples);
     return fill(part, to.surface_mm, to.density_g_cm3);
   };
-  auto grids = build_grids(std::move(info), box, fill_buffers, keep_going);
-  if (!grids) return tl::unexpected(grids.error());
-  Case result;
-  result.grids_ = std::move(*grids);
-  return result;
+  return build(std::move(info), box, fill_buffers, keep_going);
 }
 
 Result<Case> Case::load(const std::filesystem::path& folder) {
@@ -391,8 +377,10 @@ Result<Case> Case::load(const std::filesystem::path& folder) {
   return result;
 }
 
-Result<void> Case::save(const std::filesystem::path& folder) const {
+Result<void> Case::save(const std::filesystem::path& folder, const KeepGoing& keep_going) const {
   namespace fs = std::filesystem;
+  const auto stopped = [&] { return keep_going && !keep_going(1.0); };
+  if (stopped()) return failure(ErrorCode::cancelled, "stopped; nothing was written");
   std::error_code error;
   if (fs::exists(folder, error))
     return failure(ErrorCode::exists, folder.string() + " is already there; choose another name or remove it first");
@@ -414,6 +402,7 @@ Result<void> Case::save(const std::filesystem::path& folder) const {
     out << to_json(g).dump(2) << '\n';
     out.close();
     if (!out) return failure(ErrorCode::internal, "cannot write " + (partial / kInfoFile).string() + "; is the disk full?");
+    if (stopped()) return failure(ErrorCode::cancelled, "stopped; nothing was written");
     fs::rename(partial, target, error);
     if (error) return failure(ErrorCode::internal, "cannot rename " + partial.string() + " to " + target.string() + ": " + error.message());
     return {};

@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "common/core/digest.hpp"
 #include "common/volume/block_gather.hpp"
@@ -52,6 +53,14 @@ enum class PartKind {
 // fastest. Asked once for each part, always in the same order, by one thread.
 using FillPart = std::function<PartKind(const CoordBox& box, std::span<float> surface_mm, std::span<float> density_g_cm3)>;
 
+// What a part holds, with labels: as FillPart's, each of as many samples as the box has, or empty where there are no labels.
+struct PartBuffers {
+  std::vector<float> surface_mm, density_g_cm3;
+  std::vector<std::uint8_t> bone;  // as SampleLabels
+  std::vector<Tissue> tissue;
+};
+using FillLabelledPart = std::function<PartKind(const CoordBox& box, PartBuffers& buffers)>;
+
 // Read-only after construction, so any thread may read it at any time.
 class Case {
  public:
@@ -65,11 +74,13 @@ class Case {
   static constexpr std::int32_t kPartSamples = 64;
   [[nodiscard]] static Result<Case> build(CaseInfo info, const CoordBox& box, const FillPart& fill,
                                           const KeepGoing& keep_going = {});
+  [[nodiscard]] static Result<Case> build(CaseInfo info, const CoordBox& box, const FillLabelledPart& fill, const KeepGoing& keep_going);
   // Errors: not_found (no such folder), invalid_input (no or broken case.json / bone.vdb, or content that does not
   // match its hash), unsupported (schema version).
   [[nodiscard]] static Result<Case> load(const std::filesystem::path& folder);
-  // Writes beside `folder` and renames, so no half-written case is ever seen. Errors: exists, internal (disk).
-  [[nodiscard]] Result<void> save(const std::filesystem::path& folder) const;
+  // Writes beside `folder` and renames, so no half-written case is ever seen. `keep_going` is asked before the renaming, too.
+  // Errors: exists, internal (disk), cancelled.
+  [[nodiscard]] Result<void> save(const std::filesystem::path& folder, const KeepGoing& keep_going = {}) const;
 
   [[nodiscard]] const CaseInfo& info() const;
   [[nodiscard]] const Digest& hash() const;

@@ -1,14 +1,10 @@
 // The signed distance to where a sampled field crosses a value, at sub-voxel position.
 #pragma once
-#include <functional>
-
+#include "common/core/keep_going.hpp"
 #include "common/core/result.hpp"
 #include "common/volume/dense_volume.hpp"
 
 namespace osteon {
-
-// Asked often during long work, with the fraction done; false means that the user wants it stopped.
-using KeepGoing = std::function<bool(double fraction)>;
 
 // Inside is where field >= iso. Millimetres, negative inside, clipped to ±4 pitches. The crossing is interpolated
 // linearly along lattice edges, so a plane comes out exact and a sphere of radius r voxels within about 0.7 / r voxel.

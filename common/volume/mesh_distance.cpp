@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "common/geometry/mesh_file.hpp"
+#include "common/geometry/triangle_distance.hpp"
 
 namespace osteon {
 namespace {
@@ -21,27 +22,6 @@ namespace {
 void initialize_once() {
   static std::once_flag once;
   std::call_once(once, [] { openvdb::initialize(); });
-}
-
-// Distance from p to a triangle: Ericson, Real-Time Collision Detection, 2005, section 5.1.5.
-double distance_to(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 ab = b - a, ac = c - a, ap = p - a;
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0 && d2 <= 0) return ap.norm();
-  const Vec3 bp = p - b;
-  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0 && d4 <= d3) return bp.norm();
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return (ap - ab * (d1 / (d1 - d3))).norm();
-  const Vec3 cp = p - c;
-  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0 && d5 <= d6) return cp.norm();
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return (ap - ac * (d2 / (d2 - d6))).norm();
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) return (bp - (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)))).norm();
-  const double scale = 1.0 / (va + vb + vc);
-  return (ap - ab * (vb * scale) - ac * (vc * scale)).norm();
 }
 
 Result<void> check(const TriangleMesh& mesh, double pitch_mm, std::size_t most_triangles, double largest_mm) {
@@ -135,7 +115,7 @@ class BandDistance {
         if (!nearest_.probeValue(beside, t) || t == last || t < 0 || static_cast<std::size_t>(t) >= mesh_.triangles.size()) continue;
         last = t;
         const auto& [a, b, c] = mesh_.triangles[static_cast<std::size_t>(t)];
-        mm = std::min(mm, distance_to(p, position(mesh_, a), position(mesh_, b), position(mesh_, c)));
+        mm = std::min(mm, std::sqrt(squared_distance_to_triangle<double>(p, position(mesh_, a), position(mesh_, b), position(mesh_, c))));
       }
     }
     return std::copysign(mm, rough);

@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -27,15 +28,33 @@ constexpr double kMeshPitch_mm = 0.5;
 
 struct Arguments {
   std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm";
+  std::string keep;
   std::vector<std::string> bone_colours;
   std::optional<double> pitch_mm, threshold_hu;
   double width_mm = 20.0, density_g_cm3 = 1.9;
-  bool json = false;
+  bool json = false, merge = false, hollow = false;
 };
 
 Result<void> save(const Case& bone, const std::string& out, const StopSignal& stop) {
   if (stop.requested()) return tl::unexpected(stopped());
-  return bone.save(out);
+  return bone.save(out, [&](double) { return !stop.requested(); });
+}
+
+// "all", or numbers such as "1,3". Empty: the largest.
+Result<void> parse_keep(const std::string& text, CtOptions& options) {
+  options.keep_all = text == "all";
+  if (text.empty() || options.keep_all) return {};
+  std::size_t begin = 0;
+  while (begin <= text.size()) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    int number = 0;
+    const auto [stop, error] = std::from_chars(text.data() + begin, text.data() + end, number);
+    if (error != std::errc{} || stop != text.data() + end || number < 1)
+      return failure(ErrorCode::invalid_input, "--keep " + text + " is not a list of islands; write numbers such as 1,3, or all");
+    options.keep.push_back(number);
+    begin = end + 1;
+  }
+  return {};
 }
 
 // Names the input in what went wrong with its content.
@@ -45,6 +64,10 @@ Error about(const std::string& input, const Error& error) {
 
 Result<std::string> run_ct(const Arguments& a, const StopSignal& stop) {
   if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
+  CtOptions options;
+  if (auto parsed = parse_keep(a.keep, options); !parsed) return tl::unexpected(parsed.error());
+  options.merge = a.merge;
+  options.hollow = a.hollow;
   std::error_code error;
   if (!fs::exists(a.input, error)) return failure(ErrorCode::not_found, "there is no file or folder " + a.input + "; give a DICOM folder or an .inv3 file");
   Bar bar(stop);
@@ -52,15 +75,14 @@ Result<std::string> run_ct(const Arguments& a, const StopSignal& stop) {
   auto scan = fs::is_directory(a.input, error) ? read_dicom_series(a.input, reading) : read_inv3(a.input, reading);
   if (!scan) return tl::unexpected(scan.error());
 
-  CtOptions options;
   options.pitch_mm = a.pitch_mm;
   if (a.threshold_hu) options.threshold_hu = *a.threshold_hu;
   if (!a.title.empty()) options.title = a.title;
-  const auto bone = import_ct(std::move(*scan), options, bar.stage(0.2, 0.95));
-  if (!bone) return tl::unexpected(about(a.input, bone.error()));
-  if (auto saved = save(*bone, a.out, stop); !saved) return tl::unexpected(saved.error());
+  const auto made = import_ct(std::move(*scan), options, bar.stage(0.2, 0.95));
+  if (!made) return tl::unexpected(about(a.input, made.error()));
+  if (auto saved = save(*made->bone, a.out, stop); !saved) return tl::unexpected(saved.error());
   bar.stage(1.0, 1.0)(1.0);
-  return report_text(*bone);
+  return report_text(*made->bone) + segmentation_text(made->found);
 }
 
 Result<std::string> run_phantom(const Arguments& a, const StopSignal& stop) {
@@ -195,7 +217,10 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   ct->add_option("INPUT", a.input, "Folder with one DICOM CT series, or an InVesalius project (.inv3)")->required();
   ct->add_option("--out", a.out, "Folder of the case, made by this command")->required();
   ct->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the scan's smallest spacing)")->check(CLI::Range(0.02, 10.0));
-  ct->add_option("--threshold", a.threshold_hu, "Bone is at or above it, HU (default: 226)")->check(CLI::Range(-1000.0, 4000.0));
+  ct->add_option("--threshold", a.threshold_hu, "Bone is at or above it, HU (default: 226, usual for adult skulls in slices of 1.5 mm)")->check(CLI::Range(-1000.0, 4000.0));
+  ct->add_option("--keep", a.keep, "Islands of bone by their number in the printed list, such as 1,3, or all (default: 1, the largest)");
+  ct->add_flag("--merge", a.merge, "Count the kept islands as one bone; otherwise each has a bone number of its own");
+  ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone");
   ct->add_option("--title", a.title, "Name shown to people; do not use a patient's");
   commands.push_back({ct, [shared](const StopSignal& stop) { return run_ct(*shared, stop); }});
 

@@ -2,61 +2,254 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
-#include "common/imaging/islands.hpp"
+#include "common/imaging/bone_field.hpp"
+#include "common/imaging/hard_tissue.hpp"
 #include "common/imaging/resample.hpp"
+#include "common/imaging/segmentation.hpp"
 #include "server/import/import_steps.hpp"
 
 namespace osteon::import {
 namespace {
 
 // Shares of the time that the stages take, for one bar over all of them.
-constexpr double kIslandsEnd = 0.1;
-constexpr double kResampleEnd = 0.4;
-constexpr double kSurfaceEnd = 0.85;
+constexpr double kSegmentEnd = 0.3, kIslandsEnd = 0.35, kFieldEnd = 0.4, kResampleEnd = 0.5, kSurfaceEnd = 0.85;
+// Around the voxels at work, so that whatever the segmentation looks at beside a bone is there.
+constexpr double kMargin_mm = 5.0;
+
+// A part of the scan, and on which sides it ends where the scan does.
+struct Region {
+  std::array<int, 3> first{}, last{};
+  imaging::ScanEnds ends{};
+};
+
+Region grown(const std::array<int, 3>& first, const std::array<int, 3>& last, const imaging::HuVolume& volume) {
+  Region region;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const int margin = 2 + static_cast<int>(std::ceil(kMargin_mm / volume.spacing_mm[static_cast<int>(axis)]));
+    region.first[axis] = std::max(0, first[axis] - margin);
+    region.last[axis] = std::min(volume.dims[axis] - 1, last[axis] + margin);
+    region.ends[axis] = {region.first[axis] == 0, region.last[axis] == volume.dims[axis] - 1};
+  }
+  return region;
+}
+
+// Around everything at or above the threshold; all of the scan where nothing is.
+Region dense_region(const imaging::HuVolume& volume, double threshold_hu) {
+  std::array<int, 3> first = volume.dims, last{-1, -1, -1};
+  for (int slice = 0; slice < volume.dims[2]; ++slice)
+    for (int row = 0; row < volume.dims[1]; ++row) {
+      const std::int16_t* hu = volume.values.data() + volume.index(0, row, slice);
+      for (int column = 0; column < volume.dims[0]; ++column) {
+        if (hu[column] < threshold_hu) continue;
+        first = {std::min(first[0], column), std::min(first[1], row), std::min(first[2], slice)};
+        last = {std::max(last[0], column), std::max(last[1], row), std::max(last[2], slice)};
+      }
+    }
+  if (last[0] < 0) return grown({0, 0, 0}, {volume.dims[0] - 1, volume.dims[1] - 1, volume.dims[2] - 1}, volume);
+  return grown(first, last, volume);
+}
 
 // The bone's voxels, the cell around each, and the band beyond.
-CoordBox lattice_box(const imaging::HuVolume& volume, const imaging::IslandReport& bone, double pitch_mm) {
-  const Vec3 first(bone.first[0], bone.first[1], bone.first[2]);
-  const Vec3 last(bone.last[0], bone.last[1], bone.last[2]);
+CoordBox lattice_box(const imaging::HuVolume& volume, const std::array<int, 3>& bone_first, const std::array<int, 3>& bone_last, double pitch_mm) {
+  const Vec3 first(bone_first[0], bone_first[1], bone_first[2]), last(bone_last[0], bone_last[1], bone_last[2]);
   const Box cells = imaging::enclosing_box(volume, first - Vec3::Ones(), last + Vec3::Ones());
   return covering_samples(cells.grown(5.0 * pitch_mm), pitch_mm);
 }
 
 // Bone ends where the scan does: the intersection of two solids is the maximum of their distances.
-void cap_at_scan(const imaging::HuVolume& volume, double pitch_mm, DenseVolume<float>& surface_mm) {
-  const float band = static_cast<float>(4.0 * pitch_mm);
+Result<void> cap_at_scan(const imaging::HuVolume& scan, double pitch_mm, DenseVolume<float>& surface_mm, const KeepGoing& keep_going) {
+  const auto band = static_cast<float>(4.0 * pitch_mm);
   const CoordBox& box = surface_mm.box;
   float* value = surface_mm.values.data();
-  for (int x = box.min.x; x <= box.max.x; ++x)
+  for (int x = box.min.x; x <= box.max.x; ++x) {
+    if (!keep_going(static_cast<double>(x - box.min.x) / box.dims().x)) return failure(ErrorCode::cancelled, "stopped at the ends of the scan");
     for (int y = box.min.y; y <= box.max.y; ++y)
       for (int z = box.min.z; z <= box.max.z; ++z, ++value) {
-        const auto outside = static_cast<float>(imaging::outside_scan_mm(volume, position_mm({x, y, z}, pitch_mm)));
+        if (*value >= band) continue;
+        const auto outside = static_cast<float>(imaging::outside_scan_mm(scan, position_mm({x, y, z}, pitch_mm)));
         *value = std::min(band, std::max(*value, outside));
       }
+  }
+  return {};
+}
+
+Result<std::vector<int>> islands_to_keep(const CtOptions& options, const std::vector<imaging::Island>& islands) {
+  std::vector<int> all(islands.size());
+  std::iota(all.begin(), all.end(), 1);
+  if (options.keep_all) return all;
+  if (options.keep.empty()) return std::vector<int>{1};
+  std::vector<int> kept;
+  for (const int number : options.keep) {
+    if (number < 1 || number > static_cast<int>(islands.size()))
+      return failure(ErrorCode::invalid_input, "--keep names island " + std::to_string(number) + ", but at this threshold there are islands 1 to " +
+                                                   std::to_string(islands.size()) + "; give numbers of the list, or all");
+    if (std::ranges::find(kept, number) == kept.end()) kept.push_back(number);
+  }
+  return kept;
+}
+
+// Labels of the lattice's samples out of those of the voxels: the nearest voxel's, and where that is no bone, as next to the
+// surface, any of the cell's.
+class NearestLabel {
+ public:
+  NearestLabel(const imaging::HuVolume& volume, const imaging::VoxelMask& bones) : volume_(volume), bones_(bones) {}
+  // The index of the voxel that a sample in bone takes its labels from.
+  [[nodiscard]] std::size_t voxel(const Vec3& position_mm) const {
+    const Vec3 at = volume_.voxel(position_mm);
+    const auto clamped = [&](double c, std::size_t axis) { return std::clamp(static_cast<int>(c), 0, volume_.dims[axis] - 1); };
+    const std::size_t nearest = bones_.index(clamped(std::round(at.x()), 0), clamped(std::round(at.y()), 1), clamped(std::round(at.z()), 2));
+    if (bones_.values[nearest] != 0) return nearest;
+    for (int corner = 0; corner < 8; ++corner) {
+      const std::size_t beside = bones_.index(clamped(std::floor(at.x()) + (corner & 1), 0), clamped(std::floor(at.y()) + (corner >> 1 & 1), 1),
+                                              clamped(std::floor(at.z()) + (corner >> 2), 2));
+      if (bones_.values[beside] != 0) return beside;
+    }
+    return nearest;
+  }
+
+ private:
+  const imaging::HuVolume& volume_;
+  const imaging::VoxelMask& bones_;
+};
+
+// Samples for the case out of the scan, a part at a time: density and labels only where there is bone in or near a leaf.
+class CaseSamples {
+ public:
+  CaseSamples(const imaging::HuVolume& volume, const imaging::VoxelMask& bones, const imaging::VoxelMask& hard, bool several,
+              const DenseVolume<float>& surface_mm, const CtOptions& options, double pitch_mm)
+      : volume_(volume), bones_(bones), hard_(hard), several_(several), surface_mm_(surface_mm), calibration_(options.calibration), pitch_mm_(pitch_mm),
+        band_(static_cast<float>(4.0 * pitch_mm)), label_(volume, bones) {}
+
+  PartKind fill(const CoordBox& part, PartBuffers& to) {
+    const Coord dims = part.dims();
+    const std::size_t count = static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z);
+    to.surface_mm.resize(count);
+    const auto row = static_cast<std::size_t>(dims.z);
+    std::size_t n = 0;
+    for (int x = part.min.x; x <= part.max.x; ++x)
+      for (int y = part.min.y; y <= part.max.y; ++y, n += row) std::copy_n(&surface_mm_.values[surface_mm_.index({x, y, part.min.z})], row, &to.surface_mm[n]);
+    if (std::ranges::all_of(to.surface_mm, [&](float s) { return s >= band_; })) return PartKind::outside;
+
+    to.density_g_cm3.assign(count, 0.0f);
+    to.bone.assign(several_ ? count : 0, 0);
+    to.tissue.assign(hard_.values.empty() ? 0 : count, Tissue::none);
+    const Coord first = floor_to(part.min, kLeafSize);
+    for (int x = first.x; x <= part.max.x; x += kLeafSize)
+      for (int y = first.y; y <= part.max.y; y += kLeafSize)
+        for (int z = first.z; z <= part.max.z; z += kLeafSize) fill_leaf({x, y, z}, part, to);
+    return PartKind::samples;
+  }
+
+ private:
+  void fill_leaf(Coord origin, const CoordBox& part, PartBuffers& to) {
+    const CoordBox box{{std::max(origin.x, part.min.x), std::max(origin.y, part.min.y), std::max(origin.z, part.min.z)},
+                       {std::min(origin.x + kLeafSize - 1, part.max.x), std::min(origin.y + kLeafSize - 1, part.max.y), std::min(origin.z + kLeafSize - 1, part.max.z)}};
+    const Coord dims = part.dims();
+    const auto index = [&](Coord c) {
+      return (static_cast<std::size_t>(c.x - part.min.x) * static_cast<std::size_t>(dims.y) + static_cast<std::size_t>(c.y - part.min.y)) *
+                 static_cast<std::size_t>(dims.z) + static_cast<std::size_t>(c.z - part.min.z);
+    };
+    const auto each = [&](auto visit) {
+      for (int x = box.min.x; x <= box.max.x; ++x)
+        for (int y = box.min.y; y <= box.max.y; ++y)
+          for (int z = box.min.z; z <= box.max.z; ++z) visit(Coord{x, y, z}, index({x, y, z}));
+    };
+    bool near = false;
+    each([&](Coord, std::size_t i) { near = near || to.surface_mm[i] < band_; });
+    if (!near) return;
+    const Coord size = box.dims();
+    hu_.resize(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z));
+    imaging::resample(volume_, box, pitch_mm_, hu_);
+    std::size_t n = 0;
+    each([&](Coord c, std::size_t i) {
+      to.density_g_cm3[i] = static_cast<float>(imaging::bone_density_g_cm3(calibration_, static_cast<double>(hu_[n++])));
+      if (to.surface_mm[i] >= 0.0f || (to.bone.empty() && to.tissue.empty())) return;
+      const std::size_t voxel = label_.voxel(position_mm(c, pitch_mm_));
+      if (!to.bone.empty()) to.bone[i] = bones_.values[voxel];
+      if (!to.tissue.empty()) to.tissue[i] = static_cast<Tissue>(hard_.values[voxel]);
+    });
+  }
+
+  const imaging::HuVolume& volume_;
+  const imaging::VoxelMask &bones_, &hard_;
+  bool several_;
+  const DenseVolume<float>& surface_mm_;
+  DensityCalibration calibration_;
+  double pitch_mm_;
+  float band_;
+  NearestLabel label_;
+  std::vector<float> hu_;
+};
+
+// What was found and what became of it, without the components, which are large.
+CtSegmentation summary(const imaging::HuVolume& volume, const imaging::VoxelMask& bone, const imaging::VoxelMask& bones, const imaging::Islands& islands,
+                       const std::vector<int>& kept) {
+  CtSegmentation found;
+  std::int64_t marrow = 0;
+  for (std::size_t i = 0; i < bone.values.size(); ++i) marrow += bones.values[i] != 0 && bone.values[i] == static_cast<std::uint8_t>(imaging::BoneVoxel::marrow) ? 1 : 0;
+  found.marrow_cm3 = static_cast<double>(marrow) * volume.spacing_mm.prod() * 1e-3;
+  found.region = imaging::enclosing_box(volume, Vec3::Zero(), Vec3(volume.dims[0] - 1, volume.dims[1] - 1, volume.dims[2] - 1));
+  found.islands = islands.list;
+  found.kept = kept;
+  for (const imaging::Island& island : islands.list) found.left_out_cm3 += island.volume_cm3;
+  for (const int number : kept) found.left_out_cm3 -= islands.list[static_cast<std::size_t>(number - 1)].volume_cm3;
+  if (kept.size() == islands.list.size()) found.left_out_cm3 = 0.0;
+  return found;
 }
 
 }  // namespace
 
-Result<Case> import_ct(CtScan scan, const CtOptions& options, const KeepGoing& keep_going) {
-  imaging::HuVolume& volume = scan.volume;
-  const double pitch_mm = options.pitch_mm.value_or(volume.spacing_mm.minCoeff());
-  const auto bone = imaging::keep_largest_island(volume, options.threshold_hu, part(keep_going, 0.0, kIslandsEnd));
-  if (!bone) return tl::unexpected(bone.error());
+Result<CtImport> import_ct(CtScan scan, const CtOptions& options, const KeepGoing& keep_going) {
+  imaging::HuVolume geometry;  // of the whole scan, without its values
+  geometry.dims = scan.volume.dims;
+  geometry.spacing_mm = scan.volume.spacing_mm;
+  geometry.origin_mm = scan.volume.origin_mm;
+  geometry.directions = scan.volume.directions;
+  const double pitch_mm = options.pitch_mm.value_or(geometry.spacing_mm.minCoeff());
+  if (!keep_going(0.0)) return failure(ErrorCode::cancelled, "stopped before looking for the bone");
 
-  const CoordBox box = lattice_box(volume, *bone, pitch_mm);
+  const Region work = dense_region(scan.volume, options.threshold_hu);
+  imaging::HuVolume volume = imaging::cropped(std::move(scan.volume), work.first, work.last);
+  imaging::SegmentationParams params;
+  params.threshold_hu = options.threshold_hu;
+  params.hollow = options.hollow;
+  auto bone = imaging::segment_bone(volume, params, work.ends, part(keep_going, 0.0, kSegmentEnd));
+  if (!bone) return tl::unexpected(bone.error());
+  auto islands = imaging::find_islands(volume, *bone, options.calibration, part(keep_going, kSegmentEnd, kIslandsEnd));
+  if (!islands) return tl::unexpected(islands.error());
+  const auto kept = islands_to_keep(options, islands->list);
+  if (!kept) return tl::unexpected(kept.error());
+  imaging::VoxelMask bones = imaging::number_bones(*islands, *kept, options.merge, volume.dims);
+  CtImport made{summary(volume, *bone, bones, *islands, *kept), {}};
+  islands->components = {};
+  bone->values = {};
+
+  std::array<int, 3> first = volume.dims, last{-1, -1, -1};
+  for (const int number : *kept)
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const imaging::Island& island = islands->list[static_cast<std::size_t>(number - 1)];
+      first[axis] = std::min(first[axis], island.first[axis]);
+      last[axis] = std::max(last[axis], island.last[axis]);
+    }
+  const CoordBox box = lattice_box(volume, first, last, pitch_mm);
   if (Result<void> fits = check_lattice(box, pitch_mm); !fits) return tl::unexpected(fits.error());
 
-  auto hu = imaging::resample(volume, box, pitch_mm, part(keep_going, kIslandsEnd, kResampleEnd));
-  if (!hu) return tl::unexpected(hu.error());
-  volume.values = {};  // no longer needed, and large
-  auto surface_mm = signed_distance_mm(*hu, static_cast<float>(options.threshold_hu), pitch_mm, part(keep_going, kResampleEnd, kSurfaceEnd));
+  auto field = imaging::bone_field(volume, bones, options.threshold_hu, part(keep_going, kIslandsEnd, kFieldEnd));
+  if (!field) return tl::unexpected(field.error());
+  auto samples = imaging::resample(*field, box, pitch_mm, part(keep_going, kFieldEnd, kResampleEnd));
+  if (!samples) return tl::unexpected(samples.error());
+  field->values = {};
+  auto surface_mm = signed_distance_mm(*samples, static_cast<float>(options.threshold_hu), pitch_mm, part(keep_going, kResampleEnd, kSurfaceEnd));
   if (!surface_mm) return tl::unexpected(surface_mm.error());
-  cap_at_scan(volume, pitch_mm, *surface_mm);
-
-  DenseVolume<float> density = std::move(*hu);
-  for (float& value : density.values) value = static_cast<float>(imaging::density_g_cm3(options.calibration, static_cast<double>(value)));
-  if (!keep_going(kSurfaceEnd)) return failure(ErrorCode::cancelled, "stopped before building the case");
+  *samples = {};
+  const KeepGoing building = part(keep_going, kSurfaceEnd, 1.0);
+  if (auto capped = cap_at_scan(geometry, pitch_mm, *surface_mm, part(building, 0.0, 0.1)); !capped) return tl::unexpected(capped.error());
+  auto hard = imaging::find_hard_tissue(volume, bones, options.calibration, part(building, 0.1, 0.2));
+  if (!hard) return tl::unexpected(hard.error());
+  made.found.metal_cm3 = hard->metal_cm3;
+  made.found.enamel_cm3 = hard->enamel_cm3;
 
   CaseInfo info;
   info.title = options.title;
@@ -64,7 +257,12 @@ Result<Case> import_ct(CtScan scan, const CtOptions& options, const KeepGoing& k
   info.pitch_mm = pitch_mm;
   info.calibration = options.calibration;
   info.threshold_hu = options.threshold_hu;
-  return Case::build(std::move(info), *surface_mm, density);
+  CaseSamples content(volume, bones, hard->tissue, kept->size() > 1 && !options.merge, *surface_mm, options, pitch_mm);
+  const FillLabelledPart fill = [&](const CoordBox& part_box, PartBuffers& to) { return content.fill(part_box, to); };
+  auto built = Case::build(std::move(info), box, fill, part(building, 0.2, 1.0));
+  if (!built) return tl::unexpected(built.error());
+  made.bone.emplace(std::move(*built));
+  return made;
 }
 
 }  // namespace osteon::import

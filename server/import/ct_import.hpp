@@ -2,8 +2,10 @@
 #pragma once
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/imaging/calibration.hpp"
+#include "common/imaging/islands.hpp"
 #include "common/volume/case.hpp"
 #include "common/volume/iso_surface.hpp"
 #include "server/import/ct_scan.hpp"
@@ -14,11 +16,34 @@ struct CtOptions {
   std::optional<double> pitch_mm;  // absent: the scan's smallest spacing
   double threshold_hu = imaging::kBoneThreshold_hu;
   DensityCalibration calibration = imaging::kRho1995;
-  std::string title = "CT";  // never taken from the scan, whose names may be a patient's
+  std::string title = "CT";        // never taken from the scan, whose names may be a patient's
+  std::vector<int> keep;           // islands by number, from 1; empty: the largest
+  bool keep_all = false;
+  bool merge = false;              // the kept islands count as one bone
+  bool hollow = false;             // what bone encloses is not bone
 };
 
-// Bone is the largest island at or above the threshold. Where the scan ends within bone, the bone ends with the last
-// whole voxel. Errors: invalid_input (no bone, too many samples), cancelled, internal.
-[[nodiscard]] Result<Case> import_ct(CtScan scan, const CtOptions& options, const KeepGoing& keep_going);
+// What the segmentation found.
+struct CtSegmentation {
+  std::vector<imaging::Island> islands;  // largest first; number N is islands[N - 1]
+  std::vector<int> kept;                 // numbers
+  double left_out_cm3 = 0.0;             // of the islands that were not kept
+  double marrow_cm3 = 0.0;               // below the threshold, within what was kept
+  double metal_cm3 = 0.0, enamel_cm3 = 0.0;  // within what was kept
+  Box region;                            // of the scan around all that reaches the threshold, LPS
+};
+
+struct CtImport {
+  CtSegmentation found;
+  std::optional<Case> bone;  // always there on return; a case has no empty state
+};
+
+// Bone is what segment_bone() says, of the islands that the options keep. Where the scan ends within bone, the bone ends with the
+// last whole voxel. No density is above that of compact bone; what the scan shows above it is labelled metal or enamel.
+// Errors: invalid_input (no bone, no such island, too many samples), cancelled, internal.
+[[nodiscard]] Result<CtImport> import_ct(CtScan scan, const CtOptions& options, const KeepGoing& keep_going);
+
+// The islands, what was left out, and metal, as lines for a person.
+[[nodiscard]] std::string segmentation_text(const CtSegmentation& found);
 
 }  // namespace osteon::import

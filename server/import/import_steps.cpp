@@ -4,10 +4,6 @@
 
 namespace osteon::import {
 
-KeepGoing part(const KeepGoing& whole, double begin, double end) {
-  return [&whole, begin, end](double fraction) { return whole(begin + (end - begin) * fraction); };
-}
-
 Result<void> check_lattice(const CoordBox& box, double pitch_mm) {
   const Coord dims = box.dims();
   const double samples = static_cast<double>(dims.x) * dims.y * dims.z;

@@ -1,13 +1,10 @@
-// What all imports have in common: stages that share one bar of progress, and a limit on samples.
+// What all imports have in common: a limit on samples.
 #pragma once
 #include "common/core/result.hpp"
 #include "common/geometry/lattice.hpp"
 #include "common/volume/iso_surface.hpp"
 
 namespace osteon::import {
-
-// Progress of a stage that takes the whole's from `begin` to `end`; fractions. `whole` must outlive it.
-[[nodiscard]] KeepGoing part(const KeepGoing& whole, double begin, double end);
 
 // Samples of one import: 8 bytes each, and the sparse case besides, stay within 20 GB.
 inline constexpr double kLargestLattice = 1.0e9;

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include "common/imaging/bone_field.hpp"
+#include "common/imaging/calibration.hpp"
 #include "common/imaging/resample.hpp"
+#include "common/imaging/segmentation.hpp"
 
 namespace osteon::imaging {
 namespace {
@@ -23,22 +26,54 @@ void fill(HuVolume& volume, std::array<int, 3> first, std::array<int, 3> last, s
       for (int i = first[0]; i <= last[0]; ++i) volume.values[volume.index(i, j, k)] = hu;
 }
 
-TEST(Islands, KeepsTheLargestAndPullsTheOthersBelowTheThreshold) {
+Islands islands_of(const HuVolume& volume) {
+  const auto bone = segment_bone(volume, {.hollow = true}, kAllScanEnds, always);
+  EXPECT_TRUE(bone);
+  auto found = find_islands(volume, *bone, kRho1995, always);
+  EXPECT_TRUE(found);
+  return std::move(*found);
+}
+
+TEST(Islands, AreListedFromTheLargestWithVolumeCentreAndDensity) {
+  HuVolume volume = empty_volume();
+  volume.spacing_mm = {0.5, 1.0, 2.0};
+  volume.origin_mm = {10.0, 20.0, 30.0};
+  fill(volume, {14, 14, 4}, {16, 16, 6}, 1500);
+  fill(volume, {2, 2, 2}, {9, 9, 9}, 900);
+  fill(volume, {20, 3, 12}, {20, 3, 12}, 226);
+  const Islands islands = islands_of(volume);
+  ASSERT_EQ(islands.list.size(), 3u);
+  EXPECT_EQ(islands.list[0].voxels, 512);
+  EXPECT_EQ(islands.list[1].voxels, 27);
+  EXPECT_EQ(islands.list[2].voxels, 1);
+  EXPECT_NEAR(islands.list[0].volume_cm3, 0.512, 1e-9);
+  EXPECT_NEAR(islands.list[0].density_g_cm3, 0.131 + 0.001067 * 900, 1e-6);
+  EXPECT_LT((islands.list[0].centre_mm - Vec3(10.0 + 5.5 * 0.5, 20.0 + 5.5, 30.0 + 5.5 * 2.0)).norm(), 1e-9);
+  EXPECT_EQ(islands.list[0].first, (std::array<int, 3>{2, 2, 2}));
+  EXPECT_EQ(islands.list[0].last, (std::array<int, 3>{9, 9, 9}));
+}
+
+TEST(Islands, DensityOfMetalCountsAsCompactBones) {
+  HuVolume volume = empty_volume();
+  fill(volume, {2, 2, 2}, {4, 4, 4}, 3071);
+  EXPECT_NEAR(islands_of(volume).list[0].density_g_cm3, 2.1, 1e-9);
+}
+
+TEST(Islands, KeptOnesGetNumbersInTheirOrder) {
   HuVolume volume = empty_volume();
   fill(volume, {2, 2, 2}, {9, 9, 9}, 900);
   fill(volume, {14, 14, 4}, {16, 16, 6}, 1500);
   fill(volume, {20, 3, 12}, {20, 3, 12}, 226);
-  const auto report = keep_largest_island(volume, kThreshold_hu, always);
-  ASSERT_TRUE(report);
-  EXPECT_EQ(report->islands, 3);
-  EXPECT_EQ(report->kept_voxels, 512);
-  EXPECT_EQ(report->removed_voxels, 28);
-  EXPECT_EQ(report->first, (std::array<int, 3>{2, 2, 2}));
-  EXPECT_EQ(report->last, (std::array<int, 3>{9, 9, 9}));
-  EXPECT_EQ(volume.at(5, 5, 5), 900);
-  EXPECT_EQ(volume.at(15, 15, 5), 225);
-  EXPECT_EQ(volume.at(20, 3, 12), 225);
-  EXPECT_EQ(volume.at(12, 12, 12), -100);
+  const Islands islands = islands_of(volume);
+  const std::array kept{3, 1};
+  const VoxelMask bones = number_bones(islands, kept, false, volume.dims);
+  EXPECT_EQ(bones.at(20, 3, 12), 1);
+  EXPECT_EQ(bones.at(5, 5, 5), 2);
+  EXPECT_EQ(bones.at(15, 15, 5), 0);
+  EXPECT_EQ(bones.at(12, 12, 12), 0);
+  const VoxelMask merged = number_bones(islands, kept, true, volume.dims);
+  EXPECT_EQ(merged.at(20, 3, 12), 1);
+  EXPECT_EQ(merged.at(5, 5, 5), 1);
 }
 
 TEST(Islands, NeighboursAcrossACornerAreOne) {
@@ -48,9 +83,7 @@ TEST(Islands, NeighboursAcrossACornerAreOne) {
     HuVolume volume = empty_volume();
     volume.values[volume.index(10, 10, 8)] = 500;
     volume.values[volume.index(10 + d % 3 - 1, 10 + d / 3 % 3 - 1, 8 + d / 9 - 1)] = 500;
-    const auto report = keep_largest_island(volume, kThreshold_hu, always);
-    ASSERT_TRUE(report);
-    EXPECT_EQ(report->islands, 1) << "direction " << d;
+    EXPECT_EQ(islands_of(volume).list.size(), 1u) << "direction " << d;
   }
 }
 
@@ -58,10 +91,9 @@ TEST(Islands, AGapOfOneVoxelParts) {
   HuVolume volume = empty_volume();
   fill(volume, {2, 2, 2}, {5, 5, 5}, 500);
   fill(volume, {7, 2, 2}, {9, 5, 5}, 500);
-  const auto report = keep_largest_island(volume, kThreshold_hu, always);
-  ASSERT_TRUE(report);
-  EXPECT_EQ(report->islands, 2);
-  EXPECT_EQ(report->kept_voxels, 64);
+  const Islands islands = islands_of(volume);
+  ASSERT_EQ(islands.list.size(), 2u);
+  EXPECT_EQ(islands.list[0].voxels, 64);
 }
 
 TEST(Islands, ABridgeFoundLateJoinsWhatWasApart) {
@@ -70,49 +102,73 @@ TEST(Islands, ABridgeFoundLateJoinsWhatWasApart) {
   fill(volume, {2, 2, 2}, {3, 3, 12}, 500);
   fill(volume, {12, 2, 2}, {13, 3, 12}, 500);
   fill(volume, {2, 2, 13}, {13, 3, 13}, 500);
-  const auto report = keep_largest_island(volume, kThreshold_hu, always);
-  ASSERT_TRUE(report);
-  EXPECT_EQ(report->islands, 1);
-  EXPECT_EQ(report->removed_voxels, 0);
+  EXPECT_EQ(islands_of(volume).list.size(), 1u);
 }
 
-TEST(Islands, DoesNotMoveTheKeptSurface) {
+TEST(Islands, ABoneAcrossTheWholeScanIsFound) {
+  HuVolume volume = empty_volume();
+  std::ranges::fill(volume.values, std::int16_t{1000});
+  EXPECT_EQ(islands_of(volume).list[0].voxels, static_cast<std::int64_t>(volume.count()));
+}
+
+TEST(Islands, StopsWhenAsked) {
+  HuVolume volume = empty_volume();
+  fill(volume, {2, 2, 2}, {5, 5, 5}, 500);
+  const auto bone = segment_bone(volume, {.hollow = true}, kAllScanEnds, always);
+  ASSERT_TRUE(bone);
+  const auto found = find_islands(volume, *bone, kRho1995, [](double) { return false; });
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().code, ErrorCode::cancelled);
+}
+
+TEST(BoneField, OtherIslandsDoNotMoveTheKeptSurface) {
   HuVolume volume = empty_volume();
   fill(volume, {2, 2, 2}, {9, 9, 9}, 900);
   fill(volume, {11, 4, 4}, {15, 7, 7}, 1500);  // as near as another island can be
-  const HuVolume before = volume;
-  ASSERT_TRUE(keep_largest_island(volume, kThreshold_hu, always));
+  const Islands islands = islands_of(volume);
+  const std::array kept{1};
+  const auto field = bone_field(volume, number_bones(islands, kept, false, volume.dims), kThreshold_hu, always);
+  ASSERT_TRUE(field);
+  EXPECT_EQ(field->at(13, 5, 5), 225);
   // Wherever the interpolated value stands in a cell with a kept voxel it is the same as before.
   for (double x = 1.0; x <= 10.0; x += 0.125) {
     const CoordBox at{{static_cast<int>(x * 8), 40, 40}, {static_cast<int>(x * 8), 48, 48}};
-    const auto a = resample(before, at, 0.125, always);
-    const auto b = resample(volume, at, 0.125, always);
+    const auto a = resample(volume, at, 0.125, always);
+    const auto b = resample(*field, at, 0.125, always);
     ASSERT_TRUE(a && b);
     EXPECT_EQ(a->values, b->values) << "x " << x;
   }
 }
 
-TEST(Islands, ABoneAcrossTheWholeScanIsFound) {
-  HuVolume volume = empty_volume();
-  std::ranges::fill(volume.values, 1000);
-  const auto report = keep_largest_island(volume, kThreshold_hu, always);
-  ASSERT_TRUE(report);
-  EXPECT_EQ(report->kept_voxels, static_cast<std::int64_t>(volume.count()));
+// Where the field crosses the threshold between two voxels along x, as part of the way.
+double crossing(const HuVolume& field, int column) {
+  const double a = field.at(column, 5, 5), b = field.at(column + 1, 5, 5);
+  return (a - kThreshold_hu) / (a - b);
 }
 
-TEST(Islands, NothingAboveTheThresholdNamesTheRemedy) {
+TEST(BoneField, MarrowEndsHalfWayToAirAndHalfWayBetweenVoxelsElsewhere) {
   HuVolume volume = empty_volume();
-  const auto report = keep_largest_island(volume, kThreshold_hu, always);
-  ASSERT_FALSE(report);
-  EXPECT_EQ(report.error().code, ErrorCode::invalid_input);
-  EXPECT_NE(report.error().message.find("--threshold"), std::string::npos);
-}
-
-TEST(Islands, StopsWhenAsked) {
-  HuVolume volume = empty_volume();
-  const auto report = keep_largest_island(volume, kThreshold_hu, [](double) { return false; });
-  ASSERT_FALSE(report);
-  EXPECT_EQ(report.error().code, ErrorCode::cancelled);
+  VoxelMask bones(volume.dims);
+  for (int column = 0; column < 24; ++column)
+    for (int row = 0; row < 20; ++row)
+      for (int slice = 0; slice < 16; ++slice) {
+        volume.values[volume.index(column, row, slice)] = column < 8 ? 100 : column == 8 ? -340 : -1000;
+        bones.at(column, row, slice) = column < 8 ? 1 : 0;
+      }
+  auto field = bone_field(volume, bones, kThreshold_hu, always);
+  ASSERT_TRUE(field);
+  // Linear between 100 and -340, the value half way to air, -450, would lie beyond the second voxel: the most that there is.
+  EXPECT_NEAR(crossing(*field, 7), 0.95, 0.01);
+  for (int row = 0; row < 20; ++row)
+    for (int slice = 0; slice < 16; ++slice) volume.values[volume.index(8, row, slice)] = -1000;
+  field = bone_field(volume, bones, kThreshold_hu, always);
+  ASSERT_TRUE(field);
+  EXPECT_NEAR(crossing(*field, 7), 0.5, 0.01);
+  for (int row = 0; row < 20; ++row)
+    for (int slice = 0; slice < 16; ++slice) volume.values[volume.index(8, row, slice)] = 40;
+  field = bone_field(volume, bones, kThreshold_hu, always);
+  ASSERT_TRUE(field);
+  EXPECT_NEAR(crossing(*field, 7), 0.5, 0.01);
 }
 
 }  // namespace

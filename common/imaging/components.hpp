@@ -1,0 +1,36 @@
+// Connected components of a mask, as runs of voxels along the rows.
+#pragma once
+#include <array>
+#include <bitset>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/imaging/voxel_mask.hpp"
+
+namespace osteon::imaging {
+
+// A stretch of voxels within one row; both ends are included.
+struct VoxelRun {
+  std::int32_t first = 0, last = 0;
+  std::int32_t row = 0, slice = 0;
+  std::uint32_t component = 0;
+};
+
+enum class Connectivity {
+  faces,    // 6 neighbours: what is not bone
+  corners,  // 26 neighbours: bone
+};
+
+struct Components {
+  std::vector<VoxelRun> runs;  // by slice, then row, then column
+  std::uint32_t count = 0;     // components, numbered from 0 in the order of their first voxels
+
+  [[nodiscard]] std::vector<std::int64_t> voxels() const;  // of each component
+};
+
+// Components of the voxels whose value is in `of`. Error: cancelled.
+[[nodiscard]] Result<Components> find_components(const VoxelMask& mask, const std::bitset<256>& of, Connectivity connectivity,
+                                                 const KeepGoing& keep_going);
+
+}  // namespace osteon::imaging
