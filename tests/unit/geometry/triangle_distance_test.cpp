@@ -19,7 +19,7 @@ double by_sampling(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c, i
 
 template <class Scalar>
 double distance(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const auto s = squared_distance_to_triangle<Scalar>(p.cast<Scalar>(), a.cast<Scalar>(), b.cast<Scalar>(), c.cast<Scalar>());
+  const auto s = distance_to_triangle<Scalar>(p.cast<Scalar>(), a.cast<Scalar>(), b.cast<Scalar>(), c.cast<Scalar>()).squared;
   return std::sqrt(static_cast<double>(s));
 }
 
