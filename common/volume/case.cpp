@@ -166,6 +166,14 @@ void measure(Case::Grids& grids) {
   grids.volume_mm3 = samples * pitch * pitch * pitch;
 }
 
+bool has_inside(const Case::Grids& grids) {
+  const auto inside = [&](Coord origin) {
+    const float* leaf = grids.surface.leaf(origin);
+    return std::any_of(leaf, leaf + kLeafVoxels, [](float s) { return s < 0.0f; });
+  };
+  return !grids.surface.constants().empty() || std::ranges::any_of(grids.surface.leaves(), inside);
+}
+
 // Lower envelope of parabolas along one line of squared distances: exact Euclidean distance transform, one axis at a
 // time (Felzenszwalb and Huttenlocher, Distance transforms of sampled functions, 2012).
 void distance_along_line(std::vector<double>& line) {
@@ -300,8 +308,8 @@ Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillLabelledP
       }
   }
   measure(*grids);
-  if (grids->volume_mm3 <= 0.0)
-    return failure(ErrorCode::invalid_input, "there is no bone at or above the threshold; choose a lower --threshold");
+  if (!has_inside(*grids))
+    return failure(ErrorCode::invalid_input, "no sample lies in bone: there is none, or it is thinner than a sample; choose a lower --threshold or a smaller --pitch");
   grids->clearance = make_clearance(grids->surface, grids->info.pitch_mm);
   grids->hash = content_hash(*grids);
   Case result;

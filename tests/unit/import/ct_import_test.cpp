@@ -19,7 +19,7 @@ Result<Case> round_trip(const Phantom& phantom, double spacing_mm, double thresh
   if (auto written = write_dicom_series(*scan, folder / "series", keep_going); !written) return tl::unexpected(written.error());
   auto read = read_dicom_series(folder / "series", keep_going);
   if (!read) return tl::unexpected(read.error());
-  return import_ct(std::move(*read), {.pitch_mm = pitch_mm, .threshold_hu = threshold_hu}, keep_going);
+  return import_bone(std::move(*read), {.pitch_mm = pitch_mm, .threshold_hu = threshold_hu}, keep_going);
 }
 
 // Largest |S| at points that lie exactly on the phantom's surface, in voxels of the scan; edges are left out by 2 mm,
@@ -74,8 +74,69 @@ TEST(CtImport, TubeThroughDicomIsTheTube) {
     for (const double z : {-4.3, 0.0, 3.1})
       EXPECT_NEAR(bone->surface_mm({8.0 * std::cos(angle), 8.0 * std::sin(angle), z}) / spacing_mm, 0.0, 0.15) << angle;
   EXPECT_NEAR(bone->density_g_cm3({6.5, 0.0, 0.0}), 1.9, 0.02 * 1.9);
-  // The medulla lies below that threshold: no bone there, but its density is kept for what lies at the edge.
-  EXPECT_GT(bone->surface_mm({0.0, 0.0, 0.0}), 0.0);
+  // The medulla lies below that threshold, between cortex: it is bone, of its own density.
+  EXPECT_LT(bone->surface_mm({0.0, 0.0, 0.0}), 0.0);
+  EXPECT_NEAR(bone->density_g_cm3({0.0, 0.0, 0.0}), 0.3, 0.02 * 0.3);
+}
+
+// The slab of the README: cortex of 1.9, cancellous bone of 0.3 g/cm3, which is 158 HU, open to the air on four sides.
+TEST(CtImport, ASlabsCancellousLayerIsWholeAtTheDefaultThreshold) {
+  const Phantom slab{.kind = PhantomKind::block, .layers = {{5.0, 1.9}, {20.0, 0.3}, {5.0, 1.9}}, .width_mm = 20.0};
+  for (const double spacing_mm : {0.5, 0.37}) {
+    const auto bone = round_trip(slab, spacing_mm, imaging::kBoneThreshold_hu);
+    ASSERT_TRUE(bone) << bone.error().message;
+    EXPECT_NEAR(bone->volume_mm3(), slab.volume_mm3(), 0.02 * slab.volume_mm3()) << spacing_mm;
+    for (const Vec3& at : {Vec3(0, 0, 0), Vec3(8.5, 8.5, 0), Vec3(-8.5, 3, 0)}) {
+      EXPECT_NEAR(bone->density_g_cm3(at - Vec3(0, 0, 2.5)), 1.9, 0.05 * 1.9);
+      EXPECT_NEAR(bone->density_g_cm3(at - Vec3(0, 0, 15.0)), 0.3, 0.05 * 0.3);
+      EXPECT_NEAR(bone->density_g_cm3(at - Vec3(0, 0, 27.5)), 1.9, 0.05 * 1.9);
+      EXPECT_LT(bone->surface_mm(at - Vec3(0, 0, 15.0)), 0.0);
+    }
+  }
+}
+
+TEST(CtImport, HollowLeavesTheMarrowOut) {
+  CtScan scan = [] {
+    const Phantom tube{.kind = PhantomKind::tube, .layers = {{3.0, 1.9}, {5.0, 0.3}}, .width_mm = 14.0};
+    return CtScan{*scan_phantom(tube, 0.5, keep_going), "test"};
+  }();
+  const auto filled = import_bone(scan, {}, keep_going);
+  const auto hollow = import_bone(scan, {.hollow = true}, keep_going);
+  ASSERT_TRUE(filled && hollow);
+  EXPECT_LT(filled->surface_mm({0, 0, 0}), 0.0);
+  EXPECT_GT(hollow->surface_mm({0, 0, 0}), 0.0);
+  const double all = std::numbers::pi * 64.0 * 14.0, shell = std::numbers::pi * (64.0 - 25.0) * 14.0;
+  EXPECT_NEAR(filled->volume_mm3(), all, 0.02 * all);
+  // At 226 HU the inner wall lies up to a voxel within the medulla, whose edge to cortex would be at 908.
+  EXPECT_GT(hollow->volume_mm3(), shell);
+  EXPECT_LT(hollow->volume_mm3(), 1.15 * shell);
+}
+
+TEST(CtImport, DensityEndsAtCompactBoneAndMetalIsLabelled) {
+  CtScan scan;
+  scan.volume.dims = {30, 30, 30};
+  scan.volume.values.assign(scan.volume.count(), -1000);
+  for (int k = 5; k < 25; ++k)
+    for (int j = 5; j < 25; ++j)
+      for (int i = 5; i < 25; ++i) {
+        const bool screw = std::hypot(i - 14.5, j - 14.5) < 3.0 && k > 12;
+        scan.volume.values[scan.volume.index(i, j, k)] = screw ? 3071 : k < 8 ? 2400 : 1400;
+      }
+  const auto made = import_ct(std::move(scan), {}, keep_going);
+  ASSERT_TRUE(made);
+  const Case& bone = *made->bone;
+  const CoordBox box = bone.bounds_samples();
+  double most = 0.0;
+  std::vector<float> density(static_cast<std::size_t>(box.dims().x) * static_cast<std::size_t>(box.dims().y) * static_cast<std::size_t>(box.dims().z));
+  bone.gather_density(box, density);
+  for (const float rho : density) most = std::max(most, static_cast<double>(rho));
+  EXPECT_NEAR(most, 2.1, 1e-6);
+  EXPECT_EQ(bone.tissue({14, 14, 18}), Tissue::metal);
+  EXPECT_EQ(bone.tissue({14, 14, 6}), Tissue::enamel);
+  EXPECT_EQ(bone.tissue({8, 8, 15}), Tissue::cortical);
+  EXPECT_GT(made->found.metal_cm3, 0.25);
+  EXPECT_GT(made->found.enamel_cm3, 1.1);
+  EXPECT_NE(segmentation_text(made->found).find("metal"), std::string::npos);
 }
 
 TEST(CtImport, MedullaAboveTheThresholdIsBone) {
@@ -105,7 +166,7 @@ TEST(CtImport, BoneThatReachesTheEndOfTheScanEndsWithTheLastVoxel) {
   for (int k = 0; k < 10; ++k)
     for (int j = 3; j < 9; ++j)
       for (int i = 3; i < 9; ++i) scan.volume.values[scan.volume.index(i, j, k)] = 1452;  // 226 is half way to air
-  const auto bone = import_ct(std::move(scan), {}, keep_going);
+  const auto bone = import_bone(std::move(scan), {}, keep_going);
   ASSERT_TRUE(bone) << bone.error().message;
   EXPECT_EQ(bone->pitch_mm(), 1.0);
   EXPECT_NEAR(bone->surface_mm({5.5, 5.5, -1.0}), 0.0, 0.01);
@@ -126,10 +187,63 @@ TEST(CtImport, OtherIslandsAreGone) {
   };
   fill(4, 14, 1452);
   fill(20, 24, 3000);
-  const auto bone = import_ct(std::move(scan), {}, keep_going);
+  const auto bone = import_bone(std::move(scan), {}, keep_going);
   ASSERT_TRUE(bone);
   EXPECT_NEAR(bone->volume_mm3(), 10.0 * 8.0 * 8.0, 0.03 * 640.0);
   EXPECT_GT(bone->surface_mm({22.0, 10.0, 10.0}), 0.0);
+}
+
+// Three cubes apart: 1000, 512 and 64 mm3.
+CtScan three_cubes() {
+  CtScan scan;
+  scan.volume.dims = {40, 20, 20};
+  scan.volume.values.assign(scan.volume.count(), -1000);
+  const auto cube = [&](int from, int edge) {
+    for (int k = 4; k < 4 + edge; ++k)
+      for (int j = 4; j < 4 + edge; ++j)
+        for (int i = from; i < from + edge; ++i) scan.volume.values[scan.volume.index(i, j, k)] = 1452;
+  };
+  cube(3, 10);
+  cube(16, 8);
+  cube(30, 4);
+  return scan;
+}
+
+TEST(CtImport, KeepTakesTheIslandsThatAreNamedAndEachIsABoneOfItsOwn) {
+  const auto made = import_ct(three_cubes(), {.keep = {1, 3}}, keep_going);
+  ASSERT_TRUE(made);
+  EXPECT_EQ(made->found.islands.size(), 3u);
+  EXPECT_NEAR(made->found.left_out_cm3, 0.512, 1e-9);
+  EXPECT_NEAR(made->bone->volume_mm3(), 1064.0, 0.03 * 1064.0);
+  EXPECT_EQ(made->bone->bone_number({8, 8, 8}), 1);
+  EXPECT_EQ(made->bone->bone_number({32, 6, 6}), 2);
+  EXPECT_EQ(made->bone->bone_number({20, 8, 8}), 0);
+  EXPECT_EQ(made->bone->bone_number({3, 4, 4}), 1) << "at the surface too";
+}
+
+TEST(CtImport, KeepAllAndMerge) {
+  const auto all = import_ct(three_cubes(), {.keep_all = true}, keep_going);
+  const auto merged = import_ct(three_cubes(), {.keep_all = true, .merge = true}, keep_going);
+  ASSERT_TRUE(all && merged);
+  EXPECT_EQ(all->bone->bone_number({20, 8, 8}), 2);
+  EXPECT_EQ(all->bone->bone_number({32, 6, 6}), 3);
+  EXPECT_EQ(merged->bone->bone_number({32, 6, 6}), 1);
+  EXPECT_EQ(all->found.left_out_cm3, 0.0);
+  EXPECT_EQ(all->bone->volume_mm3(), merged->bone->volume_mm3());
+  EXPECT_NE(segmentation_text(all->found).find("nothing was left out"), std::string::npos);
+}
+
+TEST(CtImport, WhatIsLeftOutIsSaidWithItsVolume) {
+  const auto made = import_ct(three_cubes(), {}, keep_going);
+  ASSERT_TRUE(made);
+  const std::string text = segmentation_text(made->found);
+  EXPECT_NE(text.find("kept       1.00 of 1.58 cm3; 2 islands with 0.58 cm3 (37 %) left out: --keep"), std::string::npos) << text;
+}
+
+TEST(CtImport, AnIslandThatIsNotThereIsRefused) {
+  const auto made = import_ct(three_cubes(), {.keep = {2, 4}}, keep_going);
+  ASSERT_FALSE(made);
+  expect_one_sentence(made.error(), "--keep names island 4");
 }
 
 TEST(CtImport, SameScanSameHash) {
@@ -153,7 +267,7 @@ TEST(CtImport, TooFineAPitchIsRefusedBeforeTheMemoryIsFull) {
   CtScan scan;
   scan.volume.dims = {200, 200, 200};
   scan.volume.values.assign(scan.volume.count(), 1000);
-  const auto bone = import_ct(std::move(scan), {.pitch_mm = 0.1}, keep_going);
+  const auto bone = import_bone(std::move(scan), {.pitch_mm = 0.1}, keep_going);
   ASSERT_FALSE(bone);
   expect_one_sentence(bone.error(), "--pitch");
 }
@@ -163,7 +277,7 @@ TEST(CtImport, StopsAtEveryStage) {
   for (const double until : {0.0, 0.05, 0.2, 0.5, 0.84}) {
     auto scan = scan_phantom(small_block(), 0.25, keep_going);
     ASSERT_TRUE(scan);
-    const auto bone = import_ct({std::move(*scan), "test"}, {}, [&](double done) { return done < until; });
+    const auto bone = import_bone({std::move(*scan), "test"}, {}, [&](double done) { return done < until; });
     ASSERT_FALSE(bone) << until;
     EXPECT_EQ(bone.error().code, ErrorCode::cancelled);
   }

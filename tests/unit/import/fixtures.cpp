@@ -14,6 +14,12 @@ namespace osteon::import {
 
 namespace fs = std::filesystem;
 
+Result<Case> import_bone(CtScan scan, const CtOptions& options, const KeepGoing& going) {
+  auto made = import_ct(std::move(scan), options, going);
+  if (!made) return tl::unexpected(made.error());
+  return std::move(*made->bone);
+}
+
 Phantom small_block() { return {.kind = PhantomKind::block, .layers = {{6.0, 1.5}}, .width_mm = 4.0}; }
 
 void write_small_series(const fs::path& folder) {

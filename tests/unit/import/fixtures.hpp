@@ -8,11 +8,15 @@
 #include <vector>
 
 #include "common/core/result.hpp"
+#include "server/import/ct_import.hpp"
 #include "server/import/phantom.hpp"
 
 namespace osteon::import {
 
 inline bool keep_going(double) { return true; }
+
+// import_ct() without the list of islands.
+[[nodiscard]] Result<Case> import_bone(CtScan scan, const CtOptions& options, const KeepGoing& keep_going);
 
 // 4 x 4 x 6 mm of 1.5 g/cm³.
 [[nodiscard]] Phantom small_block();

@@ -19,7 +19,7 @@ TEST(Skull, LiesInThePatientFrame) {
   auto scan = read_inv3(*file, keep_going);
   ASSERT_TRUE(scan) << scan.error().message;
   EXPECT_EQ(scan->volume.dims, (std::array<int, 3>{256, 256, 108}));
-  const auto bone = import_ct(std::move(*scan), {.pitch_mm = {}, .title = "Skull"}, keep_going);
+  const auto bone = import_bone(std::move(*scan), {.pitch_mm = {}, .title = "Skull"}, keep_going);
   ASSERT_TRUE(bone) << bone.error().message;
 
   // InVesalius' own mesh of everything above 226 HU holds 657.7 cm³ (surface_0.plist), the headrest and loose pieces
@@ -36,7 +36,7 @@ TEST(Skull, LiesInThePatientFrame) {
     for (int y = box.min.y; y <= box.max.y; ++y)
       for (int z = box.min.z; z <= box.max.z; ++z) {
         const Vec3 p = position_mm({x, y, z}, bone->pitch_mm());
-        if (bone->density_g_cm3(p) < 2.6) continue;
+        if (bone->tissue({x, y, z}) != Tissue::enamel) continue;
         sum += p;
         ++enamel;
       }
@@ -65,7 +65,7 @@ TEST(Skull, ImportsToOneHash) {
   for (int i = 0; i < 2; ++i) {
     auto scan = read_inv3(*file, keep_going);
     ASSERT_TRUE(scan);
-    const auto bone = import_ct(std::move(*scan), {.pitch_mm = 2.0}, keep_going);
+    const auto bone = import_bone(std::move(*scan), {.pitch_mm = 2.0}, keep_going);
     ASSERT_TRUE(bone);
     if (i > 0) {
       EXPECT_EQ(to_hex(bone->hash()), hash);
@@ -102,7 +102,7 @@ TEST_F(SharedScans, TibiaWithoutDicomPreamble) {
   EXPECT_NEAR(static_cast<double>(bright) / static_cast<double>(scan->volume.count()), 0.0041, 0.00005);
 
   const imaging::HuVolume grid = scan->volume;
-  const auto bone = import_ct(std::move(*scan), {}, keep_going);
+  const auto bone = import_bone(std::move(*scan), {}, keep_going);
   ASSERT_TRUE(bone);
   // One of the two tibiae, whose places README gives; a closed tube with a canal of 20 to 80 HU.
   const Vec3 middle = grid.voxel(bone->bounds().centre_mm());
