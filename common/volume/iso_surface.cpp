@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <condition_variable>
 #include <cstdint>
 #include <exception>
 #include <limits>
@@ -317,7 +318,8 @@ Result<DenseVolume<float>> signed_distance_mm(const DenseVolume<float>& field, f
   std::atomic<int> next{0};
   std::atomic<int> finished{0};
   std::atomic<bool> stopped{false};
-  std::mutex failure_mutex;
+  std::mutex mutex;  // of `failed`, and for whoever waits for `finished`
+  std::condition_variable progressed;
   std::string failed;
   const auto work = [&] {
     Slab part(field, iso, stopped);
@@ -325,11 +327,15 @@ Result<DenseVolume<float>> signed_distance_mm(const DenseVolume<float>& field, f
       try {
         part.measure(slab * kSlab, std::min((slab + 1) * kSlab, width), pitch_mm, out);
       } catch (const std::exception& error) {
-        const std::lock_guard lock(failure_mutex);
+        const std::lock_guard lock(mutex);
         failed = error.what();
         stopped = true;
       }
-      ++finished;
+      {
+        const std::lock_guard lock(mutex);
+        ++finished;
+      }
+      progressed.notify_one();
     }
   };
   std::vector<std::thread> helpers;
@@ -339,7 +345,8 @@ Result<DenseVolume<float>> signed_distance_mm(const DenseVolume<float>& field, f
   bool cancelled = false;
   while (finished < slabs && !stopped) {
     if (!keep_going(static_cast<double>(finished) / slabs)) cancelled = stopped = true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    std::unique_lock lock(mutex);
+    progressed.wait_for(lock, std::chrono::milliseconds(10), [&] { return finished >= slabs || stopped; });
   }
   for (std::thread& helper : helpers) helper.join();
 

@@ -60,6 +60,7 @@ Drawn draw(std::uint32_t seed) {
 }
 
 TEST(RandomSeries, EveryImportEndsWithAClosedSurfaceOrASentence) {
+  const auto tools = builtin_tool_box();
   int imported = 0, refused = 0, thin = 0;
   for (std::uint32_t seed = 0; seed < kScans; ++seed) {
     const Drawn d = draw(seed);
@@ -82,7 +83,7 @@ TEST(RandomSeries, EveryImportEndsWithAClosedSurfaceOrASentence) {
     }
     ++imported;
     EXPECT_TRUE(std::isfinite(made->bone->volume_mm3()));
-    const CutField field(*made->bone, BodyId{0}, builtin_tool_box());
+    const CutField field(*made->bone, BodyId{0}, tools);
     const auto mesh = bone_surface(field, keep_going);
     ASSERT_TRUE(mesh) << mesh.error().message;
     EXPECT_EQ(open_edges(*mesh), 0u);
