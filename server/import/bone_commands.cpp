@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <limits>
 #include <memory>
 
 #include "common/geometry/mesh_file.hpp"
@@ -140,6 +141,30 @@ double peak_memory_mb() {
   return at == std::string::npos ? 0.0 : std::strtod(status->c_str() + at + 6, nullptr) / 1024.0;
 }
 
+// Why a step removed nothing, for a person: how far its tip stays from bone, and where bone is.
+std::string nothing_removed(std::size_t number, const CarveStep& step, const Case& bone) {
+  double nearest_mm = std::numeric_limits<double>::infinity();
+  const auto look = [&](const Vec3& tip) {
+    const double surface_mm = bone.surface_mm(tip);
+    const bool in_band = surface_mm < 3.99 * bone.pitch_mm();
+    nearest_mm = std::min(nearest_mm, in_band ? surface_mm : bone.clearance_mm(tip));
+  };
+  look(step.path.front().position_mm);
+  for (std::size_t i = 1; i < step.path.size(); ++i) {
+    const Vec3 &from = step.path[i - 1].position_mm, &to = step.path[i].position_mm;
+    const int parts = std::clamp(static_cast<int>((to - from).norm() / bone.pitch_mm()), 1, 10'000);
+    for (int part = 1; part <= parts; ++part) look(from + (to - from) * part / parts);
+  }
+  const Box box = bone.bounds();
+  char where[200], text[320];
+  // In bone that an earlier step has taken away there is nothing left to remove either.
+  if (nearest_mm > 0.0) std::snprintf(where, sizeof where, "its tip stays at least %.1f mm from bone", nearest_mm);
+  else std::snprintf(where, sizeof where, "what it meets was removed before");
+  std::snprintf(text, sizeof text, "       step %zu removed nothing: %s; bone lies within x %.0f..%.0f, y %.0f..%.0f, z %.0f..%.0f mm\n", number, where, box.min_mm.x(),
+                box.max_mm.x(), box.min_mm.y(), box.max_mm.y(), box.min_mm.z(), box.max_mm.z());
+  return text;
+}
+
 Result<std::string> run_carve(const Arguments& a, const StopSignal& stop) {
   for (const std::string& file : {a.out, a.report})
     if (!file.empty())
@@ -162,6 +187,7 @@ Result<std::string> run_carve(const Arguments& a, const StopSignal& stop) {
       if (!report) return tl::unexpected(report.error());
       reports.push_back(*report);
       text += line(i + 1, *report);
+      if (report->removed_mm3 <= 0.0) text += nothing_removed(i + 1, (*steps)[i], carving.field(0).bone());
     }
   }
   if (stop.requested()) return tl::unexpected(stopped());

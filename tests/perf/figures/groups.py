@@ -10,6 +10,7 @@ import numpy as np
 import devices
 import feel
 import haptics
+import imports
 import kernels
 import laws
 import registry
@@ -104,10 +105,10 @@ class Run:
         inside = Path("usr/share/doc/invesalius-examples/examples") / name
         return next((root / inside for root in (Path("/"), ROOT / "build/examples") if (root / inside).is_file()), None)
 
-    def session(self, name, plan):
+    def session(self, name, plan, case=None):
         self.say(f"session: {name}")
         folder = self.folder / name
-        numbers = Session(self.programs, self.phantom(), plan, folder, self.say_in_session, pictures=False,
+        numbers = Session(self.programs, case or self.phantom(), plan, folder, self.say_in_session, pictures=False,
                           late_viewer=True, size="640x480").run()
         self.sessions.append(numbers)
         return folder, numbers
@@ -235,5 +236,12 @@ def novice(run):
 
 
 # In the order in which they run: agreement is counted after every session.
+def scan(run):
+    """The feed rig through the same bone, but imported from a CT scan of it."""
+    folder, numbers = run.session("scan", plans.drill("rig", feed_mm_per_s=1.0, beyond_mm=5), imports.scanned_slab(run))
+    physics = rig_physics(folder, numbers)
+    return imports.slab_volume(run) | {f"scan_{name}": physics[f"rig_{name}"] for name in ("force_cortical_error", "force_medullary_error")}
+
+
 GROUPS = {**kernels.GROUPS, **devices.GROUPS, **doors.GROUPS, **feel.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, "expert": expert,
-          "novice": novice, "rig": rig}
+          "novice": novice, "rig": rig, "scan": scan, "real_imports": imports.real_imports}

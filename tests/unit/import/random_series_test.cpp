@@ -33,7 +33,7 @@ Drawn draw(std::uint32_t seed) {
   Drawn d;
   imaging::HuVolume& v = d.volume;
   v.dims = {integer(2, 12), integer(2, 12), seed % 9 == 0 ? 2 : seed % 23 == 0 ? 1 : integer(3, 12)};
-  v.spacing_mm = {length(0.3, 2.0), length(0.3, 2.0), length(0.3, 3.0)};
+  v.spacing_mm = {length(0.6, 1.2), length(0.6, 1.2), length(0.6, 2.0)};
   if (seed % 3 == 0) v.spacing_mm = Vec3::Ones();
   v.values.resize(v.count());
   const int base = integer(-200, 1200);

@@ -1,0 +1,66 @@
+"""Figures of the import of CT scans: what it takes of real ones, and what a known bone has become on the way."""
+import json
+import os
+import subprocess
+
+import numpy as np
+
+from registry import Measured
+
+LAYERS_MM_DENSITY = "5:1.9,20:0.3,5:1.9"
+SLAB_MM3 = 20.0 * 20.0 * 30.0
+# The skull is Debian's example; the others lie beside the checkout, if anywhere.
+SCANS = {"skull": None, "tibia": "tibia-dicom", "body": "body-j2k-dicom"}
+
+
+def find_scan(run, name):
+    return run.example("Cranium.inv3") if SCANS[name] is None else run.shared_data(SCANS[name])
+
+
+def cost(program, scan, out):
+    """CPU seconds and peak memory, MB, of one import and its child processes."""
+    child = subprocess.Popen([program, "ct", scan, "--out", out], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, status, used = os.wait4(child.pid, 0)
+    child.returncode = os.waitstatus_to_exitcode(status)
+    return None if child.returncode != 0 else (used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0)
+
+
+def real_imports(run):
+    """In turns with an earlier osteon-import, if OSTEON_EARLIER_IMPORT names one."""
+    earlier = os.environ.get("OSTEON_EARLIER_IMPORT")
+    values = {}
+    for name in SCANS:
+        scan = find_scan(run, name)
+        if scan is None:
+            run.skip(f"import_{name}", "there is no shared/data beside the checkout")
+            values |= {f"import_{name}_cpu": Measured(None), f"import_{name}_memory": Measured(None)}
+            continue
+        run.say(f"importing: {name}")
+        programs = {"now": run.programs / "osteon-import"} | ({"earlier": earlier} if earlier else {})
+        costs = {which: [] for which in programs}
+        for turn in range(9 if run.soak else 3):
+            for which, program in programs.items():
+                found = cost(program, scan, run.folder / f"import-{name}-{which}-{turn}")
+                costs[which] += [found] if found else []
+        for i, what in enumerate(("cpu", "memory")):
+            now = [c[i] for c in costs["now"]]
+            before = float(np.median([c[i] for c in costs["earlier"]])) if costs.get("earlier") else None
+            values[f"import_{name}_{what}"] = Measured(float(np.median(now)), before, min(now), max(now)) if now else Measured(None)
+    return values
+
+
+def scanned_slab(run):
+    """The layered block of the rig's figures as DICOM slices, imported at the default threshold."""
+    folder = run.folder / "scanned-slab"
+    if not folder.exists():
+        run.say("a phantom through DICOM")
+        folder.mkdir()
+        run.output("osteon-import", "phantom", "block", "--layers", LAYERS_MM_DENSITY, "--width", 20, "--pitch", 0.5, "--out", folder / "direct",
+                   "--dicom", folder / "series")
+        run.output("osteon-import", "ct", folder / "series", "--out", folder / "case")
+    return folder / "case"
+
+
+def slab_volume(run):
+    info = json.loads(run.output("osteon-import", "info", "--json", scanned_slab(run)))
+    return {"scan_volume_error": (100.0 * abs(info["bone_volume_mm3"] - SLAB_MM3) / SLAB_MM3, None)}
