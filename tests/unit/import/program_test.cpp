@@ -100,7 +100,7 @@ TEST_F(Program, WrongSeriesAreOneSentence) {
   for (const fs::path& file : files) remove_tag(file, 0x7fe0, 0x0010);
   expect_refused({"ct", path("series"), "--out", path("case")}, "no pixel data", folder_);
   for (const fs::path& file : files) set_tag(file, 0x0008, 0x0060, "MR");
-  expect_refused({"ct", path("series"), "--out", path("case")}, "not CT", folder_);
+  expect_refused({"ct", path("series"), "--out", path("case")}, "MR images", folder_);
 }
 
 TEST_F(Program, WrongUsageIsOneSentence) {
