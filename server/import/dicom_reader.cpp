@@ -261,7 +261,8 @@ Result<CtScan> read_dicom_series(const fs::path& input, const SeriesOptions& opt
   CtSeries& series = found->series[*chosen];
   if (series.fault) {
     Error error = series.fault->error;
-    if (found->series.size() > 1 && !options.series) error.message += ", or take another series by --series N";
+    const bool another = std::ranges::any_of(found->series, [](const CtSeries& s) { return !s.fault; });
+    if (another && !options.series) error.message += ", or take another series by --series N";
     return tl::unexpected(error);
   }
   const KeepGoing reading = part(keep_going, kHeadersEnd, 1.0);

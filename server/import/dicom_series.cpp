@@ -289,8 +289,9 @@ std::string strangers(const std::vector<Slices>& groups, std::size_t at, const S
     text += ", and " + shown_text(name, 80) + " " + what;
     return ++named < 2;
   };
-  for (const DicomHeader& h : std::ranges::equal_range(no_pixels, own.series, {}, &DicomHeader::series))
-    if (!add(found.files[h.file].name, "has no pixel data")) return text;
+  for (auto h = std::ranges::lower_bound(no_pixels, own.series, {}, &DicomHeader::series);
+       h != no_pixels.end() && h->series == own.series; ++h)
+    if (!add(found.files[h->file].name, "has no pixel data")) return text;
   std::size_t begin = at, end = at + 1;
   while (begin > 0 && groups[begin - 1].front().series == own.series) --begin;
   while (end < groups.size() && groups[end].front().series == own.series) ++end;

@@ -14,10 +14,10 @@
 #include <exception>
 #include <type_traits>
 
-#if defined(__has_feature)
-#define OSTEON_SANITIZED (__has_feature(address_sanitizer) || __has_feature(thread_sanitizer))
-#elif defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define OSTEON_SANITIZED 1
+#elif defined(__has_feature)
+#define OSTEON_SANITIZED (__has_feature(address_sanitizer) || __has_feature(thread_sanitizer))
 #else
 #define OSTEON_SANITIZED 0
 #endif

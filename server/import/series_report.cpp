@@ -66,7 +66,7 @@ std::string list_text(const SeriesReport& report) {
     text += number + describe(entry) + problem_text(entry) + "\n";
   }
   text += "taken      " + (report.taken > 0 ? std::to_string(report.taken) : "none") +
-          (report.series.size() > 1 ? "; ct --series N takes another\n" : "\n");
+          (report.series.size() > 1 && report.taken > 0 ? "; ct --series N takes another\n" : "\n");
   return text + skipped_line(report);
 }
 
