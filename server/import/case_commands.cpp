@@ -14,6 +14,7 @@
 #include "server/import/ct_import.hpp"
 #include "server/import/dicom_reader.hpp"
 #include "server/import/dicom_writer.hpp"
+#include "server/import/found_files.hpp"
 #include "server/import/inv3_reader.hpp"
 #include "server/import/label_import.hpp"
 #include "server/import/phantom.hpp"
@@ -31,6 +32,7 @@ struct Arguments {
   std::string keep;
   std::vector<std::string> bone_colours;
   std::optional<double> pitch_mm, threshold_hu;
+  std::optional<int> series;
   double width_mm = 20.0, density_g_cm3 = 1.9;
   bool json = false, merge = false, hollow = false;
 };
@@ -62,18 +64,32 @@ Error about(const std::string& input, const Error& error) {
   return error.code == ErrorCode::cancelled ? error : Error{error.code, input + ": " + error.message};
 }
 
+// A scan of whatever kind the input is by its content.
+Result<CtScan> read_scan(const Arguments& a, const KeepGoing& reading) {
+  const InputKind kind = input_kind(a.input, reading);
+  if (!reading(0.0)) return tl::unexpected(stopped());
+  if (kind == InputKind::absent)
+    return failure(ErrorCode::not_found, "there is no file or folder " + a.input +
+                                             "; give a folder, zip or ISO image with a CT series, or an .inv3 file");
+  if (kind != InputKind::inv3 && kind != InputKind::other) return read_dicom_series(a.input, {.series = a.series}, reading);
+  std::error_code error;
+  if (!fs::is_regular_file(a.input, error))
+    return failure(ErrorCode::invalid_input, a.input + " is a pipe or device; give a folder or a file");
+  if (kind == InputKind::inv3 && a.series)
+    return failure(ErrorCode::invalid_input, "--series is for DICOM; " + a.input + " is an InVesalius project with one scan");
+  return read_inv3(a.input, reading);
+}
+
 Result<std::string> run_ct(const Arguments& a, const StopSignal& stop) {
   if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
   CtOptions options;
   if (auto parsed = parse_keep(a.keep, options); !parsed) return tl::unexpected(parsed.error());
   options.merge = a.merge;
   options.hollow = a.hollow;
-  std::error_code error;
-  if (!fs::exists(a.input, error)) return failure(ErrorCode::not_found, "there is no file or folder " + a.input + "; give a DICOM folder or an .inv3 file");
   Bar bar(stop);
-  const auto reading = bar.stage(0.0, 0.2);
-  auto scan = fs::is_directory(a.input, error) ? read_dicom_series(a.input, reading) : read_inv3(a.input, reading);
+  auto scan = read_scan(a, bar.stage(0.0, 0.2));
   if (!scan) return tl::unexpected(scan.error());
+  const std::string series = report_lines(scan->report);
 
   options.pitch_mm = a.pitch_mm;
   if (a.threshold_hu) options.threshold_hu = *a.threshold_hu;
@@ -82,7 +98,17 @@ Result<std::string> run_ct(const Arguments& a, const StopSignal& stop) {
   if (!made) return tl::unexpected(about(a.input, made.error()));
   if (auto saved = save(*made->bone, a.out, stop); !saved) return tl::unexpected(saved.error());
   bar.stage(1.0, 1.0)(1.0);
-  return report_text(*made->bone) + segmentation_text(made->found);
+  return report_text(*made->bone) + series + segmentation_text(made->found);
+}
+
+Result<std::string> run_series(const Arguments& a, const StopSignal& stop) {
+  Bar bar(stop, "searching");
+  const auto searching = bar.stage(0.0, 1.0);
+  if (input_kind(a.input, searching) == InputKind::inv3)
+    return failure(ErrorCode::invalid_input, a.input + " is an InVesalius project with one scan; give it to osteon-import ct");
+  const auto report = list_dicom_series(a.input, searching);
+  if (!report) return tl::unexpected(report.error());
+  return a.json ? list_json(*report) : list_text(*report);
 }
 
 Result<std::string> run_phantom(const Arguments& a, const StopSignal& stop) {
@@ -214,7 +240,10 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   Arguments& a = *shared;
 
   CLI::App* ct = app.add_subcommand("ct", "Make a case from a CT scan");
-  ct->add_option("INPUT", a.input, "Folder with one DICOM CT series, or an InVesalius project (.inv3)")->required();
+  ct->add_option("INPUT", a.input,
+                 "DICOM: a folder (with all its subfolders), a zip or an ISO image; or an InVesalius project (.inv3)")
+      ->required();
+  ct->add_option("--series", a.series, "Number of the series, as osteon-import series lists them (default: the largest CT)");
   ct->add_option("--out", a.out, "Folder of the case, made by this command")->required();
   ct->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the scan's smallest spacing)")->check(CLI::Range(0.02, 10.0));
   ct->add_option("--threshold", a.threshold_hu, "Bone is at or above it, HU (default: 226, usual for adult skulls in slices of 1.5 mm)")->check(CLI::Range(-1000.0, 4000.0));
@@ -223,6 +252,11 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone");
   ct->add_option("--title", a.title, "Name shown to people; do not use a patient's");
   commands.push_back({ct, [shared](const StopSignal& stop) { return run_ct(*shared, stop); }});
+
+  CLI::App* series = app.add_subcommand("series", "List the CT series of a folder, zip or ISO image");
+  series->add_option("INPUT", a.input, "Folder (with all its subfolders), zip or ISO image")->required();
+  series->add_flag("--json", a.json, "For programs");
+  commands.push_back({series, [shared](const StopSignal& stop) { return run_series(*shared, stop); }});
 
   CLI::App* phantom = app.add_subcommand("phantom", "Make a case whose true shape and density are known");
   phantom->add_option("KIND", a.kind, "block (layers from the top down) or tube (layers from the outside in)")->required()->check(CLI::IsMember({"block", "tube"}));

@@ -3,12 +3,14 @@
 #include <string>
 
 #include "common/imaging/hu_volume.hpp"
+#include "server/import/series_report.hpp"
 
 namespace osteon::import {
 
 struct CtScan {
   imaging::HuVolume volume;
   std::string source;  // kind and geometry only: no name, date or number of a patient, nor the file's name
+  SeriesReport report;  // for the person who imports; a case keeps nothing of it
 };
 
 }  // namespace osteon::import

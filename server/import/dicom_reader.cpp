@@ -1,21 +1,19 @@
 #include "server/import/dicom_reader.hpp"
 
-#include <gdcmImageReader.h>
-#include <gdcmReader.h>
-#include <gdcmStringFilter.h>
 #include <gdcmTrace.h>
 
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <cstring>
-#include <exception>
-#include <map>
-#include <optional>
+#include <new>
+#include <span>
 #include <string>
+#include <system_error>
 #include <vector>
 
+#include "server/import/archive_files.hpp"
+#include "server/import/dicom_pixels.hpp"
+#include "server/import/dicom_series.hpp"
+#include "server/import/import_steps.hpp"
 #include "server/import/isolated_reader.hpp"
 
 namespace osteon::import {
@@ -23,302 +21,266 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const gdcm::Tag kPixelData(0x7fe0, 0x0010);
+constexpr int kMostDeaths = 100;                                  // of processes that read headers
+constexpr std::size_t kManyFiles = 500;                           // fewer, or a smaller archive, are searched in a moment:
+constexpr std::uint64_t kLargeArchive = std::uint64_t{64} << 20;  // what is wrong with them is said without progress before it
+constexpr double kUnpackedEnd = 0.4;                              // of the progress of an archive
+constexpr double kHeadersEnd = 0.6;
 
-// What a file's header says, before its pixels are read.
-struct Header {
-  fs::path file;
-  std::string modality;
-  std::string series;
-  std::string transfer_syntax;
-  bool localizer = false;
-  int frames = 1;
-  int columns = 0, rows = 0;
-  int bits_allocated = 0, bits_stored = 0, samples = 1;
-  bool is_signed = false;
-  std::string photometric;
-  std::vector<double> position, orientation, spacing, slope, intercept;
-  double along_mm = 0.0;  // position along the normal
-};
-
-std::string trimmed(std::string text) {
-  const auto is_padding = [](char c) { return c == ' ' || c == '\0'; };
-  while (!text.empty() && is_padding(text.back())) text.pop_back();
-  text.erase(text.begin(), std::find_if_not(text.begin(), text.end(), is_padding));
-  return text;
-}
-
-// "1.0\0.0": values separated by backslashes; empty where any is not a finite number.
-std::vector<double> numbers(const std::string& text) {
-  std::vector<double> values;
-  std::size_t begin = 0;
-  while (begin < text.size()) {
-    const std::size_t end = std::min(text.find('\\', begin), text.size());
-    const std::string part = trimmed(text.substr(begin, end - begin));
-    char* stop = nullptr;
-    const double value = std::strtod(part.c_str(), &stop);
-    if (part.empty() || *stop != '\0' || !std::isfinite(value)) return {};
-    values.push_back(value);
-    begin = end + 1;
-  }
-  return values;
-}
-
-int integer(const std::string& text, int otherwise) {
-  const auto values = numbers(text);
-  return values.empty() ? otherwise : static_cast<int>(values.front());
-}
-
-// Nothing where the file is not DICOM at all.
-Result<std::optional<Header>> read_header(const fs::path& file) {
-  gdcm::Reader reader;
-  reader.SetFileName(file.c_str());
-  if (!reader.CanRead()) return std::optional<Header>{};
-  if (!reader.ReadUpToTag(kPixelData, {}))
-    return failure(ErrorCode::invalid_input, file.string() + " looks like DICOM but cannot be read; it is damaged, copy or export it again");
-  gdcm::StringFilter tags;
-  tags.SetFile(reader.GetFile());
-  const auto text = [&](std::uint16_t group, std::uint16_t element) { return trimmed(tags.ToString(gdcm::Tag(group, element))); };
-  Header h;
-  h.file = file;
-  h.modality = text(0x0008, 0x0060);
-  h.series = text(0x0020, 0x000e);
-  if (const char* syntax = reader.GetFile().GetHeader().GetDataSetTransferSyntax().GetString()) h.transfer_syntax = trimmed(syntax);
-  h.localizer = text(0x0008, 0x0008).find("LOCALIZER") != std::string::npos;
-  h.frames = integer(text(0x0028, 0x0008), 1);
-  h.rows = integer(text(0x0028, 0x0010), 0);
-  h.columns = integer(text(0x0028, 0x0011), 0);
-  h.samples = integer(text(0x0028, 0x0002), 1);
-  h.photometric = text(0x0028, 0x0004);
-  h.bits_allocated = integer(text(0x0028, 0x0100), 0);
-  h.bits_stored = integer(text(0x0028, 0x0101), h.bits_allocated);
-  h.is_signed = integer(text(0x0028, 0x0103), 0) == 1;
-  h.position = numbers(text(0x0020, 0x0032));
-  h.orientation = numbers(text(0x0020, 0x0037));
-  h.spacing = numbers(text(0x0028, 0x0030));
-  h.intercept = numbers(text(0x0028, 0x1052));
-  h.slope = numbers(text(0x0028, 0x1053));
-  return std::optional<Header>(std::move(h));
-}
-
-Result<std::vector<Header>> read_headers(const fs::path& folder, const AtFile& at_file, const KeepGoing& keep_going) {
-  std::vector<fs::path> files;
-  bool subfolders = false;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    subfolders = subfolders || entry->is_directory(error);
-    if (entry->is_regular_file(error)) files.push_back(entry->path());
-  }
-  if (error) return failure(ErrorCode::not_found, "cannot list " + folder.string() + ": " + error.message());
-  const std::string inner = subfolders ? "; its subfolders are not searched, give the one with the series" : "; give the folder with the CT series";
-  if (files.empty()) return failure(ErrorCode::invalid_input, folder.string() + (subfolders ? " holds no files" : " is empty") + inner);
-  std::ranges::sort(files);
-
-  std::vector<Header> headers;
-  for (const fs::path& file : files) {
-    if (!keep_going(0.0)) return failure(ErrorCode::cancelled, "stopped while reading " + folder.string());
-    at_file(file);
-    auto header = read_header(file);
-    if (!header) return tl::unexpected(header.error());
-    if (*header) headers.push_back(std::move(**header));
-  }
-  if (headers.empty()) return failure(ErrorCode::invalid_input, folder.string() + " holds no DICOM files" + inner);
-  return headers;
-}
-
-// The one CT series of the folder, without scout images.
-Result<std::vector<Header>> one_ct_series(std::vector<Header> headers, const fs::path& folder) {
-  const bool scouts_only = std::ranges::all_of(headers, &Header::localizer);
-  if (scouts_only)
-    return failure(ErrorCode::invalid_input, folder.string() + " holds only scout images (LOCALIZER); give the folder with the CT series");
-  std::erase_if(headers, [](const Header& h) { return h.localizer; });
-
-  std::map<std::string, std::pair<std::string, int>> series;  // uid: modality, files
-  for (const Header& h : headers) {
-    auto& [modality, files] = series[h.series];
-    modality = h.modality;
-    ++files;
-  }
-  if (series.size() > 1) {
-    std::string list;
-    for (const auto& [uid, content] : series)
-      list += (list.empty() ? "" : ", ") + (content.first.empty() ? "unknown" : content.first) + " with " + std::to_string(content.second) +
-              (content.second == 1 ? " file" : " files");
-    return failure(ErrorCode::invalid_input, folder.string() + " holds " + std::to_string(series.size()) + " series (" + list +
-                                                 "); put the one to import into a folder of its own");
-  }
-  for (const Header& h : headers)
-    if (h.modality != "CT")
-      return failure(ErrorCode::unsupported, h.file.string() + " is " + (h.modality.empty() ? "of unknown modality" : h.modality) +
-                                                 ", not CT; only CT has the Hounsfield units that an import needs");
-  return headers;
-}
-
-// Checks one file alone; what it lacks is named as DICOM names it.
-Result<void> check_header(const Header& h) {
-  const auto lacks = [&](const std::string& what) {
-    return failure(ErrorCode::invalid_input, h.file.string() + " has no valid " + what + "; export the series again as original CT slices");
-  };
-  const auto cannot = [&](const std::string& what) { return failure(ErrorCode::unsupported, h.file.string() + " " + what); };
-  if (h.frames > 1) return cannot("holds " + std::to_string(h.frames) + " frames; export the series with one file for each slice");
-  if (h.columns < 2 || h.rows < 2) return lacks("Rows and Columns (0028,0010-0011)");
-  if (h.samples != 1 || h.photometric != "MONOCHROME2") return cannot("has colours (" + h.photometric + ") instead of Hounsfield units; export original CT slices");
-  if (h.bits_allocated != 8 && h.bits_allocated != 16)
-    return cannot("stores " + std::to_string(h.bits_allocated) + " bits for a pixel; only 8 and 16 can be read");
-  if (h.bits_stored < 1 || h.bits_stored > h.bits_allocated) return lacks("BitsStored (0028,0101)");
-  if (h.spacing.size() != 2 || h.spacing[0] <= 0.0 || h.spacing[1] <= 0.0) return lacks("PixelSpacing (0028,0030)");
-  if (h.position.size() != 3) return lacks("ImagePositionPatient (0020,0032)");
-  if (h.orientation.size() != 6) return lacks("ImageOrientationPatient (0020,0037)");
-  if (h.intercept.size() != 1 || h.slope.size() != 1 || h.slope[0] == 0.0) return lacks("RescaleSlope and RescaleIntercept (0028,1052-1053)");
-  // Spectral selection and progression were retired from DICOM; decoders give noise without noticing.
-  if (h.transfer_syntax == "1.2.840.10008.1.2.4.53" || h.transfer_syntax == "1.2.840.10008.1.2.4.55")
-    return cannot("uses a retired JPEG compression (" + h.transfer_syntax + "); export the series uncompressed or lossless");
-  return {};
-}
-
-Vec3 vec(const std::vector<double>& v, std::size_t first = 0) { return {v[first], v[first + 1], v[first + 2]}; }
-
-// Grid and order of the slices; `headers` come out sorted along the normal.
-Result<imaging::HuVolume> arrange(std::vector<Header>& headers, const fs::path& folder) {
-  const Header& first = headers.front();
-  imaging::HuVolume volume;
-  const Vec3 across = vec(first.orientation).normalized();
-  Vec3 down = vec(first.orientation, 3).normalized();
-  if (!across.allFinite() || !down.allFinite() || std::abs(across.dot(down)) > 1e-3)
-    return failure(ErrorCode::invalid_input, first.file.string() + ": ImageOrientationPatient (0020,0037) is not two perpendicular directions; export the series again");
-  down = (down - across * across.dot(down)).normalized();
-  const Vec3 normal = across.cross(down);
-
-  for (Header& h : headers) {
-    if (h.columns != first.columns || h.rows != first.rows)
-      return failure(ErrorCode::invalid_input, folder.string() + ": " + h.file.filename().string() + " has another size than " +
-                                                   first.file.filename().string() + "; put only the slices of one volume into the folder");
-    const bool same_spacing = std::abs(h.spacing[0] - first.spacing[0]) < 1e-4 && std::abs(h.spacing[1] - first.spacing[1]) < 1e-4;
-    const bool same_plane = (vec(h.orientation) - vec(first.orientation)).norm() < 1e-3 && (vec(h.orientation, 3) - vec(first.orientation, 3)).norm() < 1e-3;
-    if (!same_spacing || !same_plane)
-      return failure(ErrorCode::invalid_input, folder.string() + ": " + h.file.filename().string() + " has another " +
-                                                   (same_spacing ? "orientation" : "pixel spacing") + " than " + first.file.filename().string() +
-                                                   "; put only the slices of one volume into the folder");
-    h.along_mm = normal.dot(vec(h.position));
-  }
-  if (headers.size() < 2)
-    return failure(ErrorCode::invalid_input, folder.string() + " holds a single slice; a volume needs at least two");
-  std::ranges::stable_sort(headers, {}, &Header::along_mm);
-
-  const Vec3 origin = vec(headers.front().position);
-  const double length_mm = headers.back().along_mm - headers.front().along_mm;
-  const double step_mm = length_mm / static_cast<double>(headers.size() - 1);
-  char text[160];
-
-  // A tilted gantry moves the slices sideways within their plane: a sheared volume.
-  const Vec3 travel = vec(headers.back().position) - origin;
-  const double sideways_mm = (travel - normal * length_mm).norm();
-  const double pixel_mm = std::min(first.spacing[0], first.spacing[1]);
-  if (sideways_mm > 0.5 * pixel_mm) {
-    std::snprintf(text, sizeof text, " is sheared by %.1f degrees (tilted gantry); export it resampled to upright slices",
-                  std::atan2(sideways_mm, length_mm) * 180.0 / 3.14159265358979);
-    return failure(ErrorCode::unsupported, folder.string() + text);
-  }
-  // One missing slice opens a gap of two steps; a position written with one decimal must pass.
-  std::vector<double> gaps;
-  for (std::size_t i = 1; i < headers.size(); ++i) gaps.push_back(headers[i].along_mm - headers[i - 1].along_mm);
-  std::vector<double> sorted = gaps;
-  std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
-  const double usual_mm = sorted[sorted.size() / 2];
-  // The worst gap, or else the first slice that has drifted from where even steps would put it.
-  std::size_t at = headers.size();
-  double worst_mm = 0.2 * usual_mm;
-  for (std::size_t i = 0; i < gaps.size(); ++i)
-    if (std::abs(gaps[i] - usual_mm) > worst_mm || gaps[i] < 1e-3) {
-      worst_mm = std::max(worst_mm, std::abs(gaps[i] - usual_mm));
-      at = i;
-    }
-  for (std::size_t i = 0; at == headers.size() && i < gaps.size(); ++i)
-    if (std::abs(headers[i + 1].along_mm - (headers.front().along_mm + static_cast<double>(i + 1) * step_mm)) > 0.1 * step_mm) at = i;
-  if (at < headers.size()) {
-    std::snprintf(text, sizeof text, " are %.3g mm apart where %.3g mm is usual; add the missing slices or remove the doubled ones", gaps[at], usual_mm);
-    return failure(ErrorCode::invalid_input, folder.string() + ": the slices " + headers[at].file.filename().string() + " and " +
-                                                 headers[at + 1].file.filename().string() + text);
-  }
-
-  volume.dims = {first.columns, first.rows, static_cast<int>(headers.size())};
-  volume.spacing_mm = {first.spacing[1], first.spacing[0], step_mm};
-  volume.origin_mm = origin;
-  volume.directions << across, down, normal;
-  return volume;
-}
-
-// One slice's HU into `out`.
-Result<void> read_pixels(const Header& h, std::int16_t* out) {
-  const auto broken = [&](const std::string& why) {
-    return failure(ErrorCode::invalid_input, h.file.string() + " " + why + "; copy or export the series again");
-  };
-  gdcm::ImageReader reader;
-  reader.SetFileName(h.file.c_str());
-  const bool read = reader.Read();
-  if (!reader.GetFile().GetDataSet().FindDataElement(kPixelData)) return broken("has no pixel data");
-  if (!read) return broken("has pixel data that cannot be read");
-  const gdcm::Image& image = reader.GetImage();
-  const std::size_t pixels = static_cast<std::size_t>(h.columns) * static_cast<std::size_t>(h.rows);
-  const std::size_t width = image.GetPixelFormat().GetBitsAllocated() / 8u;
-  if ((width != 1 && width != 2) || image.GetBufferLength() != pixels * width) return broken("has pixel data of another size than its header says");
-  // Some scanners write metal beyond the range that BitsStored promises. The library would cut those bits off and so
-  // turn metal into air; plain pixels are therefore taken as they lie in the file.
-  std::vector<char> buffer(image.GetBufferLength());
-  const gdcm::TransferSyntax syntax = reader.GetFile().GetHeader().GetDataSetTransferSyntax();
-  const gdcm::ByteValue* bytes = image.GetDataElement().GetByteValue();
-  const bool plain = (syntax == gdcm::TransferSyntax::ImplicitVRLittleEndian || syntax == gdcm::TransferSyntax::ExplicitVRLittleEndian) &&
-                     image.GetNumberOfOverlays() == 0 && bytes != nullptr && bytes->GetLength() >= buffer.size();
-  if (plain) std::memcpy(buffer.data(), bytes->GetPointer(), buffer.size());
-  else if (!image.GetBuffer(buffer.data())) return broken("has pixel data that cannot be decompressed");
-
-  // Signed values may lack their sign in the bits above the stored ones.
-  const bool is_signed = image.GetPixelFormat().GetPixelRepresentation() == 1;
-  const int unused = is_signed ? 16 - static_cast<int>(image.GetPixelFormat().GetBitsStored()) : 0;
-  for (std::size_t i = 0; i < pixels; ++i) {
-    std::uint16_t raw = static_cast<std::uint8_t>(buffer[i]);
-    if (width == 2) std::memcpy(&raw, buffer.data() + 2 * i, 2);
-    const int stored = is_signed ? static_cast<std::int16_t>(static_cast<std::uint16_t>(raw << unused)) >> unused : raw;
-    const double hu = stored * h.slope[0] + h.intercept[0];
-    out[i] = static_cast<std::int16_t>(std::lround(std::clamp(hu, -32768.0, 32767.0)));
-  }
-  return {};
-}
-
-Result<CtScan> read_series(const fs::path& folder, const AtFile& at_file, const KeepGoing& keep_going) try {
+void silence_library() {
   gdcm::Trace::DebugOff();
   gdcm::Trace::WarningOff();
   gdcm::Trace::ErrorOff();
+}
 
-  auto found = read_headers(folder, at_file, keep_going);
-  if (!found) return tl::unexpected(found.error());
-  auto series = one_ct_series(std::move(*found), folder);
-  if (!series) return tl::unexpected(series.error());
-  for (const Header& h : *series)
-    if (auto checked = check_header(h); !checked) return tl::unexpected(checked.error());
-  auto volume = arrange(*series, folder);
-  if (!volume) return tl::unexpected(volume.error());
+struct Input {
+  FoundFiles found;
+  std::optional<TemporaryFolder> folder;  // of an archive
+  std::optional<std::size_t> named_file;  // when a slice was given
+};
 
-  volume->values.resize(volume->count());
-  for (std::size_t i = 0; i < series->size(); ++i) {
-    if (!keep_going(static_cast<double>(i) / static_cast<double>(series->size())))
-      return failure(ErrorCode::cancelled, "stopped while reading " + folder.string());
-    at_file((*series)[i].file);
-    if (auto read = read_pixels((*series)[i], volume->values.data() + volume->index(0, 0, static_cast<int>(i))); !read)
-      return tl::unexpected(read.error());
+void pack(const FoundFiles& found, Packer& to) {
+  to.add(found.files.size());
+  for (const FoundFile& f : found.files) to.add(f.path.string()), to.add(f.name);
+  to.add(found.skipped.counts().size());
+  for (const SkippedFiles::Count& c : found.skipped.counts()) {
+    to.add(c.kind), to.add(c.count), to.add(c.names.size());
+    for (const std::string& name : c.names) to.add(name);
   }
-  CtScan scan{std::move(*volume), {}};
-  scan.source = "DICOM CT, " + imaging::describe(scan.volume);
-  return scan;
-} catch (const std::exception& error) {
-  return failure(ErrorCode::invalid_input, folder.string() + " cannot be read as DICOM: " + error.what());
+}
+
+bool unpack(Unpacker& from, FoundFiles& found) {
+  std::size_t size = 0;
+  if (!from.get(size) || size > kMostFiles) return false;
+  for (std::size_t i = 0; i < size; ++i) {
+    std::string path, name;
+    if (!from.get(path) || !from.get(name)) return false;
+    found.files.push_back({path, name});
+  }
+  if (!from.get(size)) return false;
+  for (std::size_t i = 0; i < size; ++i) {
+    FileKind kind{};
+    int count = 0;
+    std::size_t names = 0;
+    if (!from.get(kind) || !from.get(count) || !from.get(names)) return false;
+    SkippedFiles skipped;
+    for (std::size_t j = 0; j < names; ++j) {
+      std::string name;
+      if (!from.get(name)) return false;
+      skipped.add(kind, name);
+    }
+    found.skipped.add(skipped);
+    for (int j = static_cast<int>(names); j < count; ++j) found.skipped.add(kind, "");
+  }
+  return true;
+}
+
+Result<Input> unpacked(const fs::path& archive, const KeepGoing& keep_going) {
+  auto folder = TemporaryFolder::make();
+  if (!folder) return tl::unexpected(folder.error());
+  Input input{.found = {}, .folder = std::move(*folder), .named_file = {}};
+  const fs::path into = input.folder->path();
+  IsolatedWork work;
+  work.run = [&](Speaker& speaker) -> Result<void> {
+    const auto found = unpack_archive(archive, into, {}, [&](double fraction) {
+      speaker.progress(fraction);
+      return true;  // the parent ends this process when the user wants it stopped
+    });
+    if (!found) return tl::unexpected(found.error());
+    Packer packer;
+    pack(*found, packer);
+    speaker.tell(packer.bytes());
+    return {};
+  };
+  work.hear = [&](std::string_view message) {
+    Unpacker from(message);
+    return unpack(from, input.found);
+  };
+  const IsolatedEnd end = run_isolated(work, keep_going);
+  if (end.died)
+    return failure(ErrorCode::invalid_input, archive.string() + " is damaged so that it cannot be read; copy or export it again");
+  if (!end.result) return tl::unexpected(end.result.error());
+  input.found.input = archive.string();
+  input.found.archive = true;
+  return input;
+}
+
+// All headers, by one process after the other: where one dies, its file is damaged and the next goes on behind it.
+Result<std::vector<DicomHeader>> read_headers(const FoundFiles& found, const KeepGoing& keep_going) {
+  std::vector<DicomHeader> headers;
+  const std::size_t files = found.files.size();
+  std::size_t next = 0;
+  IsolatedWork work;
+  work.run = [&](Speaker& speaker) -> Result<void> {
+    silence_library();
+    for (std::size_t i = next; i < files; ++i) {
+      speaker.at_file(i);
+      speaker.progress(static_cast<double>(i) / static_cast<double>(files));
+      DicomHeader h = read_header(found.files[i].path);
+      h.file = i;
+      Packer packer;
+      h.pack(packer);
+      speaker.tell(packer.bytes());
+    }
+    return {};
+  };
+  work.hear = [&](std::string_view message) {
+    Unpacker from(message);
+    DicomHeader h;
+    if (!h.unpack(from) || h.file != next || next >= files) return false;
+    headers.push_back(std::move(h));
+    ++next;
+    return true;
+  };
+  for (int deaths = 0; next < files; ++deaths) {
+    const IsolatedEnd end = run_isolated(work, keep_going);
+    if (end.result && next == files) break;
+    if (!end.died)
+      return tl::unexpected(end.result ? Error{ErrorCode::internal, "the reader of " + found.input + " ended early"}
+                                       : end.result.error());
+    if (deaths == kMostDeaths)
+      return failure(ErrorCode::invalid_input, found.input + " holds more than " + std::to_string(kMostDeaths) +
+                                                   " damaged files, such as " + found.shown(next) + "; copy or export it again");
+    DicomHeader damaged;
+    damaged.file = next++;
+    headers.push_back(std::move(damaged));
+  }
+  return headers;
+}
+
+Result<Input> find_input(const fs::path& path, const KeepGoing& keep_going) {
+  const auto searched = [&](const fs::path& folder, int levels) -> Result<Input> {
+    auto found = find_files(folder, levels, keep_going);
+    if (!found) return tl::unexpected(found.error());
+    return Input{.found = std::move(*found), .folder = {}, .named_file = {}};
+  };
+  switch (input_kind(path, keep_going)) {
+    case InputKind::folder:
+      return searched(path, kMostLevels);
+    case InputKind::archive:
+      return unpacked(path, keep_going);
+    case InputKind::dicom_file:
+      break;
+    case InputKind::absent:
+      return failure(ErrorCode::not_found,
+                     "there is no file or folder " + path.string() + "; give a folder, zip or ISO image with a CT series");
+    default:
+      return failure(ErrorCode::invalid_input,
+                     path.string() + " is no folder, zip, ISO image or DICOM file; give one with a CT series");
+  }
+  // The files that a DICOMDIR lists lie below it; beside a slice lies its series.
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  FoundFiles alone{.input = path.string(), .archive = false, .files = {{path, path.filename().string()}}, .skipped = {}};
+  const auto header = read_headers(alone, keep_going);
+  if (!header) return tl::unexpected(header.error());
+  const bool is_index = header->front().kind == FileKind::index;
+  auto input = searched(folder, is_index ? kMostLevels : -1);
+  if (!input || is_index) return input;
+  const auto named = std::ranges::find(input->found.files, path.filename().string(), &FoundFile::name);
+  if (named != input->found.files.end()) input->named_file = static_cast<std::size_t>(named - input->found.files.begin());
+  return input;
+}
+
+// Fills the series' volume slice by slice.
+Result<void> read_volume(CtSeries& series, const FoundFiles& found, const KeepGoing& keep_going) {
+  imaging::HuVolume& volume = series.grid;
+  try {
+    volume.values.resize(volume.count());
+  } catch (const std::bad_alloc&) {
+    return failure(ErrorCode::exhausted, found.input + ": this machine has no memory for a volume of " +
+                                             imaging::describe(volume) + "; export thicker slices");
+  }
+  const std::size_t pixels = static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]);
+  const std::size_t slices = series.slices.size();
+  std::size_t next = 0;
+  IsolatedWork work;
+  work.memory_bytes = std::size_t{4} << 30;
+  work.run = [&](Speaker& speaker) -> Result<void> {
+    silence_library();
+    std::vector<std::int16_t> slice(pixels);
+    for (std::size_t i = 0; i < slices; ++i) {
+      speaker.at_file(series.slices[i].file);
+      if (auto read =
+              read_pixels(series.slices[i], found.files[series.slices[i].file].path, found.shown(series.slices[i].file), slice);
+          !read)
+        return read;
+      speaker.tell({reinterpret_cast<const char*>(slice.data()), pixels * sizeof(std::int16_t)});
+      speaker.progress(static_cast<double>(i + 1) / static_cast<double>(slices));
+    }
+    return {};
+  };
+  work.hear = [&](std::string_view message) {
+    if (next == slices || message.size() != pixels * sizeof(std::int16_t)) return false;
+    std::memcpy(volume.values.data() + pixels * next++, message.data(), message.size());
+    return true;
+  };
+  const IsolatedEnd end = run_isolated(work, keep_going);
+  if (end.died && end.file)
+    return failure(ErrorCode::invalid_input,
+                   found.shown(*end.file) + " is damaged so that it cannot be read; copy or export it again");
+  if (!end.result) return tl::unexpected(end.result.error());
+  if (next != slices) return failure(ErrorCode::internal, "the reader of " + found.input + " ended early");
+  return {};
+}
+
+struct Survey {
+  Input input;
+  std::vector<CtSeries> series;
+  SeriesReport report;
+};
+
+Result<Survey> survey(const fs::path& path, const KeepGoing& keep_going) {
+  std::error_code error;
+  bool shows = fs::is_regular_file(path, error) && fs::file_size(path, error) > kLargeArchive;
+  const KeepGoing shown = [&](double fraction) { return keep_going(shows ? fraction : 0.0); };
+  const KeepGoing unpacking = part(shown, 0.0, kUnpackedEnd);
+  auto input = find_input(path, unpacking);
+  if (!input) return tl::unexpected(input.error());
+  shows = shows || input->found.files.size() > kManyFiles;
+  const KeepGoing scanning = part(shown, input->folder ? kUnpackedEnd : 0.0, kHeadersEnd);
+  auto headers = read_headers(input->found, scanning);
+  if (!headers) return tl::unexpected(headers.error());
+  Survey result{.input = std::move(*input), .series = {}, .report = {}};
+  result.report.skipped = result.input.found.skipped;
+  result.series = sort_series(std::move(*headers), result.input.found, result.report.skipped);
+  for (const CtSeries& s : result.series) result.report.series.push_back(s.entry);
+  return result;
+}
+
+Result<std::size_t> choose(const Survey& s, std::optional<int> number) {
+  return choose_series(s.series, s.input.found, s.report.skipped, number, s.input.named_file);
 }
 
 }  // namespace
 
-Result<CtScan> read_dicom_series(const fs::path& folder, const KeepGoing& keep_going) {
-  // Debian builds GDCM with its assertions, which abort on some damaged files.
-  return read_isolated([&](const AtFile& at_file, const KeepGoing& progress) { return read_series(folder, at_file, progress); }, keep_going);
+Result<CtScan> read_dicom_series(const fs::path& input, const SeriesOptions& options, const KeepGoing& keep_going) {
+  auto found = survey(input, keep_going);
+  if (!found) return tl::unexpected(found.error());
+  const auto chosen = choose(*found, options.series);
+  if (!chosen) return tl::unexpected(chosen.error());
+  CtSeries& series = found->series[*chosen];
+  if (series.fault) {
+    Error error = series.fault->error;
+    const bool another = std::ranges::any_of(found->series, [](const CtSeries& s) { return !s.fault; });
+    if (another && !options.series) error.message += ", or take another series by --series N";
+    return tl::unexpected(error);
+  }
+  const KeepGoing reading = part(keep_going, kHeadersEnd, 1.0);
+  if (auto read = read_volume(series, found->input.found, reading); !read) return tl::unexpected(read.error());
+  CtScan scan{std::move(series.grid), {}, std::move(found->report)};
+  scan.source = "DICOM CT, " + imaging::describe(scan.volume);
+  scan.report.taken = series.entry.number;
+  return scan;
+}
+
+Result<SeriesReport> list_dicom_series(const fs::path& input, const KeepGoing& keep_going) {
+  auto found = survey(input, keep_going);
+  if (!found) return tl::unexpected(found.error());
+  const auto chosen = choose(*found, {});
+  if (!chosen) return tl::unexpected(chosen.error());
+  SeriesReport report = std::move(found->report);
+  if (!found->series[*chosen].fault) report.taken = found->series[*chosen].entry.number;
+  return report;
 }
 
 }  // namespace osteon::import

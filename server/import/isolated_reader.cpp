@@ -2,6 +2,8 @@
 
 #include <fcntl.h>
 #include <poll.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -10,16 +12,25 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
-#include <string>
 #include <type_traits>
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define OSTEON_SANITIZED 1
+#elif defined(__has_feature)
+#define OSTEON_SANITIZED (__has_feature(address_sanitizer) || __has_feature(thread_sanitizer))
+#else
+#define OSTEON_SANITIZED 0
+#endif
 
 namespace osteon::import {
 namespace {
 
 constexpr int kPollMilliseconds = 20;
+constexpr int kPatienceMilliseconds = 120'000;                 // of polls that bring nothing: a suspended process loses none
+constexpr std::size_t kLargestMessage = std::size_t{1} << 30;  // a slice of 16384 x 16384 is half of it
 
-// What the child tells: which file it opens, how far it is, and at last a scan or an error.
-enum class Record : char { file, progress, scan, error };
+// What the child tells: which file it opens, how far it is, a part of the result, and at last how it ended.
+enum class Record : char { file, progress, message, done, error };
 
 bool write_all(int descriptor, const void* data, std::size_t size) {
   const char* from = static_cast<const char*>(data);
@@ -39,48 +50,56 @@ void put(int descriptor, const T& value) {
   if (!write_all(descriptor, &value, sizeof value)) ::_exit(1);
 }
 
-void put(int descriptor, const std::string& text) {
+void put_text(int descriptor, std::string_view text) {
   put(descriptor, text.size());
   if (!write_all(descriptor, text.data(), text.size())) ::_exit(1);
 }
 
-// Matrices of fixed size are plain numbers in memory.
-template <class Matrix>
-void put_matrix(int descriptor, const Matrix& m) {
-  for (Eigen::Index i = 0; i < m.size(); ++i) put(descriptor, m.data()[i]);
+// A length that a damaged file claims must not take the machine's memory. Sanitizers reserve far more than they use.
+void limit_memory([[maybe_unused]] std::size_t more_bytes) {
+#if !OSTEON_SANITIZED
+  unsigned long pages = 0;
+  if (std::FILE* status = std::fopen("/proc/self/statm", "r")) {
+    if (std::fscanf(status, "%lu", &pages) != 1) pages = 0;
+    std::fclose(status);
+  }
+  if (pages == 0) return;
+  const rlim_t bytes = static_cast<rlim_t>(pages) * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + more_bytes;
+  const rlimit limit{bytes, bytes};
+  ::setrlimit(RLIMIT_AS, &limit);
+#endif
 }
 
-[[noreturn]] void run_child(const ScanReader& reader, int out) {
+Result<void> run_guarded(const IsolatedWork& work, Speaker& speaker) try {
+  return work.run(speaker);
+} catch (const std::bad_alloc&) {
+  ::_exit(1);  // as if it had died: the parent knows the file
+} catch (const std::exception& error) {
+  return failure(ErrorCode::internal, std::string("reading the input failed: ") + error.what());
+}
+
+[[noreturn]] void run_child(const IsolatedWork& work, int out, pid_t parent) {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) ::_exit(1);
   const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
   ::dup2(nowhere, STDERR_FILENO);
   ::dup2(nowhere, STDOUT_FILENO);
-  const auto at_file = [out](const std::filesystem::path& file) {
-    put(out, Record::file);
-    put(out, file.string());
-  };
-  const auto progress = [out](double fraction) {
-    put(out, Record::progress);
-    put(out, fraction);
-    return true;  // the parent ends this process when the user wants it stopped
-  };
-  const Result<CtScan> scan = reader(at_file, progress);
-  if (!scan) {
+  const rlimit no_core{0, 0};
+  ::setrlimit(RLIMIT_CORE, &no_core);
+  limit_memory(work.memory_bytes);
+  Speaker speaker(out);
+  const Result<void> result = run_guarded(work, speaker);
+  if (result) {
+    put(out, Record::done);
+  } else {
     put(out, Record::error);
-    put(out, scan.error().code);
-    put(out, scan.error().message);
-    ::_exit(0);
+    put(out, result.error().code);
+    put_text(out, result.error().message);
   }
-  put(out, Record::scan);
-  put(out, scan->source);
-  put(out, scan->volume.dims);
-  put_matrix(out, scan->volume.spacing_mm);
-  put_matrix(out, scan->volume.origin_mm);
-  put_matrix(out, scan->volume.directions);
-  if (!write_all(out, scan->volume.values.data(), scan->volume.values.size() * sizeof(std::int16_t))) ::_exit(1);
   ::_exit(0);
 }
 
-// The parent's end. Reading fails for good when the child is gone or the user wants to stop.
+// The parent's end. Reading fails for good when the child is gone or silent, or the user wants to stop.
 class Line {
  public:
   Line(int descriptor, const KeepGoing& keep_going) : descriptor_(descriptor), keep_going_(keep_going) {}
@@ -91,13 +110,16 @@ class Line {
   }
   bool get(void* data, std::size_t size) {
     char* to = static_cast<char*>(data);
+    int silent_ms = 0;
     while (size > 0) {
       pollfd ready{descriptor_, POLLIN, 0};
       const int events = ::poll(&ready, 1, kPollMilliseconds);
-      if (events <= 0 || size > (1u << 20)) {
-        if (!ask()) return false;
-        if (events <= 0) continue;
+      if (events <= 0) {
+        silent_ms += kPollMilliseconds;
+        if (!ask() || silent_ms > kPatienceMilliseconds) return false;
+        continue;
       }
+      silent_ms = 0;
       const ssize_t n = ::read(descriptor_, to, size);
       if (n < 0 && errno == EINTR) continue;
       if (n <= 0) return false;
@@ -111,15 +133,11 @@ class Line {
     static_assert(std::is_trivially_copyable_v<T>);
     return get(&value, sizeof value);
   }
-  bool get(std::string& text) {
+  bool get_text(std::string& text) {
     std::size_t size = 0;
-    if (!get(size)) return false;
+    if (!get(size) || size > kLargestMessage) return false;
     text.resize(size);
     return get(text.data(), size);
-  }
-  template <class Matrix>
-  bool get_matrix(Matrix& m) {
-    return get(m.data(), static_cast<std::size_t>(m.size()) * sizeof *m.data());
   }
 
   double fraction = 0.0;
@@ -130,62 +148,85 @@ class Line {
   const KeepGoing& keep_going_;
 };
 
-bool get_scan(Line& line, CtScan& scan) {
-  imaging::HuVolume& v = scan.volume;
-  if (!line.get(scan.source) || !line.get(v.dims) || !line.get_matrix(v.spacing_mm) || !line.get_matrix(v.origin_mm) || !line.get_matrix(v.directions))
-    return false;
-  v.values.resize(v.count());
-  return line.get(v.values.data(), v.values.size() * sizeof(std::int16_t));
-}
-
-Result<CtScan> listen(Line& line) {
-  std::string file = "the input";
+IsolatedEnd listen(Line& line, const IsolatedWork& work) {
+  IsolatedEnd end;
   Record record{};
+  std::string message;
   while (line.get(record)) {
-    if (record == Record::file) {
-      if (!line.get(file)) break;
-    } else if (record == Record::progress) {
-      if (!line.get(line.fraction)) break;
-      if (!line.ask()) break;
-    } else if (record == Record::scan) {
-      CtScan scan;
-      if (!get_scan(line, scan)) break;
-      return scan;
-    } else {
+    if (record == Record::done) return end;
+    if (record == Record::error) {
       Error error;
-      if (!line.get(error.code) || !line.get(error.message)) break;
-      return tl::unexpected(error);
+      if (!line.get(error.code) || !line.get_text(error.message)) break;
+      end.result = tl::unexpected(error);
+      return end;
+    }
+    if (record == Record::file) {
+      std::size_t file = 0;
+      if (!line.get(file)) break;
+      end.file = file;
+    } else if (record == Record::progress) {
+      if (!line.get(line.fraction) || !line.ask()) break;
+    } else if (!line.get_text(message) || !work.hear(message)) {
+      break;
     }
   }
-  if (line.stopped) return failure(ErrorCode::cancelled, "stopped while reading the scan");
-  return failure(ErrorCode::invalid_input, file + " is damaged so that it cannot be read; copy or export it again");
+  if (line.stopped) {
+    end.result = failure(ErrorCode::cancelled, "stopped while reading the scan");
+  } else {
+    end.died = true;
+    end.result = failure(ErrorCode::invalid_input, "the input is damaged so that it cannot be read; copy or export it again");
+  }
+  return end;
 }
 
 }  // namespace
 
-Result<CtScan> read_isolated(const ScanReader& reader, const KeepGoing& keep_going) {
+bool limits_memory() { return !OSTEON_SANITIZED; }
+
+void Speaker::at_file(std::size_t file) {
+  put(descriptor_, Record::file);
+  put(descriptor_, file);
+}
+
+void Speaker::progress(double fraction) {
+  put(descriptor_, Record::progress);
+  put(descriptor_, fraction);
+}
+
+void Speaker::tell(std::string_view message) {
+  put(descriptor_, Record::message);
+  put_text(descriptor_, message);
+}
+
+IsolatedEnd run_isolated(const IsolatedWork& work, const KeepGoing& keep_going) {
   int ends[2];
-  if (::pipe2(ends, O_CLOEXEC) != 0) return failure(ErrorCode::internal, std::string("cannot make a pipe: ") + std::strerror(errno));
+  if (::pipe2(ends, O_CLOEXEC) != 0)
+    return {.result = failure(ErrorCode::internal, std::string("cannot make a pipe: ") + std::strerror(errno)),
+            .died = false,
+            .file = {}};
   std::fflush(nullptr);
+  const pid_t parent = ::getpid();
   const pid_t child = ::fork();
   if (child < 0) {
     ::close(ends[0]);
     ::close(ends[1]);
-    return failure(ErrorCode::internal, std::string("cannot start the reader: ") + std::strerror(errno));
+    return {.result = failure(ErrorCode::internal, std::string("cannot start the reader: ") + std::strerror(errno)),
+            .died = false,
+            .file = {}};
   }
   if (child == 0) {
     ::close(ends[0]);
-    run_child(reader, ends[1]);
+    run_child(work, ends[1], parent);
   }
   ::close(ends[1]);
   Line line(ends[0], keep_going);
-  Result<CtScan> result = listen(line);
+  IsolatedEnd end = listen(line, work);
   ::close(ends[0]);
   ::kill(child, SIGKILL);  // it has said everything, or is not wanted any more
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
-  return result;
+  return end;
 }
 
 }  // namespace osteon::import

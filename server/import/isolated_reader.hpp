@@ -1,20 +1,46 @@
-// Runs a reader of foreign files in a child process, so that a library that aborts on a damaged file costs one clear
-// sentence instead of the program.
+// Runs a reader of foreign files in a child process, so that a library that aborts on a damaged file costs that file
+// instead of the program.
 #pragma once
-#include <filesystem>
+#include <cstddef>
 #include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
 
+#include "common/core/result.hpp"
 #include "common/volume/iso_surface.hpp"
-#include "server/import/ct_scan.hpp"
 
 namespace osteon::import {
 
-// Called by the reader before each file that it opens.
-using AtFile = std::function<void(const std::filesystem::path&)>;
-using ScanReader = std::function<Result<CtScan>(const AtFile& at_file, const KeepGoing& keep_going)>;
+// How the child speaks to its parent. It never returns from a call when the parent is gone.
+class Speaker {
+ public:
+  explicit Speaker(int descriptor) : descriptor_(descriptor) {}
+  void at_file(std::size_t file);  // the one that it opens now
+  void progress(double fraction);
+  void tell(std::string_view message);
 
-// The reader's result. A child that dies is an error (invalid_input) naming the file that it had open; what libraries
-// print on the way is dropped. Call it before the program has other threads.
-[[nodiscard]] Result<CtScan> read_isolated(const ScanReader& reader, const KeepGoing& keep_going);
+ private:
+  int descriptor_;
+};
+
+struct IsolatedWork {
+  std::function<Result<void>(Speaker&)> run;           // in the child
+  std::function<bool(std::string_view message)> hear;  // in the parent; false: the message makes no sense
+  std::size_t memory_bytes = std::size_t{1} << 30;     // that the child may take beside what it begins with
+};
+
+struct IsolatedEnd {
+  Result<void> result;
+  bool died = false;                // by a signal, for want of memory, or ended after two minutes of silence
+  std::optional<std::size_t> file;  // the last that it opened
+};
+
+// False in builds with sanitizers, which reserve far more memory than they use.
+[[nodiscard]] bool limits_memory();
+
+// What libraries print on the way is dropped. Call it before the program has other threads.
+// Errors: those of the work, cancelled, internal (no child), invalid_input (it died).
+[[nodiscard]] IsolatedEnd run_isolated(const IsolatedWork& work, const KeepGoing& keep_going);
 
 }  // namespace osteon::import

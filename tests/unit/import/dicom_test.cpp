@@ -11,27 +11,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-imaging::HuVolume numbered_volume() {
-  imaging::HuVolume volume;
-  volume.dims = {7, 5, 4};
-  volume.spacing_mm = {0.5, 0.75, 1.25};
-  volume.origin_mm = {-100.5, 20.25, -1300.0};
-  volume.values.resize(volume.count());
-  for (std::size_t i = 0; i < volume.values.size(); ++i) volume.values[i] = static_cast<std::int16_t>(static_cast<int>(17 * i) % 4000 - 1024);
-  return volume;
-}
-
-void expect_same(const imaging::HuVolume& a, const imaging::HuVolume& b) {
-  EXPECT_EQ(a.dims, b.dims);
-  EXPECT_LT((a.spacing_mm - b.spacing_mm).norm(), 1e-6);
-  EXPECT_LT((a.origin_mm - b.origin_mm).norm(), 1e-6);
-  EXPECT_LT((a.directions - b.directions).norm(), 1e-6);
-  EXPECT_EQ(a.values, b.values);
-}
-
 TEST(DicomSeries, ReturnsWhatWasWritten) {
   const test::TempDir folder;
-  const auto volume = numbered_volume();
+  const auto volume = numbered_volume(7, 5, 4);
   ASSERT_TRUE(write_dicom_series(volume, folder / "series", keep_going));
   const auto scan = read_dicom_series(folder / "series", keep_going);
   ASSERT_TRUE(scan) << scan.error().message;
@@ -40,7 +22,7 @@ TEST(DicomSeries, ReturnsWhatWasWritten) {
 
 TEST(DicomSeries, KeepsAnObliqueGeometry) {
   const test::TempDir folder;
-  auto volume = numbered_volume();
+  auto volume = numbered_volume(7, 5, 4);
   volume.directions = Eigen::AngleAxisd(0.35, Vec3(1.0, 0.2, 0.1).normalized()).toRotationMatrix();
   ASSERT_TRUE(write_dicom_series(volume, folder / "series", keep_going));
   const auto scan = read_dicom_series(folder / "series", keep_going);
@@ -53,7 +35,7 @@ TEST(DicomSeries, KeepsAnObliqueGeometry) {
 
 TEST(DicomSeries, OrderOfFileNamesDoesNotMatter) {
   const test::TempDir folder;
-  const auto volume = numbered_volume();
+  const auto volume = numbered_volume(7, 5, 4);
   ASSERT_TRUE(write_dicom_series(volume, folder / "series", keep_going));
   const auto files = files_of(folder / "series");
   for (std::size_t i = 0; i < files.size(); ++i) fs::rename(files[i], folder / "series" / (std::string(1, "qdza"[i]) + "-renamed"));
@@ -80,7 +62,7 @@ TEST(DicomSeries, TheSourceSaysNothingOfThePatient) {
 
 TEST(DicomSeries, WritingOverAFolderIsRefused) {
   const test::TempDir folder;
-  const auto written = write_dicom_series(numbered_volume(), folder.path(), keep_going);
+  const auto written = write_dicom_series(numbered_volume(7, 5, 4), folder.path(), keep_going);
   ASSERT_FALSE(written);
   EXPECT_EQ(written.error().code, ErrorCode::exists);
 }
@@ -88,7 +70,7 @@ TEST(DicomSeries, WritingOverAFolderIsRefused) {
 TEST(DicomSeries, AStoppedWriteLeavesNothing) {
   const test::TempDir folder;
   int asked = 0;
-  const auto written = write_dicom_series(numbered_volume(), folder / "series", [&](double) { return ++asked < 3; });
+  const auto written = write_dicom_series(numbered_volume(7, 5, 4), folder / "series", [&](double) { return ++asked < 3; });
   ASSERT_FALSE(written);
   EXPECT_EQ(written.error().code, ErrorCode::cancelled);
   EXPECT_TRUE(files_of(folder.path()).empty());
@@ -132,16 +114,10 @@ TEST_F(BrokenSeries, NoDicomFiles) {
   expect_refused(series_.string(), "no DICOM files");
 }
 
-TEST_F(BrokenSeries, SeriesInASubfolder) {
+TEST_F(BrokenSeries, EmptySubfolder) {
   for (const fs::path& file : files_) fs::remove(file);
   fs::create_directory(series_ / "CT");
-  expect_refused(series_.string(), "subfolders");
-}
-
-TEST_F(BrokenSeries, TwoSeries) {
-  ASSERT_NO_FATAL_FAILURE(write_small_series(folder_ / "other"));
-  for (const fs::path& file : files_of(folder_ / "other")) fs::copy(file, series_ / ("other-" + file.filename().string()));
-  expect_refused(series_.string(), "2 series");
+  expect_refused(series_.string(), "is empty");
 }
 
 TEST_F(BrokenSeries, SingleSlice) {
@@ -161,7 +137,8 @@ TEST_F(BrokenSeries, MissingSlicesOfAShortSeries) {
 }
 
 TEST_F(BrokenSeries, DoubledSlice) {
-  fs::copy(files_[4], series_ / "copy.dcm");
+  fs::copy(files_[4], series_ / "another.dcm");
+  set_tag(series_ / "another.dcm", 0x0008, 0x0018, "1.2.3.4");  // an instance of its own, so no copy
   expect_refused(series_.string(), "0 mm apart");
 }
 
@@ -174,12 +151,12 @@ TEST_F(BrokenSeries, TiltedGantry) {
 
 TEST_F(BrokenSeries, AnotherModality) {
   for (const fs::path& file : files_) set_tag(file, 0x0008, 0x0060, "MR");
-  expect_refused(files_[0].string(), "is MR, not CT");
+  expect_refused(series_.string(), std::to_string(files_.size()) + " MR images");
 }
 
 TEST_F(BrokenSeries, OnlyScouts) {
   for (const fs::path& file : files_) set_tag(file, 0x0008, 0x0008, "ORIGINAL\\PRIMARY\\LOCALIZER");
-  expect_refused(series_.string(), "scout");
+  expect_refused(series_.string(), std::to_string(files_.size()) + " localizers");
 }
 
 TEST_F(BrokenSeries, AScoutBesideTheSeriesIsNotStacked) {
@@ -191,19 +168,23 @@ TEST_F(BrokenSeries, AScoutBesideTheSeriesIsNotStacked) {
 
 TEST_F(BrokenSeries, NoPixelData) {
   remove_tag(files_[3], 0x7fe0, 0x0010);
-  expect_refused(files_[3].string(), "no pixel data");
+  expect_refused(series_.string(), "slice-0004.dcm has no pixel data");
 }
 
 TEST_F(BrokenSeries, NoPixelDataAnywhere) {
   for (const fs::path& file : files_) remove_tag(file, 0x7fe0, 0x0010);
-  expect_refused(files_[0].string(), "no pixel data");
+  expect_refused(series_.string(), "no pixel data");
 }
 
 TEST_F(BrokenSeries, TruncatedFile) {
-  truncate_file(files_[2], 0.6);
-  const auto scan = read_dicom_series(series_, keep_going);
-  ASSERT_FALSE(scan);
-  expect_one_sentence(scan.error(), files_[2].string());
+  truncate_file(files_[2], 0.6);  // within its header
+  expect_refused(series_.string(), "slice-0003.dcm is damaged");
+}
+
+// The library leaves missing pixels zero without a word.
+TEST_F(BrokenSeries, FileThatEndsWithinItsPixels) {
+  fs::resize_file(files_[2], fs::file_size(files_[2]) - 2);
+  expect_refused(files_[2].string(), "cut off");
 }
 
 TEST_F(BrokenSeries, NoSpacing) {
@@ -233,17 +214,17 @@ TEST_F(BrokenSeries, NoRescaling) {
 
 TEST_F(BrokenSeries, SeveralFrames) {
   set_tag(files_[1], 0x0028, 0x0008, "2");
-  expect_refused(files_[1].string(), "2 frames");
+  expect_refused(series_.string(), "slice-0002.dcm holds 2 frames");
 }
 
 TEST_F(BrokenSeries, AnotherPixelSpacingInOneSlice) {
   set_tag(files_[1], 0x0028, 0x0030, "2\\2");
-  expect_refused(series_.string(), "another pixel spacing");
+  expect_refused(series_.string(), "slice-0002.dcm has another pixel spacing");
 }
 
 TEST_F(BrokenSeries, AnotherOrientationInOneSlice) {
   set_tag(files_[1], 0x0020, 0x0037, "1\\0\\0\\0\\0.8\\0.6");
-  expect_refused(series_.string(), "another orientation");
+  expect_refused(series_.string(), "slice-0002.dcm has another orientation");
 }
 
 TEST(DicomSeriesFolder, ThatIsNotThere) {

@@ -42,6 +42,17 @@ struct Inv3 {
 };
 void write_inv3(const std::filesystem::path& file, const Inv3& project);
 
+// A scan whose values are all different along each axis.
+[[nodiscard]] imaging::HuVolume numbered_volume(int columns, int rows, int slices);
+void expect_same(const imaging::HuVolume& a, const imaging::HuVolume& b);
+
+// A DICOM file without an image, as a recorder of CDs or of doses writes it.
+void write_object(const std::filesystem::path& file, const std::string& sop_class, const std::string& modality,
+                  const std::string& image_type = {});
+
+// Everything below a folder as one archive: "zip", "iso9660", "pax" or, of a zip with a password, "secret".
+void write_archive(const std::filesystem::path& folder, const std::filesystem::path& file, const std::string& format);
+
 // Keeps the first bytes of a file.
 void truncate_file(const std::filesystem::path& file, double part);
 

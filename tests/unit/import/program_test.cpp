@@ -1,10 +1,13 @@
 // osteon-import as its users meet it: what it prints, what it leaves behind and how it exits.
+#include <sys/stat.h>
+
 #include <csignal>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "common/volume/case.hpp"
+#include "server/import/dicom_writer.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/import/fixtures.hpp"
@@ -48,7 +51,7 @@ class Program : public ::testing::Test {
 TEST_F(Program, HelpNamesTheCommands) {
   const auto result = test::run(kProgram, {"--help"});
   EXPECT_EQ(result.exit_code, 0);
-  for (const char* command : {"ct", "phantom", "info"}) EXPECT_NE(result.out.find(command), std::string::npos);
+  for (const char* command : {"ct", "phantom", "info", "series"}) EXPECT_NE(result.out.find(command), std::string::npos);
 }
 
 TEST_F(Program, MakesAPhantomAndReportsIt) {
@@ -100,7 +103,78 @@ TEST_F(Program, WrongSeriesAreOneSentence) {
   for (const fs::path& file : files) remove_tag(file, 0x7fe0, 0x0010);
   expect_refused({"ct", path("series"), "--out", path("case")}, "no pixel data", folder_);
   for (const fs::path& file : files) set_tag(file, 0x0008, 0x0060, "MR");
-  expect_refused({"ct", path("series"), "--out", path("case")}, "not CT", folder_);
+  expect_refused({"ct", path("series"), "--out", path("case")}, "MR images", folder_);
+}
+
+// Two series and a letter on one disc.
+void write_disc(const fs::path& folder) {
+  fs::create_directories(folder);
+  ASSERT_NO_FATAL_FAILURE(write_small_series(folder / "A"));
+  const auto scan = scan_phantom({.kind = PhantomKind::block, .layers = {{9.0, 1.5}}, .width_mm = 6.0}, 1.0, keep_going);
+  ASSERT_TRUE(scan);
+  ASSERT_TRUE(write_dicom_series(*scan, folder / "B", keep_going));
+  for (const fs::path& file : files_of(folder / "B")) {
+    set_tag(file, 0x0008, 0x103e, "Block 1.0 H60s");
+    set_tag(file, 0x0020, 0x0011, "2");
+    set_tag(file, 0x0010, 0x0010, "Surname^Forename");
+  }
+  std::ofstream(folder / "README.txt") << "Insert the disc.\n";
+}
+
+TEST_F(Program, ImportsTheLargestSeriesOfADiscAndSaysSo) {
+  ASSERT_NO_FATAL_FAILURE(write_disc(folder_ / "disc"));
+  ASSERT_NO_FATAL_FAILURE(write_archive(folder_ / "disc", folder_ / "disc.zip", "zip"));
+  fs::create_directory(folder_ / "tmp");
+  const auto listed = test::run(kProgram, {"series", path("disc.zip")}, 60s, {.environment = {{"TMPDIR", path("tmp")}}});
+  ASSERT_EQ(listed.exit_code, 0) << listed.err;
+  EXPECT_EQ(listed.err, "");
+  EXPECT_NE(listed.out.find("2          \"Block 1.0 H60s\", "), std::string::npos) << listed.out;
+  EXPECT_NE(listed.out.find("taken      2; ct --series N takes another\nskipped    1 file that is not DICOM\n"),
+            std::string::npos)
+      << listed.out;
+
+  const auto made =
+      test::run(kProgram, {"ct", path("disc.zip"), "--out", path("case")}, 60s, {.environment = {{"TMPDIR", path("tmp")}}});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_NE(made.out.find("series     2 of 2: \"Block 1.0 H60s\", "), std::string::npos) << made.out;
+  EXPECT_NE(made.out.find("also       1: no description, "), std::string::npos) << made.out;
+  EXPECT_TRUE(files_of(folder_ / "tmp").empty());
+  EXPECT_EQ(made.out.find("Surname"), std::string::npos);
+  std::ifstream in(folder_ / "case" / "case.json");
+  const std::string kept{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_EQ(kept.find("Block"), std::string::npos) << kept;
+
+  const auto other = test::run(kProgram, {"ct", path("disc"), "--out", path("other"), "--series", "1"});
+  ASSERT_EQ(other.exit_code, 0) << other.err;
+  const auto first = Case::load(path("other"));
+  const auto second = Case::load(path("case"));
+  ASSERT_TRUE(first && second);
+  EXPECT_LT(first->volume_mm3(), 0.5 * second->volume_mm3());
+}
+
+TEST_F(Program, ListsSeriesForPrograms) {
+  ASSERT_NO_FATAL_FAILURE(write_disc(folder_ / "disc"));
+  const auto listed = test::run(kProgram, {"series", path("disc"), "--json"});
+  ASSERT_EQ(listed.exit_code, 0) << listed.err;
+  const auto report = nlohmann::json::parse(listed.out);
+  EXPECT_EQ(report.at("taken"), 2);
+  EXPECT_EQ(report.at("series").size(), 2u);
+  EXPECT_EQ(report.at("series")[1].at("description"), "Block 1.0 H60s");
+  EXPECT_EQ(report.at("skipped")[0].at("kind"), "file that is not DICOM");
+}
+
+TEST_F(Program, WrongSeriesNumbersAreOneSentence) {
+  ASSERT_NO_FATAL_FAILURE(write_disc(folder_ / "disc"));
+  expect_refused({"ct", path("disc"), "--series", "7", "--out", path("case")},
+                 "has the series 1 to 2; osteon-import series lists them", folder_);
+  expect_refused({"ct", path("disc"), "--series", "x", "--out", path("case")}, "--series", folder_);
+  ASSERT_NO_FATAL_FAILURE(write_inv3(folder_ / "a.inv3", {}));
+  expect_refused({"ct", path("a.inv3"), "--series", "1", "--out", path("case")}, "InVesalius", folder_);
+  expect_refused({"series", path("a.inv3")}, "InVesalius", folder_);
+  expect_refused({"series", path("absent")}, path("absent"), folder_);
+  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  expect_refused({"ct", path("pipe"), "--out", path("case")}, "is a pipe or device", folder_);
+  expect_refused({"series", path("pipe")}, path("pipe"), folder_);
 }
 
 TEST_F(Program, WrongUsageIsOneSentence) {
@@ -183,6 +257,24 @@ void expect_stopped(const std::vector<std::string>& arguments, int percent, cons
   EXPECT_NE(process.err().find("osteon-import: stopped"), std::string::npos) << process.err();
   EXPECT_EQ(process.out(), "");
   EXPECT_EQ(files_of(folder.path()), before);
+}
+
+// While a large archive is unpacked, no folder of it stays behind.
+TEST_F(Program, CtrlCWhileUnpackingLeavesNothing) {
+  const auto volume = numbered_volume(700, 700, 140);
+  ASSERT_TRUE(write_dicom_series(volume, folder_ / "disc" / "series", keep_going));
+  ASSERT_NO_FATAL_FAILURE(write_archive(folder_ / "disc", folder_ / "disc.iso", "iso9660"));
+  fs::create_directory(folder_ / "tmp");
+  for (const int number : {SIGINT, SIGTERM}) {
+    test::Process process(kProgram, {"ct", path("disc.iso"), "--out", path("case"), "--pitch", "2"},
+                          {.environment = {{"TMPDIR", path("tmp")}}});
+    ASSERT_TRUE(process.wait_for_percent(1, 60s)) << "too quick to be stopped: " << process.err();
+    process.signal(number);
+    EXPECT_EQ(process.wait(60s), 130);
+    EXPECT_EQ(process.out(), "");
+    EXPECT_TRUE(files_of(folder_ / "tmp").empty());
+    EXPECT_FALSE(fs::exists(folder_ / "case"));
+  }
 }
 
 TEST_F(Program, CtrlCLeavesNothing) {

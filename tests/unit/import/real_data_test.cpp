@@ -1,4 +1,6 @@
 // Real scans: the skull of Debian's invesalius-examples and what lies in the shared data folder, where they are there.
+#include <map>
+
 #include "common/geometry/mesh_file.hpp"
 #include "server/import/ct_import.hpp"
 #include "server/import/dicom_reader.hpp"
@@ -183,7 +185,71 @@ TEST_F(SharedScans, EveryTransferSyntaxGivesTheReferencesValuesOrIsRefused) {
   EXPECT_GE(compared, 12);
 }
 
+// The library decodes what is there and leaves the rest as it likes.
+TEST_F(SharedScans, ACutOffSliceOfAnyTransferSyntaxIsRefused) {
+  for (const auto& entry : fs::directory_iterator(data_ / "dicom-tricky" / "transfer-syntaxes")) {
+    const test::TempDir folder;
+    for (const char* name : {"a.dcm", "b.dcm"}) {
+      fs::copy(entry.path(), folder / name);
+      fs::permissions(folder / name, fs::perms::owner_write, fs::perm_options::add);
+    }
+    set_tag(folder / "b.dcm", 0x0020, 0x0032, "-161.399994\\-148.800003\\6.7");
+    truncate_file(folder / "a.dcm", 0.9);
+    const auto scan = read_dicom_series(folder.path(), keep_going);
+    ASSERT_FALSE(scan) << entry.path();
+    expect_one_sentence(scan.error(), folder.path().string());
+  }
+}
+
+TEST_F(SharedScans, ATroubledFolderIsListedAndCounted) {
+  const auto report = list_dicom_series(data_ / "dicom-tricky", keep_going);
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_EQ(report->taken, 0);
+  EXPECT_EQ(report->series.size(), 5u);
+  EXPECT_EQ(report->skipped.text(),
+            "1 localizer, 1 structured report, 2 segmentations, 4 MR images, 1 US image, 7 copies of other files, 1 file that is "
+            "not DICOM");
+  EXPECT_NE(list_text(*report).find("\"STEREOTAXIS\", 3 slices, 512x512, 0.482x0.482x2.37 mm, oblique, kernel UB (cannot be "
+                                    "imported: sheared by 18.5 degrees"),
+            std::string::npos)
+      << list_text(*report);
+}
+
+TEST_F(SharedScans, RawSlicesAreNoDicom) {
+  expect_refused(data_ / "headsq-raw", "holds no DICOM files: 94 files that are not DICOM");
+}
+
+// Two hospitals on one disc: neither hides the other.
+TEST_F(SharedScans, TwoRealSeriesInSubfolders) {
+  const test::TempDir folder;
+  fs::create_directory_symlink(data_ / "nowhere", folder / "link");
+  fs::copy(data_ / "tibia-dicom", folder / "A");
+  fs::copy(data_ / "body-j2k-dicom", folder / "B");
+  const auto legs = read_dicom_series(folder.path(), keep_going);
+  ASSERT_TRUE(legs) << legs.error().message;
+  EXPECT_EQ(legs->volume.dims, (std::array<int, 3>{512, 512, 46}));
+  const auto plain = read_dicom_series(data_ / "tibia-dicom", keep_going);
+  ASSERT_TRUE(plain);
+  EXPECT_EQ(legs->volume.values, plain->volume.values);
+  ASSERT_EQ(legs->report.series.size(), 2u);
+  const auto trunk = read_dicom_series(folder.path(), {.series = 3 - legs->report.taken}, keep_going);
+  ASSERT_TRUE(trunk) << trunk.error().message;
+  EXPECT_EQ(trunk->volume.dims, (std::array<int, 3>{512, 512, 20}));
+}
+
 TEST_F(SharedScans, EachOddFileAloneIsOneSentence) {
+  const std::map<std::string, std::string> words = {{"CT0012.fragmented_no_bot_jpeg_baseline.51.dcm", "holds 2 frames"},
+                                                    {"bad_sequence.dcm", "single slice"},
+                                                    {"eCT_Supplemental.dcm", "holds 2 frames"},
+                                                    {"emri_small_RLE.dcm", "1 MR image"},
+                                                    {"emri_small_big_endian.dcm", "1 MR image"},
+                                                    {"emri_small_jpeg_2k_lossless_too_short.dcm", "1 MR image"},
+                                                    {"emri_small_jpeg_ls_lossless.dcm", "1 MR image"},
+                                                    {"explicit_VR-UN.dcm", "single slice"},
+                                                    {"liver_deflate.dcm", "1 segmentation"},
+                                                    {"liver_rle.dcm", "1 segmentation"},
+                                                    {"no-pixel-data.dcm", "1 structured report"},
+                                                    {"no-pixel-spacing.dcm", "1 US image"}};
   int refused = 0;
   for (const auto& entry : fs::directory_iterator(data_ / "dicom-tricky" / "structure")) {
     const test::TempDir folder;
@@ -191,6 +257,8 @@ TEST_F(SharedScans, EachOddFileAloneIsOneSentence) {
     const auto scan = read_dicom_series(folder.path(), keep_going);
     ASSERT_FALSE(scan) << entry.path();
     expect_one_sentence(scan.error(), folder.path().string());
+    const auto word = words.find(entry.path().filename().string());
+    if (word != words.end()) expect_one_sentence(scan.error(), word->second);
     ++refused;
   }
   EXPECT_GE(refused, 12);

@@ -1,0 +1,41 @@
+// What the header of a DICOM file says, before its pixels are read.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/import/packed.hpp"
+#include "server/import/skipped_files.hpp"
+
+namespace osteon::import {
+
+struct DicomHeader {
+  std::size_t file = 0;  // among those found
+  std::uint64_t bytes = 0;
+  std::uint64_t pixel_offset = 0;  // of the value of the pixel data; 0 in a deflated file
+  FileKind kind = FileKind::damaged;
+  std::string modality;
+
+  // Of a CT slice, and of one without pixels.
+  std::string series, instance, transfer_syntax, photometric, image_type;
+  std::string description, kernel;  // as they may be shown
+  int series_number = 0, acquisition = 0, temporal_position = 0;
+  int frames = 1;
+  int columns = 0, rows = 0;
+  int bits_allocated = 0, bits_stored = 0, samples = 1;
+  std::vector<double> position, orientation, spacing, slope, intercept;
+
+  void pack(Packer& to) const;
+  bool unpack(Unpacker& from);
+};
+
+// The library may abort on a damaged file: call it in a process that may die.
+[[nodiscard]] DicomHeader read_header(const std::filesystem::path& file);
+
+// Kind by SOP class, modality and image type, as for a file whose pixels are there.
+[[nodiscard]] FileKind kind_of(std::string_view sop_class, std::string_view modality, std::string_view image_type);
+
+}  // namespace osteon::import

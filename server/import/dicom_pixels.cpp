@@ -1,0 +1,93 @@
+#include "server/import/dicom_pixels.hpp"
+
+#include <gdcmImageReader.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <fstream>
+#include <new>
+#include <vector>
+
+namespace osteon::import {
+namespace {
+
+namespace fs = std::filesystem;
+
+const gdcm::Tag kPixelData(0x7fe0, 0x0010);
+
+std::uint32_t little_endian(const unsigned char* bytes, int count) {
+  std::uint32_t value = 0;
+  for (int i = count - 1; i >= 0; --i) value = value << 8 | bytes[i];
+  return value;
+}
+
+// The library takes a file that ends within its pixels for a whole one and leaves the rest zero.
+bool pixels_are_whole(const DicomHeader& h, const fs::path& file, std::uint64_t plain_bytes) {
+  if (h.pixel_offset == 0) return true;  // deflated: the stream itself knows its end
+  const bool is_plain = h.transfer_syntax.empty() || h.transfer_syntax == "1.2.840.10008.1.2" ||
+                        h.transfer_syntax.starts_with("1.2.840.10008.1.2.1") || h.transfer_syntax == "1.2.840.10008.1.2.2";
+  if (is_plain) return h.pixel_offset + plain_bytes <= h.bytes;
+  // Compressed pixels are items, each with its length; the last has none.
+  std::ifstream in(file, std::ios::binary);
+  std::uint64_t at = h.pixel_offset;
+  while (at + 8 <= h.bytes) {
+    std::array<unsigned char, 8> item{};
+    in.seekg(static_cast<std::streamoff>(at));
+    if (!in.read(reinterpret_cast<char*>(item.data()), item.size())) return false;
+    if (little_endian(item.data(), 2) != 0xfffe || little_endian(item.data() + 2, 2) != 0xe000) return true;
+    at += 8 + little_endian(item.data() + 4, 4);
+  }
+  return at <= h.bytes;
+}
+
+}  // namespace
+
+Result<void> read_pixels(const DicomHeader& h, const fs::path& file, const std::string& name, std::span<std::int16_t> out) try {
+  const auto broken = [&](const std::string& why) {
+    return failure(ErrorCode::invalid_input, name + " " + why + "; copy or export the series again");
+  };
+  gdcm::ImageReader reader;
+  reader.SetFileName(file.c_str());
+  const bool read = reader.Read();
+  if (!reader.GetFile().GetDataSet().FindDataElement(kPixelData)) return broken("has no pixel data");
+  if (!read) return broken("has pixel data that cannot be read");
+  const gdcm::Image& image = reader.GetImage();
+  const std::size_t pixels = out.size();
+  const std::size_t width = image.GetPixelFormat().GetBitsAllocated() / 8u;
+  if ((width != 1 && width != 2) || image.GetBufferLength() != pixels * width)
+    return broken("has pixel data of another size than its header says");
+  if (!pixels_are_whole(h, file, pixels * width)) return broken("is cut off within its pixel data");
+  // Some scanners write metal beyond the range that BitsStored promises. The library would cut those bits off and so
+  // turn metal into air; plain pixels are therefore taken as they lie in the file.
+  std::vector<char> buffer(image.GetBufferLength());
+  const gdcm::TransferSyntax syntax = reader.GetFile().GetHeader().GetDataSetTransferSyntax();
+  const gdcm::ByteValue* bytes = image.GetDataElement().GetByteValue();
+  const bool plain =
+      (syntax == gdcm::TransferSyntax::ImplicitVRLittleEndian || syntax == gdcm::TransferSyntax::ExplicitVRLittleEndian) &&
+      image.GetNumberOfOverlays() == 0 && bytes != nullptr && bytes->GetLength() >= buffer.size();
+  if (plain)
+    std::memcpy(buffer.data(), bytes->GetPointer(), buffer.size());
+  else if (!image.GetBuffer(buffer.data()))
+    return broken("has pixel data that cannot be decompressed");
+
+  // Signed values may lack their sign in the bits above the stored ones.
+  const bool is_signed = image.GetPixelFormat().GetPixelRepresentation() == 1;
+  const int unused = is_signed ? 16 - static_cast<int>(image.GetPixelFormat().GetBitsStored()) : 0;
+  for (std::size_t i = 0; i < pixels; ++i) {
+    std::uint16_t raw = static_cast<std::uint8_t>(buffer[i]);
+    if (width == 2) std::memcpy(&raw, buffer.data() + 2 * i, 2);
+    const int stored = is_signed ? static_cast<std::int16_t>(static_cast<std::uint16_t>(raw << unused)) >> unused : raw;
+    const double hu = stored * h.slope[0] + h.intercept[0];
+    out[i] = static_cast<std::int16_t>(std::lround(std::clamp(hu, -32768.0, 32767.0)));
+  }
+  return {};
+} catch (const std::bad_alloc&) {
+  return failure(ErrorCode::invalid_input, name + " has pixel data that take too much memory; copy or export the series again");
+} catch (const std::exception&) {
+  return failure(ErrorCode::invalid_input, name + " has pixel data that cannot be read; copy or export the series again");
+}
+
+}  // namespace osteon::import

@@ -1,0 +1,383 @@
+#include "server/import/dicom_series.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <map>
+#include <tuple>
+
+namespace osteon::import {
+namespace {
+
+constexpr int kLargestAxis = 1 << 14;
+constexpr double kMostVoxels = 4e9;
+constexpr double kThickest_mm = 1000.0;
+constexpr int kFewSlices = 8;                // fewer are no volume to operate on
+constexpr std::size_t kGroupsCompared = 64;  // of one UID; hostile files could have each slice differ
+
+using Slices = std::vector<DicomHeader>;
+
+Vec3 vec(const std::vector<double>& v, std::size_t first = 0) { return {v[first], v[first + 1], v[first + 2]}; }
+
+bool has_spacing(const DicomHeader& h) {
+  return h.spacing.size() == 2 && std::ranges::all_of(h.spacing, [](double mm) { return mm > 0.0 && mm <= kThickest_mm; });
+}
+bool has_orientation(const DicomHeader& h) { return h.orientation.size() == 6; }
+bool has_place(const DicomHeader& h) { return has_spacing(h) && has_orientation(h) && h.position.size() == 3; }
+
+// What sets the second apart from the first; nothing where both may be slices of one volume.
+const char* difference(const DicomHeader& a, const DicomHeader& b) {
+  if ((a.frames > 1) != (b.frames > 1)) return b.frames > 1 ? "several frames" : "a single frame";
+  if (a.columns != b.columns || a.rows != b.rows) return "another size";
+  if (a.samples != b.samples || a.photometric != b.photometric) return "other colours";
+  if (has_spacing(a) != has_spacing(b) ||
+      (has_spacing(a) && (std::abs(a.spacing[0] - b.spacing[0]) >= 1e-4 || std::abs(a.spacing[1] - b.spacing[1]) >= 1e-4)))
+    return "another pixel spacing";
+  if (has_orientation(a) != has_orientation(b)) return "another orientation";
+  if (has_orientation(a) && ((vec(a.orientation) - vec(b.orientation)).norm() >= 1e-3 ||
+                             (vec(a.orientation, 3) - vec(b.orientation, 3)).norm() >= 1e-3))
+    return "another orientation";
+  return nullptr;
+}
+
+// The same instance at the same place: a file that was copied. The largest is kept, as one may be cut off.
+Slices without_copies(Slices slices, SkippedFiles& skipped, const FoundFiles& found) {
+  std::map<std::tuple<std::string, std::string, std::vector<double>, int>, std::size_t> seen;
+  Slices kept;
+  for (DicomHeader& h : slices) {
+    if (h.instance.empty()) {
+      kept.push_back(std::move(h));
+      continue;
+    }
+    const auto [place, is_new] = seen.try_emplace({h.series, h.instance, h.position, h.acquisition}, kept.size());
+    if (is_new) {
+      kept.push_back(std::move(h));
+      continue;
+    }
+    DicomHeader& first = kept[place->second];
+    if (h.bytes > first.bytes) std::swap(first, h);
+    skipped.add(FileKind::copy, found.files[h.file].name);
+  }
+  return kept;
+}
+
+// Slices of one UID that may be of one volume.
+std::vector<Slices> alike(Slices slices) {
+  std::vector<Slices> groups;
+  for (DicomHeader& h : slices) {
+    const std::size_t compared = std::min(groups.size(), kGroupsCompared);
+    std::size_t at = 0;
+    while (at < compared && difference(groups[at].front(), h) != nullptr) ++at;
+    if (at == compared) at = groups.size(), groups.emplace_back();
+    groups[at].push_back(std::move(h));
+  }
+  // The largest first, and those without spacing or orientation last.
+  std::ranges::stable_sort(groups, std::greater{}, [](const Slices& g) {
+    return std::pair(has_spacing(g.front()) && has_orientation(g.front()), g.size());
+  });
+  // A slice that has lost its spacing or orientation must not vanish from its series without a word.
+  const auto is_lost = [](const Slices& g) { return !has_spacing(g.front()) || !has_orientation(g.front()); };
+  const std::size_t compared = std::min(groups.size(), kGroupsCompared);
+  std::vector<Slices> kept;
+  for (Slices& group : groups) {
+    const auto takes = [&](const Slices& g) {
+      const DicomHeader &a = g.front(), &b = group.front();
+      return !is_lost(g) && a.columns == b.columns && a.rows == b.rows && a.frames == b.frames;
+    };
+    const auto end = kept.begin() + static_cast<std::ptrdiff_t>(std::min(compared, kept.size()));
+    const auto whole = is_lost(group) ? std::find_if(kept.begin(), end, takes) : end;
+    if (whole != end)
+      std::ranges::move(group, std::back_inserter(*whole));
+    else
+      kept.push_back(std::move(group));
+  }
+  return kept;
+}
+
+Vec3 normal_of(const DicomHeader& h) { return vec(h.orientation).cross(vec(h.orientation, 3)); }
+
+bool places_repeat(const Slices& slices) {
+  if (!std::ranges::all_of(slices, has_place)) return false;
+  const Vec3 normal = normal_of(slices.front());
+  std::vector<double> along;
+  for (const DicomHeader& h : slices) along.push_back(normal.dot(vec(h.position)));
+  std::ranges::sort(along);
+  for (std::size_t i = 1; i < along.size(); ++i)
+    if (along[i] - along[i - 1] < 1e-3) return true;
+  return false;
+}
+
+// Parts a group whose places repeat, by the first mark that leaves no part with repeated ones.
+std::vector<Slices> parted(Slices slices) {
+  if (!places_repeat(slices)) return {std::move(slices)};
+  using Mark = std::function<std::string(const DicomHeader&)>;
+  const std::array<Mark, 4> marks = {[](const DicomHeader& h) { return std::to_string(h.acquisition); },
+                                     [](const DicomHeader& h) { return std::to_string(h.temporal_position); },
+                                     [](const DicomHeader& h) { return h.kernel; },
+                                     [](const DicomHeader& h) { return h.image_type; }};
+  for (const Mark& mark : marks) {
+    std::map<std::string, Slices> parts;
+    for (const DicomHeader& h : slices) parts[mark(h)].push_back(h);
+    const auto sound = [](const auto& part) { return part.second.size() >= 2 && !places_repeat(part.second); };
+    if (parts.size() < 2 || !std::ranges::all_of(parts, sound)) continue;
+    std::vector<Slices> groups;
+    for (auto& [value, part] : parts) groups.push_back(std::move(part));
+    return groups;
+  }
+  return {std::move(slices)};
+}
+
+// Makes the grid of one series, or says what is wrong with it.
+class Arranger {
+ public:
+  Arranger(CtSeries& series, const FoundFiles& found, std::string subject, std::function<std::string()> missing)
+      : series_(series), found_(found), subject_(std::move(subject)), missing_(std::move(missing)) {}
+
+  std::optional<SeriesFault> run() {
+    for (const DicomHeader& h : series_.slices)
+      if (auto fault = check(h)) return fault;
+    if (auto fault = axes()) return fault;
+    if (series_.slices.size() < 2)
+      return wrong("a single slice", subject_ + " holds a single slice; a volume needs at least two");
+    const double voxels = static_cast<double>(first().columns) * first().rows * static_cast<double>(series_.slices.size());
+    if (voxels > kMostVoxels)
+      return wrong("more than 4e9 voxels",
+                   subject_ + " has more than the 4e9 voxels that can be imported; export a part of it, or thicker slices");
+    return even_steps();
+  }
+
+ private:
+  [[nodiscard]] const DicomHeader& first() const { return series_.slices.front(); }
+  [[nodiscard]] std::string name(std::size_t slice) const {
+    return shown_text(found_.files[series_.slices[slice].file].name, 80);
+  }
+  static SeriesFault wrong(const std::string& brief, const std::string& sentence, ErrorCode code = ErrorCode::invalid_input) {
+    return {brief, {code, sentence}};
+  }
+
+  // One file alone; what it lacks is named as DICOM names it.
+  [[nodiscard]] std::optional<SeriesFault> check(const DicomHeader& h) const {
+    const std::string file = found_.shown(h.file);
+    const auto lacks = [&](const std::string& what) {
+      return wrong("no valid " + what, file + " has no valid " + what + "; export the series again as original CT slices");
+    };
+    const auto cannot = [&](const std::string& brief, const std::string& what) {
+      return wrong(brief, file + " " + what, ErrorCode::unsupported);
+    };
+    if (h.frames > 1)
+      return cannot("several frames in a file",
+                    "holds " + std::to_string(h.frames) + " frames; export the series with one file for each slice");
+    if (h.columns < 2 || h.rows < 2 || h.columns > kLargestAxis || h.rows > kLargestAxis)
+      return lacks("Rows and Columns (0028,0010-0011)");
+    if (h.samples != 1 || h.photometric != "MONOCHROME2")
+      return cannot("colours", "has colours (" + h.photometric + ") instead of Hounsfield units; export original CT slices");
+    if (h.bits_allocated != 8 && h.bits_allocated != 16)
+      return cannot("neither 8 nor 16 bits",
+                    "stores " + std::to_string(h.bits_allocated) + " bits for a pixel; only 8 and 16 can be read");
+    if (h.bits_stored < 1 || h.bits_stored > h.bits_allocated) return lacks("BitsStored (0028,0101)");
+    if (!has_spacing(h)) return lacks("PixelSpacing (0028,0030)");
+    if (h.position.size() != 3) return lacks("ImagePositionPatient (0020,0032)");
+    if (!has_orientation(h)) return lacks("ImageOrientationPatient (0020,0037)");
+    if (h.intercept.size() != 1 || h.slope.size() != 1 || h.slope[0] == 0.0)
+      return lacks("RescaleSlope and RescaleIntercept (0028,1052-1053)");
+    // Spectral selection and progression were retired from DICOM; decoders give noise without noticing.
+    if (h.transfer_syntax == "1.2.840.10008.1.2.4.53" || h.transfer_syntax == "1.2.840.10008.1.2.4.55")
+      return cannot("a retired compression",
+                    "uses a retired JPEG compression (" + h.transfer_syntax + "); export the series uncompressed or lossless");
+    return std::nullopt;
+  }
+
+  std::optional<SeriesFault> axes() {
+    const Vec3 across = vec(first().orientation).normalized();
+    Vec3 down = vec(first().orientation, 3).normalized();
+    const Vec3 normal = across.cross(down);
+    if (!across.allFinite() || !down.allFinite() || !(std::abs(across.dot(down)) <= 1e-3) || !(normal.norm() > 0.99))
+      return wrong("no valid ImageOrientationPatient (0020,0037)",
+                   found_.shown(first().file) +
+                       ": ImageOrientationPatient (0020,0037) is not two perpendicular directions; export the series again");
+    down = (down - across * across.dot(down)).normalized();
+    series_.grid.directions << across, down, across.cross(down);
+    return std::nullopt;
+  }
+
+  std::optional<SeriesFault> even_steps() {
+    const Vec3 normal = series_.grid.directions.col(2);
+    const auto along = [&](const DicomHeader& h) { return normal.dot(vec(h.position)); };
+    std::ranges::stable_sort(series_.slices, {}, along);
+    std::vector<double> places, gaps;
+    for (const DicomHeader& h : series_.slices) places.push_back(along(h));
+    for (std::size_t i = 1; i < places.size(); ++i) gaps.push_back(places[i] - places[i - 1]);
+    const double length_mm = places.back() - places.front();
+    const double step_mm = length_mm / static_cast<double>(gaps.size());
+    series_.entry.slice_mm = step_mm;
+
+    // A tilted gantry moves the slices sideways within their plane: a sheared volume.
+    const Vec3 travel = vec(series_.slices.back().position) - vec(first().position);
+    const double sideways_mm = (travel - normal * length_mm).norm();
+    char text[160];
+    if (sideways_mm > 0.5 * std::min(first().spacing[0], first().spacing[1])) {
+      std::snprintf(text, sizeof text, "sheared by %.1f degrees (tilted gantry)",
+                    std::atan2(sideways_mm, length_mm) * 180.0 / 3.14159265358979);
+      return wrong(text, subject_ + " is " + text + "; export it resampled to upright slices", ErrorCode::unsupported);
+    }
+    if (auto fault = check_gaps(places, gaps, step_mm)) return fault;
+    series_.grid.dims = {first().columns, first().rows, static_cast<int>(series_.slices.size())};
+    series_.grid.spacing_mm = {first().spacing[1], first().spacing[0], step_mm};
+    series_.grid.origin_mm = vec(first().position);
+    return std::nullopt;
+  }
+
+  // One missing slice opens a gap of two steps; a position written with one decimal must pass.
+  std::optional<SeriesFault> check_gaps(const std::vector<double>& places, const std::vector<double>& gaps, double step_mm) {
+    std::vector<double> sorted = gaps;
+    std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
+    const double usual_mm = sorted[sorted.size() / 2];
+    // The worst gap, or else the first slice that has drifted from where even steps would put it.
+    std::size_t at = gaps.size();
+    double worst_mm = 0.2 * usual_mm;
+    for (std::size_t i = 0; i < gaps.size(); ++i)
+      if (std::abs(gaps[i] - usual_mm) > worst_mm || gaps[i] < 1e-3) {
+        worst_mm = std::max(worst_mm, std::abs(gaps[i] - usual_mm));
+        at = i;
+      }
+    for (std::size_t i = 0; at == gaps.size() && i < gaps.size(); ++i)
+      if (std::abs(places[i + 1] - (places.front() + static_cast<double>(i + 1) * step_mm)) > 0.1 * step_mm) at = i;
+    if (at == gaps.size()) return std::nullopt;
+    series_.entry.slice_mm = usual_mm;
+    char brief[64], text[96];
+    std::snprintf(brief, sizeof brief, gaps[at] < 1e-3 ? "several slices at one place" : "a gap of %.3g mm", gaps[at]);
+    std::snprintf(text, sizeof text, " are %.3g mm apart where %.3g mm is usual", gaps[at], usual_mm);
+    return wrong(brief, subject_ + ": the slices " + name(at) + " and " + name(at + 1) + text +
+                            (gaps[at] > usual_mm ? missing_() : "") + "; add the missing slices or remove the doubled ones");
+  }
+
+  CtSeries& series_;
+  const FoundFiles& found_;
+  const std::string subject_;
+  const std::function<std::string()> missing_;  // what may belong into a gap
+};
+
+std::string plane_of(const DicomHeader& h) {
+  const Vec3 normal = has_orientation(h) ? Vec3(normal_of(h).cwiseAbs()) : Vec3::Zero();
+  if (!(normal.norm() > 0.5)) return {};
+  return normal.z() > 0.95 ? "axial" : normal.y() > 0.95 ? "coronal" : normal.x() > 0.95 ? "sagittal" : "oblique";
+}
+
+SeriesEntry entry_of(const Slices& slices) {
+  const DicomHeader& h = slices.front();
+  SeriesEntry entry;
+  entry.description = h.description;
+  entry.kernel = h.kernel;
+  entry.slices = static_cast<int>(slices.size());
+  entry.rows = h.rows;
+  entry.columns = h.columns;
+  entry.plane = plane_of(h);
+  if (has_spacing(h)) entry.row_mm = h.spacing[0], entry.column_mm = h.spacing[1];
+  return entry;
+}
+
+// Files that belong to a series by its UID and are none of its slices: what may be missing in a gap. `groups` and
+// `no_pixels` lie together by UID.
+std::string strangers(const std::vector<Slices>& groups, std::size_t at, const Slices& no_pixels, const FoundFiles& found,
+                      const SkippedFiles& skipped) {
+  const DicomHeader& own = groups[at].front();
+  std::string text;
+  int named = 0;
+  const auto add = [&](const std::string& name, const std::string& what) {
+    text += ", and " + shown_text(name, 80) + " " + what;
+    return ++named < 2;
+  };
+  for (auto h = std::ranges::lower_bound(no_pixels, own.series, {}, &DicomHeader::series);
+       h != no_pixels.end() && h->series == own.series; ++h)
+    if (!add(found.files[h->file].name, "has no pixel data")) return text;
+  std::size_t begin = at, end = at + 1;
+  while (begin > 0 && groups[begin - 1].front().series == own.series) --begin;
+  while (end < groups.size() && groups[end].front().series == own.series) ++end;
+  for (std::size_t i = begin; i < end; ++i) {
+    const DicomHeader& h = groups[i].front();
+    const char* what = i == at || groups[i].size() > groups[at].size() ? nullptr : difference(own, h);
+    if (what == nullptr) continue;
+    const std::string told = h.frames > 1 ? "holds " + std::to_string(h.frames) + " frames" : std::string("has ") + what;
+    if (!add(found.files[h.file].name, told)) return text;
+  }
+  for (const SkippedFiles::Count& c : skipped.counts())
+    if (c.kind == FileKind::damaged || c.kind == FileKind::unreadable)
+      for (const std::string& name : c.names)
+        if (!add(name, c.kind == FileKind::damaged ? "is damaged" : "cannot be opened")) return text;
+  return text;
+}
+
+double voxels(const CtSeries& s) { return static_cast<double>(s.entry.slices) * s.entry.rows * s.entry.columns; }
+
+// Nothing of CT: says what is there instead.
+Error no_series(const FoundFiles& found, const SkippedFiles& skipped) {
+  const std::string& input = found.input;
+  if (skipped.empty())
+    return {ErrorCode::invalid_input,
+            input + (found.archive ? " holds no files" : " is empty") + "; give the folder with the CT series"};
+  bool any_dicom = false;
+  for (const SkippedFiles::Count& c : skipped.counts()) any_dicom = any_dicom || c.kind < FileKind::damaged;
+  const bool only_archives = !any_dicom && skipped.count(FileKind::archive) > 0;
+  std::string what = skipped.text(false);
+  if (what.size() > 160) what = what.substr(0, what.rfind(", ", 160)) + " and more";
+  return {any_dicom ? ErrorCode::unsupported : ErrorCode::invalid_input,
+          input + (any_dicom ? " holds no CT series: " : " holds no DICOM files: ") + what +
+              (only_archives ? "; unpack what is inside and give the folder"
+               : any_dicom   ? "; only original CT slices, one in a file, can be imported"
+                             : "; give the folder with the CT series")};
+}
+
+}  // namespace
+
+std::vector<CtSeries> sort_series(std::vector<DicomHeader> headers, const FoundFiles& found, SkippedFiles& skipped) {
+  std::map<std::pair<int, std::string>, Slices> by_uid;
+  Slices no_pixels;
+  for (DicomHeader& h : headers) {
+    if (h.kind == FileKind::no_pixels) no_pixels.push_back(h);
+    if (h.kind == FileKind::ct_slice)
+      by_uid[{h.series_number, h.series}].push_back(std::move(h));
+    else
+      skipped.add(h.kind, found.files[h.file].name, h.kind == FileKind::other_modality ? h.modality : "");
+  }
+  std::ranges::stable_sort(no_pixels, {}, &DicomHeader::series);
+  std::vector<Slices> groups;
+  for (auto& [key, slices] : by_uid)
+    for (Slices& group : alike(without_copies(std::move(slices), skipped, found)))
+      for (Slices& part : parted(std::move(group))) groups.push_back(std::move(part));
+
+  std::vector<CtSeries> series(groups.size());
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    CtSeries& s = series[i];
+    s.slices = groups[i];
+    s.entry = entry_of(s.slices);
+    s.entry.number = static_cast<int>(i) + 1;
+    const std::string subject = groups.size() == 1 ? found.input : "series " + std::to_string(i + 1) + " of " + found.input;
+    s.fault = Arranger(s, found, subject, [&] { return strangers(groups, i, no_pixels, found, skipped); }).run();
+    if (s.fault) s.entry.problem = s.fault->brief;
+  }
+  return series;
+}
+
+Result<std::size_t> choose_series(const std::vector<CtSeries>& series, const FoundFiles& found, const SkippedFiles& skipped,
+                                  std::optional<int> number, std::optional<std::size_t> file) {
+  if (series.empty()) return tl::unexpected(no_series(found, skipped));
+  if (number) {
+    if (*number >= 1 && *number <= static_cast<int>(series.size())) return static_cast<std::size_t>(*number) - 1;
+    const std::string range = series.size() == 1 ? "only series 1" : "the series 1 to " + std::to_string(series.size());
+    return failure(ErrorCode::invalid_input, "--series " + std::to_string(*number) + ": " + found.input + " has " + range +
+                                                 "; osteon-import series lists them");
+  }
+  std::size_t largest = 0;
+  std::optional<std::size_t> best;
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    if (file && std::ranges::count(series[i].slices, *file, &DicomHeader::file) > 0) return i;
+    if (voxels(series[i]) > voxels(series[largest])) largest = i;
+    if (!series[i].fault && (!best || voxels(series[i]) > voxels(series[*best]))) best = i;
+  }
+  const bool whole = best && (series[*best].entry.slices >= kFewSlices || series[largest].entry.slices < kFewSlices);
+  return whole ? *best : largest;
+}
+
+}  // namespace osteon::import

@@ -1,0 +1,48 @@
+// The files of a scan's input: those of a folder, or those that an archive was unpacked to.
+#pragma once
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/core/result.hpp"
+#include "common/volume/iso_surface.hpp"
+#include "server/import/skipped_files.hpp"
+
+namespace osteon::import {
+
+struct FoundFile {
+  std::filesystem::path path;
+  std::string name;  // within the input, for people
+};
+
+struct FoundFiles {
+  std::string input;  // as it was given
+  bool archive = false;
+  std::vector<FoundFile> files;  // sorted by name
+  SkippedFiles skipped;          // what is no regular file
+
+  // "folder/inner/name", "archive.zip: inner/name"
+  [[nodiscard]] std::string shown(std::size_t file) const;
+};
+
+inline constexpr int kMostFiles = 200'000;
+inline constexpr int kMostLevels = 32;
+
+// Regular files of a folder and of those in it, `levels` deep. A link to a file is one; a link to a folder is not followed.
+// Errors: not_found, invalid_input (too many files), cancelled.
+[[nodiscard]] Result<FoundFiles> find_files(const std::filesystem::path& folder, int levels, const KeepGoing& keep_going);
+
+// What the first bytes of a file say it is.
+enum class Content { empty, dicom, archive, other };
+inline constexpr std::size_t kHeadBytes = 4096;
+// DICOM has its mark at byte 128, or, as old scanners wrote it, begins at once with several sound elements of group 2 or
+// 8: raw numbers are not taken for it. `head`: the first kHeadBytes, or all of a shorter file.
+[[nodiscard]] Content content_of(std::span<const unsigned char> head);
+
+// How a path can be read as a scan.
+enum class InputKind { absent, folder, archive, dicom_file, inv3, other };
+[[nodiscard]] InputKind input_kind(const std::filesystem::path& path, const KeepGoing& keep_going);
+
+}  // namespace osteon::import
