@@ -1,7 +1,10 @@
 // Real scans: the skull of Debian's invesalius-examples and what lies in the shared data folder, where they are there.
 #include <map>
 
+#include <fstream>
+
 #include "common/geometry/mesh_file.hpp"
+#include "server/import/carving.hpp"
 #include "server/import/ct_import.hpp"
 #include "server/import/dicom_reader.hpp"
 #include "server/import/inv3_reader.hpp"
@@ -74,6 +77,57 @@ TEST(Skull, ImportsToOneHash) {
     }
     hash = to_hex(bone->hash());
   }
+}
+
+// The script that README shows, with what it says: both steps take something from the skull, as osteon-import makes it.
+TEST(Skull, TheReadmesCarveScriptRemovesBone) {
+  const auto file = test::find_skull();
+  ASSERT_TRUE(file) << "Cranium.inv3 of the package invesalius-examples is not there; run deploy/install";
+  std::ifstream readme(test::source_dir() / "README.md");
+  std::string script, text;
+  for (bool found = false; std::getline(readme, text);) {
+    found = found || text == "    steps:";
+    if (found && !text.starts_with("    ")) break;
+    if (found) script += text.substr(4) + "\n";
+  }
+  ASSERT_NE(script.find("burr-round-5"), std::string::npos) << "README has no script";
+  const test::TempDir folder;
+  std::ofstream(folder / "script.yaml") << script;
+  const auto steps = read_carve_script(folder / "script.yaml");
+  ASSERT_TRUE(steps) << steps.error().message;
+  auto scan = read_inv3(*file, keep_going);
+  ASSERT_TRUE(scan);
+  auto bone = import_bone(std::move(*scan), {}, keep_going);
+  ASSERT_TRUE(bone);
+  Carving carving(std::move(*bone), 1.0);
+  ASSERT_EQ(steps->size(), 2u);
+  for (const CarveStep& step : *steps) {
+    const auto report = carving.run(step, keep_going);
+    ASSERT_TRUE(report);
+    EXPECT_GT(report->removed_mm3, 20.0) << report->tool;
+  }
+}
+
+// Of a tibia's outline nothing is void: in each slice of the shaft every sample that bone surrounds is bone.
+TEST(Tibia, HasItsMarrow) {
+  const auto shared = test::find_shared();
+  if (!shared || !fs::is_directory(*shared / "data" / "tibia-dicom")) GTEST_SKIP() << "no shared/data/tibia-dicom beside the checkout";
+  auto scan = read_dicom_series(*shared / "data" / "tibia-dicom", keep_going);
+  ASSERT_TRUE(scan);
+  const auto bone = import_bone(std::move(*scan), {}, keep_going);
+  ASSERT_TRUE(bone);
+  const CoordBox box = bone->bounds_samples();
+  std::int64_t within = 0, voids = 0;
+  for (int z = box.min.z + 8; z <= box.max.z - 8; z += 4)
+    for (int y = box.min.y; y <= box.max.y; ++y) {
+      int first = box.max.x + 1, last = box.min.x - 1;
+      const auto inside = [&](int x) { return bone->surface_mm(position_mm({x, y, z}, bone->pitch_mm())) < 0.0; };
+      for (int x = box.min.x; x <= box.max.x; ++x)
+        if (inside(x)) first = std::min(first, x), last = x;
+      for (int x = first; x <= last; ++x, ++within) voids += inside(x) ? 0 : 1;
+    }
+  ASSERT_GT(within, 1000);
+  EXPECT_LT(static_cast<double>(voids), 0.01 * static_cast<double>(within)) << "it was 28 % with a threshold alone";
 }
 
 class SharedScans : public ::testing::Test {
