@@ -201,6 +201,23 @@ TEST(HandTools, NoneThatCutsTakesMetal) {
   }
 }
 
+// Dragged over metal under pressure a bur neither cuts nor says that it does.
+TEST(HandTools, ABurDraggedOverMetalSendsNothing) {
+  const Tool bur = *find_tool("burr-round-5");
+  HandStage stage(block(0.5, 40.0, 12.0, [](const Vec3&) { return Tissue::metal; }), bur, held(bur));
+  stage.input_.spindle_rpm = bur.spindle_rpm;
+  stage.lead({0, 0, 1.4}, 0.5);
+  EXPECT_NE(stage.lead(Vec3::Zero(), 0.1).events & kOnMetal, 0u);
+  const std::size_t before = stage.cuts_.size();
+  const Vec3 from = stage.tick().pose_bone_proxy.position_mm;
+  const LoopReport dragged = stage.lead({4, 2, 0}, 0.5);
+  EXPECT_GT((dragged.pose_bone_proxy.position_mm - from).norm(), 3.0);
+  EXPECT_GT(-dragged.force_physical_n.z(), 20.0);
+  EXPECT_EQ(stage.cuts_.size(), before);
+  EXPECT_EQ(stage.cutting_, 0);
+  EXPECT_EQ(stage.replica_.removed_mm3(), 0.0);
+}
+
 // A bur in its groove that a hand rocks hard, by 9 degrees 1.5 times a second: turning cuts nothing and lifts it out, its
 // coupling cuts it in again. Where a tick does more of the first it rubs; but what was cut in it took its work.
 TEST(HandTools, ARockedBurIsPushedBackAndCutsAgain) {
