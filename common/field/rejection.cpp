@@ -21,6 +21,7 @@ std::string_view sentence(Rejection reason) {
     case Rejection::taken: return "an instructor holds this hand's tool";
     case Rejection::forbidden_tool: return "an instructor lets this hand cut with other tools only";
     case Rejection::zone: return "an instructor lets this hand cut in another place only";
+    case Rejection::metal: return "the cut would take metal away";
   }
   return "the reason is unknown";
 }

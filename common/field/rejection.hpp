@@ -24,8 +24,9 @@ enum class Rejection : std::uint8_t {
   taken = 14,     // an instructor holds the hand's tool
   forbidden_tool = 15,  // an instructor allows the hand other tools
   zone = 16,      // outside where an instructor lets the hand cut
+  metal = 17,     // it would take metal away
 };
-inline constexpr int kRejections = 17;
+inline constexpr int kRejections = 18;
 [[nodiscard]] std::string_view sentence(Rejection reason);
 
 }  // namespace osteon

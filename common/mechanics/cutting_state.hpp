@@ -25,6 +25,7 @@ struct CuttingState {
   double depth_mm = 0;             // of the tip from the entry of the step under way, along the axis of its site;
                                    // negative before the bone, 0 before the first step
   CuttingPhase phase = CuttingPhase::idle;
+  bool on_metal = false;           // it turns, and metal is in its way: it cuts nothing
 };
 
 }  // namespace osteon

@@ -33,6 +33,7 @@ void gather_block(const Field& field, const SurfaceBlocks& blocks, const BlockKe
   out.covered = blocks.covered(key);
   out.seams = {};
   out.uncut = false;
+  out.tissue.clear();
   if (out.covered == kWhollyCovered) return;
   out.seams = blocks.seams(key);
   const auto solid = [&](int level, const CoordBox& box, std::span<float> to) { field.gather_solid(level, box, to); };
@@ -51,6 +52,15 @@ void gather_block(const Field& field, const SurfaceBlocks& blocks, const BlockKe
   } else {
     gather_level(solid, key.level, box, out.solid_mm);
     gather_level(surface, key.level, box, out.surface_mm);
+  }
+  // The samples of level 0 that samples of this level are nearest to.
+  const int level = key.level;
+  const Coord beyond{1, 1, 1};
+  const CoordBox at_h = level >= 0 ? CoordBox{shift_down(box.min, level), shift_down(box.max, level) + beyond}
+                                   : CoordBox{(1 << -level) * box.min, (1 << -level) * box.max};
+  if (field.bone().has_hard(at_h)) {
+    out.tissue.resize(out.solid_mm.size());
+    field.bone().gather_hard(level, box, out.tissue);
   }
   std::array<bool, kSeamSteps + 1> meets{};
   for (const std::uint8_t steps : out.seams.coarser) meets[steps] = true;

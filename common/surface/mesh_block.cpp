@@ -16,9 +16,12 @@ namespace osteon {
 namespace {
 
 // Payload: flags; the covered groups and the seams where there are any; the solid bits as below; then for each vertex in
-// the order of the contour its place along the edge, its normal, and one cut bit where vertices differ in it.
+// the order of the contour its place along the edge, its normal, one cut bit where vertices differ in it, and two bits of
+// tissue where any is metal or enamel.
 constexpr int kN = kBlockSamples;
-constexpr std::uint8_t kHasCovered = 1, kHasSeams = 2, kAllCut = 4, kSomeCut = 8, kFlags = 15;
+constexpr std::uint8_t kHasCovered = 1, kHasSeams = 2, kAllCut = 4, kSomeCut = 8, kHasTissue = 16, kFlags = 31;
+// Two bits of a vertex; what they say is in kTissues.
+constexpr std::array kTissues{Tissue::none, Tissue::metal, Tissue::enamel};
 constexpr std::size_t kGathered = static_cast<std::size_t>(kBlockApron) * kBlockApron * kBlockApron;
 
 // Solid bits go row by row, x slowest, as the difference from what the three rows before suggest: a plane continues. One
@@ -202,6 +205,7 @@ struct Vertex {
   int place = 0;  // along its edge, 252ths
   std::array<float, 3> gradient{};
   bool cut = false;
+  Tissue tissue = Tissue::none;
 };
 
 // The field around one block, its contour, and the vertices on it.
@@ -220,6 +224,8 @@ class Mesher {
     samples_ = &samples;
     raw_ = field_ = solid.data();
     surface_ = surface.data();
+    OSTEON_CHECK(samples.tissue.empty() || samples.tissue.size() == kGathered);
+    tissue_ = samples.tissue.empty() ? nullptr : samples.tissue.data();
     rule_ = SeamRule(seams);
     if (rule_.any()) {
       std::ranges::copy(solid, ruled_.begin());
@@ -258,6 +264,7 @@ class Mesher {
         vertex.place = edge_place(field[a], field[b]);
         vertex.gradient = gradient_between(raw + a, raw + b, t, kSlab, kRow);
         vertex.cut = surface[a] + t * (surface[b] - surface[a]) < below_surface;
+        if (tissue_) vertex.tissue = tissue_[field[a] < 0.0f ? a : b];
       }
       visit(v, x, y, z, axis, vertex);
     });
@@ -282,6 +289,7 @@ class Mesher {
     const float t = fa / (fa - fb);
     vertex.place = std::clamp(cells * edge_place(fa, fb) - kEdgePlaces * (at[axis] - from[axis]), 0, kEdgePlaces);
     vertex.cut = surface_[a] + t * (surface_[b] - surface_[a]) < static_cast<float>(cells) * below_surface;
+    if (tissue_) vertex.tissue = tissue_[fa < 0.0f ? a : b];
     // The coarse level's own gradient, as its block has it.
     const std::vector<float>& coarse = samples_->coarse_mm[static_cast<std::size_t>(steps - 1)];
     const auto side = static_cast<std::size_t>(kBlockCells / cells + 3);
@@ -297,6 +305,7 @@ class Mesher {
   const float* raw_ = nullptr;      // as gathered
   const float* field_ = nullptr;    // with the seams' contour
   const float* surface_ = nullptr;
+  const Tissue* tissue_ = nullptr;  // null: none at all
   SeamRule rule_{Seams{}};
   SolidRows rows_{};
   std::array<float, kGathered> ruled_;
@@ -327,6 +336,7 @@ BlockPayload encode(Mesher& at, CoveredGroups covered, const Seams& seams, doubl
   std::uint8_t* normals = places + count;
   std::uint8_t* cuts = normals + 2 * count;
   std::size_t cut = 0;
+  bool hard = false;
   at.for_vertices(level_pitch_mm, [&](std::size_t v, unsigned, unsigned, unsigned, unsigned, const Vertex& vertex) {
     places[v] = static_cast<std::uint8_t>(vertex.place);
     const auto normal = encode_normal(vertex.gradient);
@@ -334,9 +344,20 @@ BlockPayload encode(Mesher& at, CoveredGroups covered, const Seams& seams, doubl
     normals[2 * v + 1] = normal[1];
     if (vertex.cut) cuts[v / 8] = static_cast<std::uint8_t>(cuts[v / 8] | 1 << (v % 8));
     cut += vertex.cut;
+    hard |= vertex.tissue != Tissue::none;
   });
   if (cut == 0 || cut == count)
     bytes.resize(bytes.size() - cut_bytes);
+  if (hard) {
+    const std::size_t begin = bytes.size();
+    bytes.resize(begin + (count + 3) / 4);
+    at.for_vertices(level_pitch_mm, [&](std::size_t v, unsigned, unsigned, unsigned, unsigned, const Vertex& vertex) {
+      const auto bits = static_cast<unsigned>(std::ranges::find(kTissues, vertex.tissue) - kTissues.begin());
+      std::uint8_t& four = bytes[begin + v / 4];
+      four = static_cast<std::uint8_t>(four | bits << (v % 4 * 2));
+    });
+    bytes[0] |= kHasTissue;
+  }
   bytes[0] = static_cast<std::uint8_t>(bytes[0] | (cut == 0 ? 0 : cut == count ? kAllCut : kSomeCut));
   return payload;
 }
@@ -398,6 +419,7 @@ void mesh_block(const BlockSamples& samples, Mesh& mesh) {
   mesh.positions_mm.resize(count);
   mesh.normals.resize(count);
   mesh.cut_face.resize(count);
+  mesh.tissue.resize(samples.tissue.empty() ? 0 : count);
   mesh.triangles.clear();
   if (!any) return;
   const Places places(samples.key, samples.level_pitch_mm);
@@ -405,6 +427,7 @@ void mesh_block(const BlockSamples& samples, Mesh& mesh) {
     places.put(x, y, z, axis, vertex.place, mesh.positions_mm[v]);
     mesh.normals[v] = vertex.gradient;
     mesh.cut_face[v] = vertex.cut;
+    if (!mesh.tissue.empty()) mesh.tissue[v] = vertex.tissue;
   });
   // Roots and quotients several at a time.
   static thread_local std::array<float, 3 * kBlockSampleCount> scales;
@@ -451,12 +474,17 @@ Result<Mesh> decode_block(const BlockKey& key, const BlockPayload& payload, doub
   const auto edges = contour.vertex_edges();
   const std::size_t count = edges.size();
   const bool some_cut = (flags & kSomeCut) != 0;
-  if (bytes.size() != 3 * count + (some_cut ? (count + 7) / 8 : 0)) return broken("does not fit its " + std::to_string(count) + " vertices");
-  const auto place_bytes = bytes.first(count), normals = bytes.subspan(count, 2 * count), cuts = bytes.subspan(3 * count);
+  const bool has_tissue = (flags & kHasTissue) != 0;
+  const std::size_t cut_bytes = some_cut ? (count + 7) / 8 : 0, tissue_bytes = has_tissue ? (count + 3) / 4 : 0;
+  if (bytes.size() != 3 * count + cut_bytes + tissue_bytes)
+    return broken("does not fit its " + std::to_string(count) + " vertices");
+  const auto place_bytes = bytes.first(count), normals = bytes.subspan(count, 2 * count);
+  const auto cuts = bytes.subspan(3 * count, cut_bytes), tissues = bytes.last(tissue_bytes);
 
   mesh.positions_mm.resize(count);
   mesh.normals.resize(count);
   mesh.cut_face.resize(count);
+  mesh.tissue.resize(has_tissue ? count : 0);
   const Places places(key, level_pitch_mm);
   for (std::size_t v = 0; v < count; ++v) {
     if (place_bytes[v] > kEdgePlaces) return broken("has a vertex beyond its edge");
@@ -464,6 +492,10 @@ Result<Mesh> decode_block(const BlockKey& key, const BlockPayload& payload, doub
     places.put(sample / (kN * kN), sample / kN % kN, sample % kN, axis, place_bytes[v], mesh.positions_mm[v]);
     mesh.normals[v] = decode_normal(normals[2 * v], normals[2 * v + 1]);
     mesh.cut_face[v] = some_cut ? cuts[v / 8] >> (v % 8) & 1 : (flags & kAllCut) != 0;
+    if (!has_tissue) continue;
+    const std::size_t bits = tissues[v / 4] >> (v % 4 * 2) & 3u;
+    if (bits >= kTissues.size()) return broken("has a tissue that does not exist");
+    mesh.tissue[v] = kTissues[bits];
   }
   mesh.triangles.reserve(2 * count);
   contour.for_triangles([&](std::uint32_t a, std::uint32_t b, std::uint32_t c) { mesh.triangles.push_back({a, b, c}); });

@@ -10,6 +10,7 @@
 #include "common/core/digest.hpp"
 #include "common/core/id.hpp"
 #include "common/core/result.hpp"
+#include "common/field/tissue.hpp"
 #include "common/geometry/lattice.hpp"
 
 namespace osteon {
@@ -35,6 +36,7 @@ struct Mesh {
   std::vector<std::array<float, 3>> positions_mm;
   std::vector<std::array<float, 3>> normals;
   std::vector<std::uint8_t> cut_face;  // 1 where the vertex lies on a cut, 0 on the imported surface
+  std::vector<Tissue> tissue;          // metal, enamel, or none for all else, of each vertex; empty: none at all
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
@@ -57,6 +59,7 @@ struct BlockSamples {
   std::vector<float> solid_mm;     // f on block_samples(key), negative where bone is left
   std::vector<float> surface_mm;   // S on the same samples: a vertex below the imported surface lies on a cut face
   bool uncut = false;              // solid_mm is S as well, and surface_mm is not read
+  std::vector<Tissue> tissue;      // metal, enamel or none on the same samples; empty: none at all
   CoveredGroups covered = 0;       // kWhollyCovered: the block is not drawn, and nothing else here is read
   Seams seams;
   // For each number of levels that seams has: f on coarse_samples(key, steps), for the normals on that seam.

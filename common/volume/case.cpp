@@ -24,6 +24,7 @@ struct Case::Grids {
   SparseVolume surface, density, clearance, bone, tissue;
   CoordBox bounds;
   double volume_mm3 = 0.0;
+  std::vector<Coord> metal_leaves, hard_leaves;  // of `tissue`, sorted
 };
 
 namespace {
@@ -174,6 +175,34 @@ bool has_inside(const Case::Grids& grids) {
   return !grids.surface.constants().empty() || std::ranges::any_of(grids.surface.leaves(), inside);
 }
 
+// Where metal and enamel are, which follows from the tissue.
+void find_hard_leaves(Case::Grids& grids) {
+  constexpr auto kMetal = static_cast<float>(Tissue::metal), kEnamel = static_cast<float>(Tissue::enamel);
+  const auto note = [&](Coord origin, std::span<const float> leaf) {
+    const bool metal = std::ranges::find(leaf, kMetal) != leaf.end();
+    if (metal) grids.metal_leaves.push_back(origin);
+    if (metal || std::ranges::find(leaf, kEnamel) != leaf.end()) grids.hard_leaves.push_back(origin);
+  };
+  for (const Coord origin : grids.tissue.leaves()) note(origin, std::span(grids.tissue.leaf(origin), kLeafVoxels));
+  for (const Coord origin : grids.tissue.constants()) {
+    const float value = grids.tissue.value(origin);
+    note(origin, std::span(&value, 1));
+  }
+  std::ranges::sort(grids.metal_leaves);
+  std::ranges::sort(grids.hard_leaves);
+}
+
+// Whether the box meets one of these leaves.
+bool meets(const std::vector<Coord>& leaves, const CoordBox& box) {
+  if (leaves.empty()) return false;
+  const Coord first = floor_to(box.min, kLeafSize);
+  for (std::int32_t x = first.x; x <= box.max.x; x += kLeafSize)
+    for (std::int32_t y = first.y; y <= box.max.y; y += kLeafSize)
+      for (std::int32_t z = first.z; z <= box.max.z; z += kLeafSize)
+        if (std::ranges::binary_search(leaves, Coord{x, y, z})) return true;
+  return false;
+}
+
 // Lower envelope of parabolas along one line of squared distances: exact Euclidean distance transform, one axis at a
 // time (Felzenszwalb and Huttenlocher, Distance transforms of sampled functions, 2012).
 void distance_along_line(std::vector<double>& line) {
@@ -284,7 +313,7 @@ Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillLabelledP
   if (!(info.pitch_mm > 0.0)) return failure(ErrorCode::invalid_input, "a case needs a pitch above zero");
   const float band = band_mm(info.pitch_mm);
   auto grids = std::make_shared<Grids>(Grids{std::move(info), {}, SparseVolume(band), SparseVolume(0.0f), SparseVolume(0.0f),
-                                             SparseVolume(0.0f), SparseVolume(0.0f), {}, 0.0});
+                                             SparseVolume(0.0f), SparseVolume(0.0f), {}, 0.0, {}, {}});
   PartBuffers buffers;
   constexpr std::int32_t kPart = kPartSamples;
   const Coord first = floor_to(box.min, kPart), last = box.max;
@@ -310,6 +339,7 @@ Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillLabelledP
   measure(*grids);
   if (!has_inside(*grids))
     return failure(ErrorCode::invalid_input, "no sample lies in bone: there is none, or it is thinner than a sample; choose a lower --threshold or a smaller --pitch");
+  find_hard_leaves(*grids);
   grids->clearance = make_clearance(grids->surface, grids->info.pitch_mm);
   grids->hash = content_hash(*grids);
   Case result;
@@ -376,10 +406,11 @@ Result<Case> Case::load(const std::filesystem::path& folder) {
   if (!volumes) return tl::unexpected(volumes.error());
   auto& v = *volumes;
   auto grids = std::make_shared<Grids>(Grids{std::move(info), named, std::move(v[0]), std::move(v[1]), std::move(v[2]), std::move(v[3]),
-                                             std::move(v[4]), {}, 0.0});
+                                             std::move(v[4]), {}, 0.0, {}, {}});
   if (content_hash(*grids) != named)
     return failure(ErrorCode::invalid_input, folder.string() + ": the content does not match content_hash of " + kInfoFile + "; import the case again");
   measure(*grids);
+  find_hard_leaves(*grids);
   Case result;
   result.grids_ = std::move(grids);
   return result;
@@ -452,6 +483,40 @@ double Case::clearance_mm(const Vec3& point_mm) const {
 }
 
 Tissue Case::tissue(Coord sample) const { return static_cast<Tissue>(static_cast<int>(grids_->tissue.value(sample))); }
+void Case::gather_hard(int level, const CoordBox& box, std::span<Tissue> out) const {
+  const auto shown = [](Tissue t) { return t == Tissue::metal || t == Tissue::enamel ? t : Tissue::none; };
+  const std::int32_t wide = 1 << std::abs(level), half = wide / 2;
+  std::size_t i = 0;
+  for (std::int32_t x = box.min.x; x <= box.max.x; ++x)
+    for (std::int32_t y = box.min.y; y <= box.max.y; ++y)
+      for (std::int32_t z = box.min.z; z <= box.max.z; ++z) {
+        const Coord at{x, y, z};
+        if (level <= 0) {
+          out[i++] = shown(tissue(wide * at));
+          continue;
+        }
+        // Of the corners of the cell that the sample is in, the nearest first.
+        const Coord low = shift_down(at, level), part = at - wide * low;
+        const Coord near{part.x > half, part.y > half, part.z > half};
+        Tissue found = Tissue::none;
+        std::int32_t least = std::numeric_limits<std::int32_t>::max();
+        for (int corner = 0; corner < 8; ++corner) {
+          const Coord step{near.x ^ (corner >> 2 & 1), near.y ^ (corner >> 1 & 1), near.z ^ (corner & 1)};
+          const Coord away = part - wide * step;
+          const std::int32_t distance = away.x * away.x + away.y * away.y + away.z * away.z;
+          if (distance >= least) continue;
+          const Tissue there = tissue(low + step);
+          if (there == Tissue::none) continue;
+          found = there;
+          least = distance;
+        }
+        out[i++] = shown(found);
+      }
+}
+const std::vector<Coord>& Case::metal_leaves() const { return grids_->metal_leaves; }
+const std::vector<Coord>& Case::hard_leaves() const { return grids_->hard_leaves; }
+bool Case::has_metal(const CoordBox& box) const { return meets(grids_->metal_leaves, box); }
+bool Case::has_hard(const CoordBox& box) const { return meets(grids_->hard_leaves, box); }
 int Case::bone_number(Coord sample) const { return static_cast<int>(grids_->bone.value(sample)); }
 
 bool Case::has_surface(const CoordBox& box) const {

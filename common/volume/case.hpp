@@ -10,6 +10,7 @@
 #include "common/core/digest.hpp"
 #include "common/volume/block_gather.hpp"
 #include "common/core/result.hpp"
+#include "common/field/tissue.hpp"
 #include "common/volume/dense_volume.hpp"
 #include "common/volume/iso_surface.hpp"
 
@@ -32,9 +33,6 @@ struct CaseInfo {
   double threshold_hu = 0;          // bone is at or above it
   friend bool operator==(const CaseInfo&, const CaseInfo&) = default;
 };
-
-// Enamel is all that a scan shows denser than compact bone and that is no metal. Tools cut it as compact bone. No tool cuts metal.
-enum class Tissue : std::uint8_t { none = 0, cortical = 1, trabecular = 2, metal = 3, enamel = 4 };
 
 // What an importer knows about the samples beyond their distance and density. Each volume has the box of the distance, or
 // is empty.
@@ -101,12 +99,20 @@ class Case {
   // A lower bound of the distance to the bone, mm, zero in and near it.
   [[nodiscard]] double clearance_mm(const Vec3& point_mm) const;
   [[nodiscard]] Tissue tissue(Coord sample) const;
+  // Origins of the leaves that hold metal, and of those that hold metal or enamel; sorted, and empty for most cases.
+  [[nodiscard]] const std::vector<Coord>& metal_leaves() const;
+  [[nodiscard]] const std::vector<Coord>& hard_leaves() const;
+  // On the samples of a level: metal, enamel, or none for all else, of the nearest sample of level 0 that is bone; z fastest.
+  void gather_hard(int level, const CoordBox& box, std::span<Tissue> out) const;
   // Number of the bone that the sample belongs to, from 1; 0: no bone.
   [[nodiscard]] int bone_number(Coord sample) const;
   // Whether any sample of level 0 in the box is within the band of the surface; if none is, all are on one side of it.
   [[nodiscard]] bool has_surface(const CoordBox& box) const;
   // Whether any sample of level 0 in the box is bone or in the band around it.
   [[nodiscard]] bool has_bone(const CoordBox& box) const;
+  // Whether any leaf of level 0 that the box meets holds metal, or metal or enamel.
+  [[nodiscard]] bool has_metal(const CoordBox& box) const;
+  [[nodiscard]] bool has_hard(const CoordBox& box) const;
 
   struct Grids;
 

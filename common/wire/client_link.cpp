@@ -21,7 +21,7 @@ bool at_the_bone(const HeardState& state) {
 bool has_news(const HeardState& said, const HeardState& now, const PoseDeadband& band) {
   return has_moved(said.state.pose_bone_tool, now.state.pose_bone_tool, band) ||
          has_moved(said.state.pose_bone_device, now.state.pose_bone_device, band) || said.buttons != now.buttons ||
-         said.state.phase != now.state.phase;
+         said.state.phase != now.state.phase || said.state.on_metal != now.state.on_metal;
 }
 
 }  // namespace

@@ -92,6 +92,7 @@ v1::CuttingState to_wire(const CuttingState& state) {
   out.set_torque_n_mm(state.torque_Nmm);
   out.set_depth_mm(state.depth_mm);
   out.set_phase(static_cast<v1::CuttingPhase>(state.phase));
+  out.set_on_metal(state.on_metal);
   return out;
 }
 
@@ -184,6 +185,7 @@ Result<CuttingState> from_wire(const v1::CuttingState& state) {
   if (state.phase() < v1::CUTTING_PHASE_IDLE || state.phase() > v1::CUTTING_PHASE_RUBBING)
     return bad("phase", "is not one that this program knows");
   out.phase = static_cast<CuttingPhase>(state.phase());
+  out.on_metal = state.on_metal();
   return out;
 }
 

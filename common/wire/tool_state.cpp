@@ -57,6 +57,7 @@ v1::ToolState to_tool_state(const CuttingState& state, std::uint32_t buttons, bo
   out.set_buttons(buttons);
   out.set_spindle_rpm(steps<std::uint32_t>(state.spindle_rpm, 1.0));
   out.set_phase(static_cast<v1::CuttingPhase>(state.phase));
+  out.set_on_metal(state.on_metal);
   if (!with_effort) return out;
   v1::ToolEffort& effort = *out.mutable_effort();
   effort.set_tool_name(state.tool_name.substr(0, kMostNameBytes));
@@ -86,6 +87,7 @@ Result<bool> take_over(const v1::ToolState& sent, HeardState& known) {
   if (sent.phase() < v1::CUTTING_PHASE_IDLE || sent.phase() > v1::CUTTING_PHASE_RUBBING)
     return bad("phase", "is not one that this program knows");
   next.phase = static_cast<CuttingPhase>(sent.phase());
+  next.on_metal = sent.on_metal();
   if (sent.has_effort()) {
     const v1::ToolEffort& effort = sent.effort();
     if (effort.force_size() != 3) return bad("effort.force", "needs 3 numbers, this has " + std::to_string(effort.force_size()));

@@ -647,10 +647,11 @@ class Client {
   }
 
   void note_range(const TickRow& row) {
-    if (row.report.out_of_range == 0) return;
+    if (row.report.out_of_range == 0 && !(row.report.events & kOnMetal)) return;
     const ToolModel& model = session_.plan().tools[static_cast<std::size_t>(row.report.tool)];
-    const std::string sentence = ranges_.note(model, row.report);
-    if (!sentence.empty()) log::warn("force law outside its range", {{"tool", model.tool.name}, {"because", sentence}});
+    const std::string outside = ranges_.note(model, row.report), metal = metal_.note(model, row.report);
+    if (!outside.empty()) log::warn("force law outside its range", {{"tool", model.tool.name}, {"because", outside}});
+    if (!metal.empty()) log::warn("metal", {{"because", metal}});
   }
 
   // What the loop makes of it, tick by tick: when it stopped is known to the millisecond.
@@ -685,6 +686,7 @@ class Client {
     state.torque_Nmm = r.torque_nmm;
     state.depth_mm = row.depth_mm;
     state.phase = r.phase;
+    state.on_metal = (r.events & kOnMetal) != 0;
     return state;
   }
 
@@ -694,6 +696,7 @@ class Client {
                 row.depth_mm, r.force_physical_n.norm(), r.feed_mm_per_s, r.spindle_rpm, name(r.phase));
     if (r.out_of_range != 0) std::printf(", outside the range of its law: %s", out_of_range_words(r.out_of_range).c_str());
     const RoomHealth health = room_health_;
+    if (r.events & kOnMetal) std::printf(", on metal, which it does not cut");
     if (r.events & kForbidden) std::printf(", stopped by %s", overseer_.empty() ? "an instructor" : overseer_.c_str());
     if (r.events & kHandGuided) std::printf(", led, %.1f mm off", r.guide_distance_mm);
     if (health != RoomHealth::follows) std::printf(", held: %s, %zu cuts unconfirmed", name(health), unconfirmed_.load());
@@ -718,6 +721,7 @@ class Client {
   SessionLog log_;             // reporter thread
   Recorder recorder_;          // filled by the reporter thread
   RangeWatch ranges_;          // reporter thread, until it is joined
+  MetalWatch metal_;           // reporter thread
   std::vector<std::string> tool_names_;  // never changes
 
   LatestValue<Patch> patches_;     // replica → haptic

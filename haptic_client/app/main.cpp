@@ -45,7 +45,11 @@ json means(const LayerMeans& m) {
 
 json step_summary(const ReadyStep& step, const std::vector<ToolModel>& tools, const StepResult& result, double removed_mm3) {
   json out{{"completed", result.completed}, {"duration_s", result.duration_s}};
-  if (result.gave_up) out["gave_up_in"] = name(*result.gave_up);
+  if (result.gave_up) {
+    out["gave_up_in"] = name(*result.gave_up);
+    out["gave_up_because"] = given_up_words(result);
+  }
+  if (result.on_metal_s > 0.0) out["on_metal_s"] = result.on_metal_s;
   out["action"] = name(step.plan.action);
   if (step.plan.action == Action::wait) return out;
   if (step.plan.action == Action::place) {
@@ -212,9 +216,9 @@ Result<void> check_outputs(const Options& options) {
 // Error unavailable: the first step whose time, or whose recording, ran out. One that a signal stopped is as it should be.
 Result<void> all_finished(const ReadyPlan& plan, const ClientOutcome& outcome) {
   for (std::size_t i = 0; i < plan.steps.size(); ++i)
-    if (const auto gave_up = outcome.steps[i].gave_up)
+    if (outcome.steps[i].gave_up)
       return failure(ErrorCode::unavailable, "step " + std::to_string(i + 1) + " (" + name(plan.steps[i].plan.action) +
-                                                 ") did not finish: " + given_up_words(*gave_up));
+                                                 ") did not finish: " + given_up_words(outcome.steps[i]));
   // Without a stop nothing else leaves a step of a plan undone.
   if (outcome.stopped) return {};
   for (std::size_t i = 0; i < plan.steps.size(); ++i)

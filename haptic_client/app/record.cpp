@@ -23,7 +23,8 @@ std::string law_name(const ToolModel& model) { return std::string(model.law->nam
 std::vector<std::string> event_names() {
   constexpr std::array kNames{"uncovered", "force limited", "slew limited", "cuts waiting", "missed ticks",
                               "heel contact", "guided", "stalled", "breakthrough", "pushed away",
-                              "energy limited", "ramping", "room held", "forbidden", "hand guided", "partner touched"};
+                              "energy limited", "ramping", "room held", "forbidden", "hand guided", "partner touched",
+                              "on metal"};
   static_assert(kNames.size() == kLoopEvents);
   return {kNames.begin(), kNames.end()};
 }
@@ -31,6 +32,14 @@ std::vector<std::string> event_names() {
 std::vector<std::string> range_names() {
   const auto names = out_of_range_names();
   return {names.begin(), names.end()};
+}
+
+std::string MetalWatch::note(const ToolModel& model, const LoopReport& report) {
+  if (!(report.events & kOnMetal)) return {};
+  const bool begins = last_seq_ == 0 || report.state_seq > last_seq_ + kApart_ticks;
+  last_seq_ = report.state_seq;
+  if (!begins) return {};
+  return model.tool.name + " stands on metal, which it does not cut: draw back and go round it";
 }
 
 std::string RangeWatch::note(const ToolModel& model, const LoopReport& report) {

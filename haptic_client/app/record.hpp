@@ -42,6 +42,18 @@ struct CutRow {
 // Of the bits of LoopReport::out_of_range, the lowest first.
 [[nodiscard]] std::vector<std::string> range_names();
 
+// Contacts with metal, each to be told once. One thread.
+class MetalWatch {
+ public:
+  // So long without metal a contact is over: a hand trembles, and a point that is drawn back a little comes again.
+  static constexpr std::uint64_t kApart_ticks = 500;
+  // To be asked of every tick in order. A sentence as a contact begins, else nothing.
+  [[nodiscard]] std::string note(const ToolModel& model, const LoopReport& report);
+
+ private:
+  std::uint64_t last_seq_ = 0;  // of the last tick on metal; 0: none yet
+};
+
 // Where a session used force laws outside the range that they were made for. One thread.
 class RangeWatch {
  public:

@@ -143,6 +143,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   }
   if (!step.covered) report.events |= kUncovered;
   if (step.heel_contact) report.events |= kHeelContact;
+  if (step.on_metal) report.events |= kOnMetal;
 
   // What comes back is not taken again by a path that is still open, and in it the spindle stands.
   if (step.returned && recorder_.recording()) {
@@ -371,7 +372,9 @@ Vec3 HapticLoop::slewed(const Vec3& wanted, const Vec3& now, double most, LoopRe
 }
 
 void HapticLoop::record(const ToolModel& model, const ProxyStep& step, LoopReport& report) noexcept {
-  if (step.near_bone && !recorder_.recording() && proxy_.begin_sweep(model)) {
+  // A tool that stands on metal cuts nothing until it is drawn back.
+  const bool stands = step.on_metal && !step.cutting;
+  if (step.near_bone && !stands && !recorder_.recording() && proxy_.begin_sweep(model)) {
     recorder_.begin(proxy_.cut_pose(), model.tool.cutting_length_mm);
     quiet_ticks_ = 0;
     return;
@@ -379,7 +382,7 @@ void HapticLoop::record(const ToolModel& model, const ProxyStep& step, LoopRepor
   if (!recorder_.recording()) return;
   // A tool that stands rubs with its points, its faces a little within the bone: that is no cut.
   // Nor is what the room would refuse.
-  const bool taken = step.may_cut && overseer_.takes(proxy_.cut_pose().position_mm);
+  const bool taken = step.may_cut && !stands && overseer_.takes(proxy_.cut_pose().position_mm);
   if (taken) recorder_.add(proxy_.cut_pose());
   quiet_ticks_ = step.near_bone ? 0 : quiet_ticks_ + 1;
 

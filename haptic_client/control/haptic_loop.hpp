@@ -80,9 +80,10 @@ enum LoopEvent : std::uint32_t {
   kForbidden = 8192,     // an instructor does not let this tool cut here now: the spindle stands
   kHandGuided = 16384,   // another's hand leads this one
   kPartnerTouched = 32768,  // another's tool pushes this one
+  kOnMetal = 65536,      // metal is in the way of the turning tool: it cuts nothing
 };
 // Bits up to the last of them.
-inline constexpr std::size_t kLoopEvents = std::bit_width(std::uint32_t{kPartnerTouched});
+inline constexpr std::size_t kLoopEvents = std::bit_width(std::uint32_t{kOnMetal});
 
 struct LoopReport {
   Vec3 force_device_n = Vec3::Zero();    // to write to the device, device frame

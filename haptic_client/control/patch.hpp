@@ -54,6 +54,8 @@ struct Patch {
   BrickGrid fine;            // f, mm: negative in bone
   BrickGrid coarse;          // f
   BrickGrid density;         // g/cm³, at h, of the same bricks as `coarse`
+  BrickGrid metal;           // at h, where metal is near: 1 at its samples and in the air beside them, else 0
+  bool has_metal = false;    // any brick of these is there
   Clearance clearance;
   std::uint64_t own_cuts = 0;  // own cuts up to this number are in it
   RoomSeq room_seq;            // committed events that are in it
@@ -66,6 +68,11 @@ struct Patch {
   [[nodiscard]] double density_at(const Vec3& point_mm) const noexcept {
     double value = 0.0;
     return density.sample(point_mm, value) ? value : 0.0;
+  }
+  // Of a point in the bone.
+  [[nodiscard]] bool is_metal(const Vec3& point_mm) const noexcept {
+    double value = 0.0;
+    return has_metal && metal.sample(point_mm, value) && value >= 0.5;
   }
 };
 

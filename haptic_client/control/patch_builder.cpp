@@ -96,11 +96,29 @@ std::shared_ptr<const Brick> PatchBuilder::brick(Store& store, std::span<const C
   return kept = made;
 }
 
+std::shared_ptr<const Brick> PatchBuilder::metal_brick(const Case& bone, Coord index) {
+  const CoordBox samples = brick_samples(index), around = samples.grown(1);
+  if (!bone.has_metal(around)) return nullptr;
+  auto& kept = metal_[index];
+  if (kept) return kept;
+  auto made = std::make_shared<Brick>();
+  std::size_t i = 0;
+  for_each(samples, [&](Coord at) {
+    // What lies between metal and air is metal up to the surface; what lies between metal and bone is so up to the middle.
+    bool metal = bone.tissue(at) == Tissue::metal;
+    if (!metal && bone.tissue(at) == Tissue::none)
+      for_each(CoordBox{at, at}.grown(1), [&](Coord beside) { metal |= bone.tissue(beside) == Tissue::metal; });
+    made->values[i++] = metal ? 1.0f : 0.0f;
+  });
+  ++bricks_made_;
+  return kept = made;
+}
+
 void PatchBuilder::build(std::span<const CutField* const> bodies, const ToolModel& model, const Pose& pose, Patch& patch) {
   const double h = bodies.front()->bone().pitch_mm();
   const Tool& tool = model.tool;
   if (fine_level_ != model.cut_level || fine_.size() > kMostKeptBricks) fine_.clear();
-  if (coarse_.size() > kMostKeptBricks) coarse_.clear(), density_.clear();
+  if (coarse_.size() > kMostKeptBricks) coarse_.clear(), density_.clear(), metal_.clear();
   // A body that came or went changed the bone all over it.
   if (!std::ranges::equal(bodies_, bodies)) {
     fine_.clear();
@@ -138,10 +156,18 @@ void PatchBuilder::build(std::span<const CutField* const> bodies, const ToolMode
   fill(patch.density, coarse, h, params_.coarse_margin_mm,
        [&](Coord i) { return brick(density_, bodies, 0, i, Quantity::density); });
 
+  const Case& bone = bodies.front()->bone();
+  patch.has_metal = false;
+  if (!bone.metal_leaves().empty())
+    fill(patch.metal, coarse, h, params_.coarse_margin_mm, [&](Coord i) {
+      std::shared_ptr<const Brick> made = metal_brick(bone, i);
+      patch.has_metal |= made != nullptr;
+      return made;
+    });
+
   // What the case says never changes: it is asked for again only where the tool has gone on to other cells.
   const CoordBox cells = bricks_in(tool_box(model, pose, 0.0, -tool.reach_mm()).grown(params_.clearance_margin_mm), h);
   Clearance& clearance = patch.clearance;
-  const Case& bone = bodies.front()->bone();
   if (clearance.mm.empty() || clearance.cells != cells || clearance.bone != bone.hash()) {
     clearance.bone = bone.hash();
     clearance.cells = cells;

@@ -37,12 +37,14 @@ class PatchBuilder {
  private:
   using Store = std::unordered_map<Coord, std::shared_ptr<const Brick>, CoordHash>;
   enum class Quantity { solid, density };
+  // Null where the brick holds no metal.
+  std::shared_ptr<const Brick> metal_brick(const Case& bone, Coord index);
   std::shared_ptr<const Brick> brick(Store& store, std::span<const CutField* const> bodies, int level, Coord index,
                                      Quantity quantity);
 
   PatchParams params_;
   int fine_level_ = -1;
-  Store fine_, coarse_, density_;
+  Store fine_, coarse_, density_, metal_;
   std::vector<const CutField*> bodies_;  // of the last patch, to see when one comes or goes
   std::shared_ptr<const Brick> air_;  // shared by every brick far from bone
   std::size_t bricks_made_ = 0;

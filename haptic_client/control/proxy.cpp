@@ -464,6 +464,7 @@ Proxy::Engagement Proxy::engagement(const Tick& tick, const Vec3& direction) noe
       sums.milling = std::max(0.0, sums.milling);
     }
   }
+  now.metal = sums.engaged_mm2 > 0.0 && tick.patch.has_metal && meets_metal(tick, query);
   LawInputs& in = now.inputs;
   in.spindle_rpm = tick.spindle_rpm;
   in.wear = tick.around.effects ? tick.around.effects->wear() : model.wear;
@@ -477,6 +478,22 @@ Proxy::Engagement Proxy::engagement(const Tick& tick, const Vec3& direction) noe
     in.directed_density = std::max(0.0, sums.density_mm2) / model.active_area_mm2;
   }
   return now;
+}
+
+bool Proxy::meets_metal(const Tick& tick, const ContactQuery& query) const noexcept {
+  const ToolModel& model = tick.model;
+  const Vec3 toward = pose_.rotation.conjugate() * query.direction_bone;
+  for (int group = 0; group < model.contact.active_groups; ++group) {
+    if (ahead_.values.nearest_mm[static_cast<std::size_t>(group)] >= 0.0f) continue;
+    for (int i = group * kGroupPoints; i < (group + 1) * kGroupPoints && is_real(model, i); ++i) {
+      const auto p = static_cast<std::size_t>(i);
+      if (ahead_.values.distance_mm[p] >= 0.0f) continue;
+      const ContactPoint& point = model.active[p];
+      const double reach_mm = query.ahead_mm > 0.0 ? std::min(query.ahead_mm / point.outward.dot(toward), query.most_mm) : 0.0;
+      if (tick.patch.is_metal(pose_.point(point.inset_mm + query.lift_mm * point.outward + reach_mm * toward))) return true;
+    }
+  }
+  return false;
 }
 
 void Proxy::note_forces(const Tick& tick, const Engagement& now, const Vec3& direction, double thrust_n,
@@ -548,6 +565,11 @@ bool Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm,
       if (now.inputs.engaged >= kWholePoint) bitten_ = true;
       else if (skives(model.tool.kind)) note_slope(tick, direction, tick.stiffness_n_per_mm * extension_mm);
       if (!tick.may_cut) break;
+      // As on steel: the coupling's stretch is the force, and no law is asked.
+      if (now.metal) {
+        report.on_metal = true;
+        break;
+      }
       FeedLaw law = model.law->feed_law(model.law_tool, now.inputs);
       if (tick.around.effects) law = tick.around.effects->felt(law);
       const FeedSolution solution = solve_feed(law, tick.stiffness_n_per_mm, extension_mm, left_s);

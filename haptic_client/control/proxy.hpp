@@ -30,6 +30,7 @@ struct ProxyStep {
   bool may_cut = false;        // it would, where the force suffices: it turns, and nothing forbids it
   bool near_bone = false;      // the cutting part touches or may remove bone
   bool heel_contact = false;
+  bool on_metal = false;       // it turns, and metal is in its way: there it goes no further, and nothing is cut
   bool returned = false;       // bone came back where the tool is: it cuts nothing until it has left that
   bool locked = false;         // and so deep that it cannot be felt: no force, the spindle is to stand, until drawn out
   double feed_mm_per_s = 0;    // into bone, along the direction of cutting
@@ -119,6 +120,7 @@ class Proxy {
     ContactSums sums;
     LawInputs inputs;
     bool covered = true;
+    bool metal = false;  // some of what is engaged is
   };
 
   void look(const Tick& tick, const Pose& pose, Against against, Sight& sight) noexcept;
@@ -132,6 +134,8 @@ class Proxy {
   // Goes as far towards a pose as nothing blocks, cutting nothing.
   void travel(const Tick& tick, const Pose& wanted, const Vec3* across, bool move_too, ProxyStep& report) noexcept;
   [[nodiscard]] Engagement engagement(const Tick& tick, const Vec3& direction) noexcept;
+  // After engagement(): whether any of the points that it found in bone is in metal.
+  [[nodiscard]] bool meets_metal(const Tick& tick, const ContactQuery& query) const noexcept;
   void note_slope(const Tick& tick, const Vec3& direction, double thrust_n) noexcept;
   // Goes along a direction, cutting what is in the way as far as the force allows. True: here_ is another sight now.
   bool advance(const Tick& tick, const Vec3& direction, double distance_mm, ProxyStep& report) noexcept;

@@ -266,6 +266,13 @@ const char* given_up_words(SurgeonPhase phase) {
   }
 }
 
+const char* given_up_words(const StepResult& result) {
+  const SurgeonPhase phase = result.gave_up.value_or(SurgeonPhase::done);
+  const bool cuts = phase == SurgeonPhase::push || phase == SurgeonPhase::feed || phase == SurgeonPhase::sweep;
+  if (cuts && result.on_metal_s > 0.0) return "the tool stands on metal, which it does not cut; choose a way beside it";
+  return given_up_words(phase);
+}
+
 const char* name(Action action) {
   constexpr const char* kNames[] = {"drill", "burr", "wait", "place", "screw", "free_hand"};
   return kNames[static_cast<int>(action)];
@@ -329,6 +336,7 @@ bool Surgeon::carry_to_depth(const ReadyStep& step, double to_mm, double speed_m
 void Surgeon::observe(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept {
   StepResult& result = results_[step_];
   result.duration_s += dt_s;
+  if (report.events & kOnMetal) result.on_metal_s += dt_s;
   const double force_n = std::max(0.0, -report.force_physical_n.dot(step.site.axis));
   const double depth = depth_mm(step, report.pose_bone_proxy.position_mm);
   result.peak_force_n = std::max(result.peak_force_n, report.force_physical_n.norm());

@@ -117,8 +117,12 @@ struct StepResult {
   double deepest_mm = 0;       // of the tip below the entry
   double plunge_mm = 0;        // of the tip beyond the far surface, as the reference table counts it
   double after_exit_mm = 0;    // of the tip beyond where the cone was last in bone
+  double on_metal_s = 0;       // metal was in the way of the turning tool for so long
   LayerMeans near_cortex, medulla, far_cortex, all;
 };
+
+// The same of a step that gave up, metal in its way told apart.
+[[nodiscard]] const char* given_up_words(const StepResult& result);
 
 class Surgeon {
  public:

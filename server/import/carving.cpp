@@ -10,6 +10,7 @@
 
 #include "common/field/kernel.hpp"
 #include "common/surface/block_source.hpp"
+#include "common/volume/metal.hpp"
 
 namespace osteon::import {
 namespace {
@@ -89,11 +90,15 @@ Result<StepReport> Carving::run(const CarveStep& step, const KeepGoing& keep_goi
   const std::vector<Cut> cuts = cuts_of(step, tool.hash, report.level, cut_mm_);
   std::vector<double> cut_ms, frame_ms;
   std::vector<std::set<Coord>> changed(bodies);  // leaves of each body
+  std::vector<const CutField*> fields;
+  for (const CutField& body : bodies_) fields.push_back(&body);
   for (std::size_t i = 0; i < cuts.size(); ++i) {
     if (!keep_going(static_cast<double>(i) / static_cast<double>(cuts.size()))) return failure(ErrorCode::cancelled, "stopped while carving");
     const auto begin = Clock::now();
+    const bool metal = meets_metal(cuts[i], tool.body, fields);
+    report.metal_refused += metal;
     std::vector<Coord> of_bone;
-    for (std::size_t b = 0; b < bodies; ++b) {
+    for (std::size_t b = 0; b < bodies && !metal; ++b) {
       CutReport done = bodies_[b].apply(cuts[i]);
       report.visited += done.visited;
       report.computed += done.computed;
@@ -104,8 +109,8 @@ Result<StepReport> Carving::run(const CarveStep& step, const KeepGoing& keep_goi
     cut_ms.push_back(milliseconds_since(begin));
     mesh_changes(report.level, of_bone, i + 1 == cuts.size(), frame_ms);
   }
-  report.cuts = static_cast<int>(cuts.size());
-  cuts_ += cuts.size();
+  report.cuts = static_cast<int>(cuts.size()) - report.metal_refused;
+  cuts_ += static_cast<std::uint64_t>(report.cuts);
   report.removed_mm3 = removed_mm3(bodies) - before_mm3;
   report.cut_ms_median = quantile(cut_ms, 0.5);
   report.cut_ms_p99 = quantile(cut_ms, 0.99);
@@ -204,7 +209,8 @@ std::string line(std::size_t number, const StepReport& r) {
   std::snprintf(text, sizeof text, "%5zu  %-20s %5d %6d %12.2f %13lld %13lld %13lld %8.3f/%6.3f/%6.3f %6.2f/%6.2f  %3d+%-3d %9.1f\n", number, r.tool.c_str(), r.level, r.cuts,
                 r.removed_mm3, static_cast<long long>(r.visited), static_cast<long long>(r.computed), static_cast<long long>(r.modified), r.cut_ms_median,
                 r.cut_ms_p99, r.cut_ms_most, r.frame_ms_median, r.frame_ms_most, r.pieces, r.debris, r.field_mb);
-  return text;
+  if (r.metal_refused == 0) return text;
+  return text + ("       metal refused " + std::to_string(r.metal_refused) + " more cuts\n");
 }
 
 std::string to_json(const std::vector<StepReport>& steps, const SavedFields& fields) {
@@ -215,7 +221,7 @@ std::string to_json(const std::vector<StepReport>& steps, const SavedFields& fie
                     {"cut_ms", {{"median", r.cut_ms_median}, {"p99", r.cut_ms_p99}, {"max", r.cut_ms_most}}},
                     {"frame_ms", {{"median", r.frame_ms_median}, {"max", r.frame_ms_most}}},
                     {"fragment_ms", r.fragment_ms}, {"pieces", r.pieces}, {"pieces_mm3", r.pieces_mm3}, {"debris", r.debris},
-                    {"field_mb", r.field_mb}});
+                    {"field_mb", r.field_mb}, {"metal_refused", r.metal_refused}});
   const nlohmann::json report{{"case", to_hex(fields.case_hash)}, {"field_hash", to_hex(field_hash(fields.leaves, fields.pitch_mm))},
                               {"bodies", fields.bodies.size()}, {"steps", list}};
   return report.dump(2) + "\n";

@@ -17,7 +17,8 @@ namespace osteon::import {
 struct StepReport {
   std::string tool;
   int level = 0;
-  int cuts = 0;
+  int cuts = 0;                           // that were made
+  int metal_refused = 0;                  // others, which would have taken metal away
   double removed_mm3 = 0;                 // by cutting, from all bodies; pieces that came apart are not counted
   std::int64_t visited = 0, computed = 0, modified = 0;  // samples of all bodies together, §5.4
   double cut_ms_median = 0, cut_ms_p99 = 0, cut_ms_most = 0;

@@ -7,6 +7,7 @@
 
 #include "common/field/kernel.hpp"
 #include "common/surface/block_source.hpp"
+#include "common/volume/metal.hpp"
 
 namespace osteon {
 namespace {
@@ -151,14 +152,15 @@ Rejection Room::judge(const Cut& cut) {
   if (limits_.swept_voxels_per_s > 0 &&
       voxels_spent(surgeon) + swept_voxels(cut) > kBurst_s * limits_.swept_voxels_per_s)
     return Rejection::rate;
-  return beyond_power(cut) ? Rejection::power : Rejection::none;
-}
-
-bool Room::beyond_power(const Cut& cut) {
-  if (limits_.power_w <= 0) return false;
   std::vector<const CutField*> fields;
   for (const auto& [id, body] : bodies_)
     if (body.present) fields.push_back(&body.field);
+  if (meets_metal(cut, tools_->find(cut.tool)->body, fields)) return Rejection::metal;
+  return beyond_power(cut, fields) ? Rejection::power : Rejection::none;
+}
+
+bool Room::beyond_power(const Cut& cut, std::span<const CutField* const> fields) {
+  if (limits_.power_w <= 0) return false;
   // What the motor has not given yet, since an author's cuts before; some samples too many or too few even out.
   const ToolBox::Entry& tool = *tools_->find(cut.tool);
   double& owed_j = owed_j_[cut.author];

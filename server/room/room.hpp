@@ -213,7 +213,7 @@ class Room {
 
   [[nodiscard]] Rejection judge(const Cut& cut);
   [[nodiscard]] Rejection judge_form(const Cut& cut) const;
-  [[nodiscard]] bool beyond_power(const Cut& cut);
+  [[nodiscard]] bool beyond_power(const Cut& cut, std::span<const CutField* const> fields);
   [[nodiscard]] double swept_mm(const Cut& cut, const ToolBox::Entry& tool) const;
   [[nodiscard]] double swept_voxels(const Cut& cut) const;
   [[nodiscard]] double voxels_spent(const Surgeon& surgeon) const;

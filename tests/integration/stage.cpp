@@ -64,6 +64,11 @@ Stage::Stage(double width_mm, std::vector<std::string> server_arguments) {
   start_server(std::move(server_arguments));
 }
 
+Stage::Stage(const std::function<void(const std::filesystem::path&)>& make_case, std::vector<std::string> server_arguments) {
+  make_case(temp_ / "case");
+  start_server(std::move(server_arguments));
+}
+
 void Stage::start_server(std::vector<std::string> more) {
   std::vector<std::string> arguments{"--case", temp_ / "case", "--address-file", temp_ / "address", "--summary", temp_ / "server.json"};
   arguments.insert(arguments.end(), more.begin(), more.end());

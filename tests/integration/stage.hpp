@@ -1,5 +1,7 @@
 // All programs of a room as real processes on this machine, for tests that watch them from outside.
 #pragma once
+#include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -40,6 +42,9 @@ class Stage {
  public:
   // Imports the layered block of force-laws.md and starts a server on it.
   explicit Stage(double width_mm = 40.0, std::vector<std::string> server_arguments = {});
+  // The same on a case that `make_case` leaves in the folder that it is given.
+  explicit Stage(const std::function<void(const std::filesystem::path&)>& make_case,
+                 std::vector<std::string> server_arguments = {});
 
   [[nodiscard]] const std::string& address() const { return address_; }
   [[nodiscard]] std::filesystem::path operator/(const std::string& name) const { return temp_ / name; }

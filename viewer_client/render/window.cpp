@@ -37,6 +37,7 @@
 #include <map>
 #include <memory>
 #include <numbers>
+#include <span>
 #include <thread>
 #include <utility>
 
@@ -54,6 +55,9 @@ using Colour = std::array<std::uint8_t, 3>;
 
 constexpr Colour kBone{241, 226, 196};     // dry ivory
 constexpr Colour kCutBone{219, 143, 117};  // fresh bone with marrow in it
+constexpr Colour kMetal{126, 150, 184};    // bluer and darker than tools, so that it is no tool
+constexpr Colour kEnamel{250, 250, 255};
+constexpr Colour kCutEnamel{236, 214, 232};
 constexpr std::array<Colour, 3> kPieces{{{214, 226, 200}, {200, 214, 236}, {236, 206, 214}}};  // sawn-off, by turns
 constexpr Colour kSteel{222, 227, 234};
 constexpr Colour kCuttingSteel{205, 205, 202};
@@ -76,12 +80,12 @@ vtkSmartPointer<vtkFloatArray> vectors(const std::vector<std::array<float, 3>>& 
   return to;
 }
 
-// `marked` chooses between two colours vertex by vertex.
+// `marked` says of each vertex which of the colours it has.
 vtkSmartPointer<vtkPolyData> poly_data(const std::vector<std::array<float, 3>>& positions,
                                        const std::vector<std::array<float, 3>>& normals,
                                        const std::vector<std::uint8_t>& marked,
-                                       const std::vector<std::array<std::uint32_t, 3>>& triangles, const Colour& plain,
-                                       const Colour& mark) {
+                                       const std::vector<std::array<std::uint32_t, 3>>& triangles,
+                                       std::span<const Colour> palette) {
   vtkNew<vtkPoints> points;
   points->SetData(vectors(positions));
 
@@ -89,7 +93,7 @@ vtkSmartPointer<vtkPolyData> poly_data(const std::vector<std::array<float, 3>>& 
   colours->SetNumberOfComponents(3);
   colours->SetNumberOfTuples(static_cast<vtkIdType>(marked.size()));
   for (std::size_t i = 0; i < marked.size(); ++i) {
-    std::memcpy(colours->GetPointer(static_cast<vtkIdType>(3 * i)), (marked[i] != 0 ? mark : plain).data(), 3);
+    std::memcpy(colours->GetPointer(static_cast<vtkIdType>(3 * i)), palette[marked[i]].data(), 3);
   }
 
   // 32-bit connectivity is a copy of our own array; offsets of triangles are multiples of three.
@@ -325,7 +329,7 @@ vtkPolyData* BoneWindow::Impl::data_of(const std::string& name) {
 
 vtkSmartPointer<vtkPolyData> BoneWindow::Impl::data_of(const Tool& tool) {
   const ToolMesh mesh = tool_mesh(tool);
-  return poly_data(mesh.positions_mm, mesh.normals, mesh.cutting, mesh.triangles, kSteel, kCuttingSteel);
+  return poly_data(mesh.positions_mm, mesh.normals, mesh.cutting, mesh.triangles, std::array{kSteel, kCuttingSteel});
 }
 
 std::optional<Vec3> BoneWindow::Impl::surface_at(int x, int y) const {
@@ -472,8 +476,12 @@ void BoneWindow::show_region(const RegionKey& region, const Mesh& mesh) {
     return;
   }
 
-  const auto data = poly_data(mesh.positions_mm, mesh.normals, mesh.cut_face, mesh.triangles,
-                              region.body == BodyId{0} ? kBone : kPieces[region.body.value % kPieces.size()], kCutBone);
+  const Colour& whole = region.body == BodyId{0} ? kBone : kPieces[region.body.value % kPieces.size()];
+  const std::array palette{whole, kCutBone, kMetal, kMetal, kEnamel, kCutEnamel};
+  std::vector<std::uint8_t> looks = mesh.cut_face;
+  for (std::size_t v = 0; v < mesh.tissue.size(); ++v)
+    if (mesh.tissue[v] != Tissue::none) looks[v] |= mesh.tissue[v] == Tissue::metal ? 2 : 4;
+  const auto data = poly_data(mesh.positions_mm, mesh.normals, looks, mesh.triangles, palette);
   if (held != impl_->regions.end()) {
     static_cast<vtkPolyDataMapper*>(held->second->GetMapper())->SetInputData(data);
     return;

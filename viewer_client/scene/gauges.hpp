@@ -6,7 +6,7 @@
 
 namespace osteon {
 
-// Lines: tool and what it does, spindle speed, physical force, depth, density where it touches.
+// Lines: tool and what it does, spindle speed, physical force, depth, metal in its way, density where it touches.
 [[nodiscard]] std::string gauge_text(const CuttingState& state);
 
 }  // namespace osteon

@@ -82,8 +82,13 @@ Mesh SurfaceScene::region_mesh(const RegionKey& region) const {
     whole.positions_mm.insert(whole.positions_mm.end(), part.positions_mm.begin(), part.positions_mm.end());
     whole.normals.insert(whole.normals.end(), part.normals.begin(), part.normals.end());
     whole.cut_face.insert(whole.cut_face.end(), part.cut_face.begin(), part.cut_face.end());
+    if (!part.tissue.empty()) {
+      whole.tissue.resize(first);
+      whole.tissue.insert(whole.tissue.end(), part.tissue.begin(), part.tissue.end());
+    }
     for (const auto& [a, b, c] : part.triangles) whole.triangles.push_back({a + first, b + first, c + first});
   }
+  if (!whole.tissue.empty()) whole.tissue.resize(vertices);
   return whole;
 }
 

@@ -9,18 +9,21 @@
 namespace osteon::test {
 
 Case make_bone(const Box& extent, double pitch_mm, const std::function<double(const Vec3&)>& distance_mm,
-               const std::function<double(const Vec3&)>& density_g_cm3) {
+               const std::function<double(const Vec3&)>& density_g_cm3, const std::function<Tissue(const Vec3&)>& tissue) {
   const CoordBox box = covering_samples(extent.grown((kBandVoxels + 1) * pitch_mm), pitch_mm);
   DenseVolume<float> surface(box, 0.0f), density(box, 0.0f);
+  SampleLabels labels;
+  if (tissue) labels.tissue = DenseVolume<Tissue>(box, Tissue::none);
   for (std::int32_t x = box.min.x; x <= box.max.x; ++x)
     for (std::int32_t y = box.min.y; y <= box.max.y; ++y)
       for (std::int32_t z = box.min.z; z <= box.max.z; ++z) {
         const Vec3 p = position_mm({x, y, z}, pitch_mm);
         surface.at({x, y, z}) = static_cast<float>(distance_mm(p));
         density.at({x, y, z}) = static_cast<float>(density_g_cm3(p));
+        if (tissue) labels.tissue.at({x, y, z}) = tissue(p);
       }
   CaseInfo info{.title = "Test bone", .source = "closed form", .pitch_mm = pitch_mm, .calibration = {}, .threshold_hu = 0.0};
-  auto built = Case::build(info, surface, density);
+  auto built = Case::build(info, surface, density, labels);
   OSTEON_CHECK(built.has_value());
   return *built;
 }
@@ -47,6 +50,17 @@ Case layered_block(const std::vector<Layer>& layers, double width_mm, double pit
 
 Case plain_block(double width_mm, double thickness_mm, double pitch_mm, double density_g_cm3) {
   return layered_block({{thickness_mm, density_g_cm3}}, width_mm, pitch_mm);
+}
+
+Case marked_block(double width_mm, double thickness_mm, double pitch_mm,
+                  const std::function<Tissue(const Vec3&)>& tissue) {
+  const Vec3 half{0.5 * width_mm, 0.5 * width_mm, 0.5 * thickness_mm};
+  const auto distance = [=](const Vec3& p) {
+    const Vec3 q = (p + Vec3(0, 0, half.z())).cwiseAbs() - half;
+    return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0);
+  };
+  const auto density = [&](const Vec3& p) { return tissue(p) == Tissue::none ? 1.9 : 2.1; };
+  return make_bone({{-half.x(), -half.y(), -thickness_mm}, {half.x(), half.y(), 0.0}}, pitch_mm, distance, density, tissue);
 }
 
 Case large_ball(double radius_mm, double pitch_mm, double density_g_cm3) {

@@ -8,9 +8,11 @@
 
 namespace osteon::test {
 
-// Any bone from its signed distance (mm, negative inside) and density (g/cm³) over a box.
+// Any bone from its signed distance (mm, negative inside) and density (g/cm³) over a box. `tissue`: what its importer knows,
+// metal, enamel or none.
 [[nodiscard]] Case make_bone(const Box& extent, double pitch_mm, const std::function<double(const Vec3&)>& distance_mm,
-                             const std::function<double(const Vec3&)>& density_g_cm3);
+                             const std::function<double(const Vec3&)>& density_g_cm3,
+                             const std::function<Tissue(const Vec3&)>& tissue = {});
 
 struct Layer {
   double thickness_mm;
@@ -23,6 +25,10 @@ struct Layer {
 
 // One density throughout, z from -thickness to 0.
 [[nodiscard]] Case plain_block(double width_mm, double thickness_mm, double pitch_mm, double density_g_cm3 = 1.9);
+
+// A plain block in which some of the bone is metal or enamel, of 2.1 g/cm³ as importers have both.
+[[nodiscard]] Case marked_block(double width_mm, double thickness_mm, double pitch_mm,
+                                const std::function<Tissue(const Vec3&)>& tissue);
 
 // A ball about the origin, made part by part: however large, only its surface takes memory.
 [[nodiscard]] Case large_ball(double radius_mm, double pitch_mm, double density_g_cm3 = 1.9);

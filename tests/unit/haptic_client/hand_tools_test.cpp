@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
+#include "common/volume/metal.hpp"
 #include "haptic_client/control/haptic_loop.hpp"
 #include "haptic_client/control/patch_builder.hpp"
 #include "haptic_client/control/replica.hpp"
@@ -45,6 +47,7 @@ class HandStage {
     CutPiece piece;
     while (loop_.take_piece(piece)) {
       const Cut cut = cut_of(piece, loop_.tool(0), AuthorId{1}, 0);
+      cuts_.push_back(cut);
       replica_.add_own(cut);
       replica_.commit(RoomSeq{++seq_}, cut, true);
     }
@@ -77,16 +80,17 @@ class HandStage {
   std::int64_t allocations_ = 0, ticks_ = 0;
   int cutting_ = 0, touching_ = 0, disagree_ = 0, pushed_ = 0;
   std::uint64_t seq_ = 0;
+  std::vector<Cut> cuts_;
 };
 
-// The bone is at z > 0. Cancellous, so that a push that a hand can give goes on.
-Case block(double pitch_mm, double width_mm, double deep_mm) {
+// The bone is at z > 0. Cancellous, so that a push that a hand can give goes on. `tissue`: what of it is metal.
+Case block(double pitch_mm, double width_mm, double deep_mm, const std::function<Tissue(const Vec3&)>& tissue = {}) {
   return osteon::test::make_bone(
       {Vec3(-0.5 * width_mm, -0.5 * width_mm, -3), Vec3(0.5 * width_mm, 0.5 * width_mm, deep_mm)}, pitch_mm,
       [=](const Vec3& p) {
         return std::max({-p.z(), std::abs(p.x()) - 0.5 * width_mm + 3.0, std::abs(p.y()) - 0.5 * width_mm + 3.0});
       },
-      [](const Vec3&) { return 0.6; });
+      [](const Vec3&) { return 0.6; }, tissue);
 }
 
 // How each tool is held against a face that looks along -z, and which way it is pushed: z, into the bone.
@@ -142,6 +146,76 @@ TEST(HandTools, EveryToolThatCutsTakesBone) {
     ++tried;
   }
   EXPECT_GE(tried, 21);
+}
+
+// Pushed down on it, aside and turned, no tool takes metal away: nothing that a room would refuse, and nothing of it at all.
+TEST(HandTools, NoneThatCutsTakesMetal) {
+  for (const Tool& tool : builtin_tools()) {
+    if (!tool.cuts()) continue;
+    const bool large = tool.cut_level == 0;
+    const double pitch_mm = large ? 1.0 : 0.5, metal_mm = 2.0 * pitch_mm;
+    // Metal from there on, and beside small tools a step of it that is higher.
+    const Case bone = block(pitch_mm, large ? 70.0 : 40.0, large ? 24.0 : 12.0, [=](const Vec3& p) {
+      return p.z() >= metal_mm || (!large && p.x() > 4.0 && p.y() > 2.0 && p.z() >= pitch_mm) ? Tissue::metal : Tissue::none;
+    });
+    HandStage stage(bone, tool, held(tool));
+    stage.input_.spindle_rpm = tool.spindle_rpm;
+    stage.lead(Vec3::Zero(), 0.2);
+    std::uint32_t events = 0;
+    const auto see = [&](const Vec3& by_mm, double turn_rad, double seconds) {
+      const Eigen::Quaterniond before = stage.input_.pose_device_tool.rotation;
+      constexpr int kParts = 40;
+      for (int i = 1; i <= kParts; ++i) {
+        const Eigen::AngleAxisd turn(turn_rad * i / kParts, Vec3(0.6, 0.7, 0.2).normalized());
+        stage.input_.pose_device_tool.rotation = before * turn;
+        events |= stage.lead(by_mm / kParts, seconds / kParts).events;
+      }
+    };
+    see({0, 0, metal_mm + 1.5}, 0.0, 1.5);
+    see({0, 0, 0}, 0.15, 0.2);
+    see({2.0, 1.0, 0}, -0.3, 0.4);
+    see({-4.0, 1.0, 0.5}, 0.25, 0.4);
+    EXPECT_GT(stage.replica_.removed_mm3(), 0.02) << tool.name;
+    // The shank of one lies on the bone before it comes so deep.
+    if (tool.name != "burr-round-3.2") {
+      EXPECT_NE(events & kOnMetal, 0u) << tool.name;
+    }
+    EXPECT_EQ(stage.disagree_, 0) << tool.name;
+    EXPECT_EQ(stage.allocations_, 0) << tool.name;
+    const CutField fresh(bone, BodyId{});
+    const CutField* const field = &fresh;
+    int refused = 0;
+    for (const Cut& cut : stage.cuts_) refused += meets_metal(cut, fresh.tools()->find(cut.tool)->body, std::span(&field, 1));
+    double deepest_mm = 0;  // of any sample of metal below what is left
+    const CutField& left = stage.replica_.predicted();
+    for (const Coord leaf : bone.metal_leaves())
+      for (int i = 0; i < kLeafVoxels; ++i) {
+        const Coord at = leaf + Coord{i >> 6, i >> 3 & 7, i & 7};
+        const Vec3 p = position_mm(at, pitch_mm);
+        if (bone.tissue(at) == Tissue::metal) deepest_mm = std::max(deepest_mm, left.solid_mm(p));
+      }
+    std::printf("  %-20s %3zu cuts, %8.2f mm3, at most %5.1f N, %.3f mm into a sample of metal\n", tool.name.c_str(),
+                stage.cuts_.size(), stage.replica_.removed_mm3(), stage.force_n_, deepest_mm);
+    EXPECT_EQ(refused, 0) << tool.name;
+    EXPECT_LT(deepest_mm, 0.5 * pitch_mm) << tool.name;
+  }
+}
+
+// Dragged over metal under pressure a bur neither cuts nor says that it does.
+TEST(HandTools, ABurDraggedOverMetalSendsNothing) {
+  const Tool bur = *find_tool("burr-round-5");
+  HandStage stage(block(0.5, 40.0, 12.0, [](const Vec3&) { return Tissue::metal; }), bur, held(bur));
+  stage.input_.spindle_rpm = bur.spindle_rpm;
+  stage.lead({0, 0, 1.4}, 0.5);
+  EXPECT_NE(stage.lead(Vec3::Zero(), 0.1).events & kOnMetal, 0u);
+  const std::size_t before = stage.cuts_.size();
+  const Vec3 from = stage.tick().pose_bone_proxy.position_mm;
+  const LoopReport dragged = stage.lead({4, 2, 0}, 0.5);
+  EXPECT_GT((dragged.pose_bone_proxy.position_mm - from).norm(), 3.0);
+  EXPECT_GT(-dragged.force_physical_n.z(), 20.0);
+  EXPECT_EQ(stage.cuts_.size(), before);
+  EXPECT_EQ(stage.cutting_, 0);
+  EXPECT_EQ(stage.replica_.removed_mm3(), 0.0);
 }
 
 // A bur in its groove that a hand rocks hard, by 9 degrees 1.5 times a second: turning cuts nothing and lifts it out, its

@@ -397,7 +397,29 @@ TEST(Recording, NamesItsEvents) {
   EXPECT_EQ(named(kForbidden), "forbidden");
   EXPECT_EQ(named(kHandGuided), "hand guided");
   EXPECT_EQ(named(kPartnerTouched), "partner touched");
+  EXPECT_EQ(named(kOnMetal), "on metal");
   EXPECT_EQ(names.size(), kLoopEvents);
+}
+
+// A contact is told once, however the hand trembles on it, and the next one again.
+TEST(MetalWatch, TellsEachContactOnce) {
+  const ToolModel model(*find_tool("drill-3.2"), 0.5);
+  MetalWatch watch;
+  int told = 0;
+  const auto at = [&](std::uint64_t seq, std::uint32_t events) {
+    LoopReport report;
+    report.state_seq = seq;
+    report.events = events;
+    const std::string sentence = watch.note(model, report);
+    told += !sentence.empty();
+    EXPECT_TRUE(sentence.empty() || sentence.starts_with("drill-3.2 stands on metal")) << sentence;
+  };
+  for (std::uint64_t seq = 1; seq < 3000; ++seq) at(seq, seq > 1000 && seq % 300 < 200 ? kOnMetal : kGuided);
+  EXPECT_EQ(told, 1);
+  for (std::uint64_t seq = 3000; seq < 4000; ++seq) at(seq, 0);
+  EXPECT_EQ(told, 1);
+  for (std::uint64_t seq = 4000; seq < 4100; ++seq) at(seq, kOnMetal | kForceLimited);
+  EXPECT_EQ(told, 2);
 }
 
 // Ticks of a session as the watch is asked of them: those outside only.

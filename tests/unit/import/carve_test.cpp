@@ -9,6 +9,7 @@
 #include "server/import/bone_surface.hpp"
 #include "server/import/carving.hpp"
 #include "tests/support/process.hpp"
+#include "tests/support/scenes/bones.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/import/fixtures.hpp"
 
@@ -40,6 +41,24 @@ TEST(Carving, ABurrsGrooveHasItsVolume) {
   EXPECT_GE(report->computed, report->modified);
   EXPECT_GT(report->modified, 0);
   EXPECT_EQ(report->pieces + report->debris, 0);
+}
+
+// Down through bone into a plate of metal: the cuts that would take it are left out, and said.
+TEST(Carving, LeavesMetalWhereItIs) {
+  const auto plate = [](const Vec3& p) { return p.z() < -4.0 ? Tissue::metal : Tissue::none; };
+  Carving carving(osteon::test::marked_block(12.0, 8.0, 0.5, plate), 0.5), bone(osteon::test::plain_block(12.0, 8.0, 0.5), 0.5);
+  const CarveStep through = step("burr-round-5", {down(0, 0, 0), down(0, 0, -8)});
+  const auto report = carving.run(through, keep_going), all = bone.run(through, keep_going);
+  ASSERT_TRUE(report && all);
+  // The first sample of metal is at 4.5 mm, and the tip may be half a millimetre deep in it.
+  EXPECT_EQ(report->cuts, 10);
+  EXPECT_EQ(report->metal_refused, 6);
+  EXPECT_EQ(all->metal_refused, 0);
+  EXPECT_EQ(all->cuts, 16);
+  EXPECT_LT(report->removed_mm3, all->removed_mm3);
+  EXPECT_NE(line(1, *report).find("metal refused 6 more cuts"), std::string::npos);
+  EXPECT_EQ(line(1, *all).find("metal"), std::string::npos);
+  EXPECT_EQ(nlohmann::json::parse(to_json({*report}, carving.fields()))["steps"][0]["metal_refused"], 6);
 }
 
 TEST(Carving, TheWayIsTheSameInAnyParts) {

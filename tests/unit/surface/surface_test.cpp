@@ -244,6 +244,71 @@ TEST(SurfaceBlocks, FineAndCoarseTogetherDrawEveryFaceOnce) {
   EXPECT_NEAR(after.area - before.area, wall - mouths, 2.0);
 }
 
+// A rod of metal and a cap of enamel in a block: each vertex has the tissue of what is below it, on the imported surface and
+// on faces that cuts have left. Blocks that meet neither have the bytes that they had.
+TEST(SurfaceBlocks, MetalAndEnamelAreMarked) {
+  const auto tissue = [](const Vec3& p) {
+    if (std::hypot(p.x() - 3.0, p.y()) < 1.0) return Tissue::metal;
+    return p.x() < -6.0 && p.z() > -3.0 ? Tissue::enamel : Tissue::none;
+  };
+  DrawnSurface plain{CutField(test::plain_block(20.0, 10.0, 0.5), {})};
+  DrawnSurface marked{CutField(test::marked_block(20.0, 10.0, 0.5, tissue), {})};
+  // Past the rod, beside which it lays metal bare, and into the enamel: cuts of two levels, and far off in coarse blocks.
+  Cut groove = test::straight_cut(*find_tool("burr-round-5"), {3, -8, -1}, {3, -2.4, -1}, {0, 0, -1});
+  const Cut across = test::straight_cut(*find_tool("drill-3.2"), {-8, 0, 1}, {-8, 0, -6}, {0, 0, -1});
+  for (DrawnSurface* surface : {&plain, &marked})
+    for (int level : {1, 2}) {
+      Cut cut = level == 1 ? groove : across;
+      cut.level = level;
+      surface->cut(cut);
+      const Focus focus{{0, 9, 0}, 3.0, 6.0};
+      (void)surface->blocks.focus({&focus, 1}, surface->field.bone().bounds_samples(), 0.5);
+    }
+  const auto before = plain.all(), after = marked.all();
+  ASSERT_EQ(before.size(), after.size());
+  int same = 0, metal = 0, enamel = 0, cut_enamel = 0, bone = 0;
+  std::set<int> levels;
+  for (const auto& [key, payload] : after) {
+    const double pitch_mm = level_pitch_mm(0.5, key.level);
+    const auto mesh = decode_block(key, payload, pitch_mm);
+    ASSERT_TRUE(mesh) << mesh.error().message;
+    same += payload == before.at(key);
+    EXPECT_EQ(payload == before.at(key), mesh->tissue.empty());
+    if (mesh->tissue.empty()) continue;
+    const auto without = decode_block(key, before.at(key), pitch_mm);
+    EXPECT_EQ(without->positions_mm, mesh->positions_mm);
+    EXPECT_EQ(without->cut_face, mesh->cut_face);
+    EXPECT_EQ(payload.bytes.size(), before.at(key).bytes.size() + (mesh->positions_mm.size() + 3) / 4) << "two bits a vertex";
+    ASSERT_EQ(mesh->tissue.size(), mesh->positions_mm.size());
+    levels.insert(key.level);
+    for (std::size_t v = 0; v < mesh->tissue.size(); ++v) {
+      const Point& at = mesh->positions_mm[v];
+      const Vec3 p(at[0], at[1], at[2]);
+      metal += mesh->tissue[v] == Tissue::metal;
+      enamel += mesh->tissue[v] == Tissue::enamel;
+      cut_enamel += mesh->tissue[v] == Tissue::enamel && mesh->cut_face[v] != 0;
+      // Where it is the same in a whole sample round it, nothing else may be shown.
+      const double reach_mm = std::max(0.5, pitch_mm);
+      bool alike = true;
+      for (int i = 0; i < 27; ++i)
+        alike &= tissue(p + reach_mm * Vec3(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1)) == tissue(p);
+      if (!alike) continue;
+      ASSERT_EQ(mesh->tissue[v], tissue(p)) << key.level << ": " << p.transpose();
+      bone += mesh->tissue[v] == Tissue::none;
+    }
+    // Two bits that say nothing are no block's.
+    BlockPayload broken = payload;
+    broken.bytes.back() |= 3;
+    EXPECT_FALSE(decode_block(key, broken, pitch_mm));
+  }
+  EXPECT_GT(same, 20);
+  EXPECT_GT(metal, 20);
+  EXPECT_GT(enamel, 200);
+  EXPECT_GT(cut_enamel, 50);
+  EXPECT_GT(bone, 50);
+  EXPECT_GE(levels.size(), 3u);
+}
+
 TEST(SurfaceBlocks, CutFacesAreMarked) {
   DrawnSurface surface{CutField(test::plain_block(20.0, 10.0, 0.5), {})};
   const CutReport report = surface.field.apply(test::straight_cut(*find_tool("drill-3.2"), {1, 1, 1}, {1, 1, -14}, {0, 0, -1}));

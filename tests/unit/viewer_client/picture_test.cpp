@@ -9,8 +9,11 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "common/surface/block_source.hpp"
+#include "common/volume/cut_field.hpp"
 #include "picture.hpp"
 #include "synthetic.hpp"
+#include "tests/support/scenes/bones.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "viewer_client/app/viewer.hpp"
 #include "viewer_client/render/window.hpp"
@@ -69,6 +72,52 @@ TEST_F(Picture, CutFacesAreRedder) {
   const Vec3 imported = colour(image, kWidth / 2 - offset, kHeight / 2);
   const Vec3 cut = colour(image, kWidth / 2 + offset, kHeight / 2);
   EXPECT_GT(cut.x() / cut.y(), 1.25 * imported.x() / imported.y());
+}
+
+// A block of bone with a rod of metal and a cap of enamel, a groove through all of the bone between: over the wire and drawn.
+TEST_F(Picture, MetalAndEnamelHaveColoursOfTheirOwn) {
+  const auto tissue = [](const Vec3& p) {
+    if (std::hypot(p.x() - 8.0, p.z() + 6.0) < 3.0) return Tissue::metal;
+    return p.x() < -6.0 ? Tissue::enamel : Tissue::none;
+  };
+  CutField field(test::marked_block(28.0, 12.0, 0.5, tissue), BodyId{});
+  SurfaceBlocks blocks{BodyId{}};
+  // Along the front face, into the enamel and the bone, short of the rod.
+  const Cut groove = test::straight_cut(*find_tool("burr-round-5"), {-12, -15.5, -8.5}, {-1, -15.5, -8.5}, {0, 0, -1});
+  (void)blocks.touch(groove.level, field.apply(groove).changed_leaves);
+  std::vector<BlockKey> keys = blocks.fine_blocks();
+  const CoordBox b = field.bone().bounds_samples();
+  for (int x = (b.min.x - 1) >> 4; x <= b.max.x >> 4; ++x)
+    for (int y = (b.min.y - 1) >> 4; y <= b.max.y >> 4; ++y)
+      for (int z = (b.min.z - 1) >> 4; z <= b.max.z >> 4; ++z) keys.push_back({{}, 0, {x, y, z}});
+  int region = 0;
+  for (const BlockKey& key : keys) {
+    BlockSamples samples;
+    gather_block(field, blocks, key, 0.5, samples);
+    const auto mesh = decode_block(key, encode_block(samples), level_pitch_mm(0.5, key.level));
+    ASSERT_TRUE(mesh);
+    window_->show_region({BodyId{0}, 0, {region++, 0, 0}}, *mesh);
+  }
+  CameraView view = from_front(90.0);
+  view.target_mm = Vec3(0, -14, -6);
+  view.eye_mm = Vec3(0, -90, -6);
+  window_->look(view);
+  const Image image = drawn();
+  if (const char* folder = std::getenv("OSTEON_PICTURES")) ASSERT_TRUE(window_->save_png(std::string(folder) + "/metal.png"));
+  const double px_per_mm = focal_px(view) / 76.0;
+  const auto seen = [&](double x_mm, double z_mm) {
+    return colour(image, kWidth / 2 + static_cast<int>(std::lround(px_per_mm * x_mm)),
+                  kHeight / 2 - static_cast<int>(std::lround(px_per_mm * (z_mm + 6.0))));
+  };
+  const Vec3 bone = seen(2.0, -2.0), metal = seen(8.0, -6.0), enamel = seen(-10.0, -2.0), cut_bone = seen(-3.0, -6.0),
+             cut_enamel = seen(-10.0, -6.0);
+  EXPECT_GT(bone.x(), bone.z() + 10.0) << "warm";
+  EXPECT_GT(metal.z(), metal.x() + 10.0) << "cold";
+  EXPECT_NEAR(enamel.x(), enamel.z(), 20.0) << "white";
+  EXPECT_GT(enamel.minCoeff(), bone.z() + 10.0);
+  EXPECT_GT(cut_bone.x() / cut_bone.y(), 1.25 * bone.x() / bone.y());
+  EXPECT_GT((cut_enamel - cut_bone).norm(), 40.0);
+  EXPECT_GT((cut_enamel - enamel).norm(), 12.0);
 }
 
 TEST_F(Picture, DoesNotDependOnTheOrderOfArrival) {

@@ -325,6 +325,9 @@ TEST(Gauges, NameToolForceAndDepth) {
   state.phase = CuttingPhase::cutting;
   state.engaged_fraction = 0.5;
   EXPECT_EQ(gauge_text(state), "drill-3.2, cutting\n1000 rpm\nforce 13.0 N\ndepth 0.0 mm\ndensity 1.90 g/cm\xC2\xB3");
+  state.phase = CuttingPhase::rubbing;
+  state.on_metal = true;
+  EXPECT_NE(gauge_text(state).find("\non metal: it does not cut\n"), std::string::npos) << gauge_text(state);
 }
 
 }  // namespace

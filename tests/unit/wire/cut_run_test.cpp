@@ -685,11 +685,13 @@ TEST(ToolState, ComesBackWithinItsSteps) {
   state.torque_Nmm = -12.34;
   state.depth_mm = -3.5;
   state.phase = CuttingPhase::cutting;
+  state.on_metal = true;
   wire::HeardState known;
   const v1::ToolState full = wire::to_tool_state(state, 5, true);
   ASSERT_TRUE(wire::take_over(full, known).value());
   EXPECT_EQ(known.state.author, state.author);
   EXPECT_EQ(known.buttons, 5u);
+  EXPECT_TRUE(known.state.on_metal);
   EXPECT_EQ(known.state.tool_name, state.tool_name);
   EXPECT_EQ(known.state.spindle_rpm, 20000);
   EXPECT_NEAR(known.state.feed_mm_per_s, 1.2345, 0.0005 + 1e-9);
