@@ -27,8 +27,10 @@ struct TriangleDistance {
 // From p to the triangle a, b, c, in the square of their unit. Finite for finite corners: where the triangle has no area the
 // nearest of its sides counts. Regions of the plane as in Ericson, Real-Time Collision Detection, 2005, section 5.1.5.
 template <class Scalar>
-[[nodiscard]] TriangleDistance<Scalar> distance_to_triangle(const Eigen::Matrix<Scalar, 3, 1>& p, const Eigen::Matrix<Scalar, 3, 1>& a,
-                                                            const Eigen::Matrix<Scalar, 3, 1>& b, const Eigen::Matrix<Scalar, 3, 1>& c) {
+[[nodiscard]] TriangleDistance<Scalar> distance_to_triangle(const Eigen::Matrix<Scalar, 3, 1>& p,
+                                                            const Eigen::Matrix<Scalar, 3, 1>& a,
+                                                            const Eigen::Matrix<Scalar, 3, 1>& b,
+                                                            const Eigen::Matrix<Scalar, 3, 1>& c) {
   using Vector = Eigen::Matrix<Scalar, 3, 1>;
   constexpr unsigned kA = 1, kB = 2, kC = 4;
   const Vector ab = b - a, ac = c - a, ap = p - a;
@@ -44,11 +46,13 @@ template <class Scalar>
   if (vc <= 0 && d1 >= 0 && d3 <= 0 && d1 > d3) return {(ap - ab * (d1 / (d1 - d3))).squaredNorm(), kA | kB};
   if (vb <= 0 && d2 >= 0 && d6 <= 0 && d2 > d6) return {(ap - ac * (d2 / (d2 - d6))).squaredNorm(), kA | kC};
   const Scalar along = d4 - d3, beyond = d5 - d6;
-  if (va <= 0 && along >= 0 && beyond >= 0 && along + beyond > 0) return {(bp - (c - b) * (along / (along + beyond))).squaredNorm(), kB | kC};
+  if (va <= 0 && along >= 0 && beyond >= 0 && along + beyond > 0)
+    return {(bp - (c - b) * (along / (along + beyond))).squaredNorm(), kB | kC};
   // va + vb + vc is four times the squared area; by rounding it may be anything where the corners lie in a line.
   const Scalar sum = va + vb + vc;
   if (!(sum > std::sqrt(std::numeric_limits<Scalar>::epsilon()) * ab.squaredNorm() * ac.squaredNorm()))
-    return {std::min({squared_distance_to_segment<Scalar>(p, a, b), squared_distance_to_segment<Scalar>(p, a, c), squared_distance_to_segment<Scalar>(p, b, c)}),
+    return {std::min({squared_distance_to_segment<Scalar>(p, a, b), squared_distance_to_segment<Scalar>(p, a, c),
+                      squared_distance_to_segment<Scalar>(p, b, c)}),
             kA | kB | kC};
   return {(ap - ab * (vb / sum) - ac * (vc / sum)).squaredNorm(), kA | kB | kC};
 }

@@ -5,11 +5,12 @@
 
 namespace osteon::imaging {
 
-// HU where a voxel is dense bone that is kept, and where it is outside and below the threshold. Voxels of other islands go to
-// the last whole HU below the threshold: a trilinear cell with a voxel of a kept island has none of another (they would be
-// 26-neighbours), so the kept surface does not move. Voxels of kept marrow go above it, so that the surface lies half way
-// between the values of marrow and air where it meets air, and half way between the voxels elsewhere.
+// Kept dense voxels keep their HU. All outside voxels end below the threshold: those of other islands get the last whole HU
+// below it. A trilinear cell with a voxel of a kept island has none of another (they would be 26-neighbours), so the kept
+// surface does not move. Kept marrow is raised above the threshold. Where marrow meets air, the surface lies half way between
+// their values; where it meets anything else, half way between the voxels.
 // `bones`: not 0 where the voxel is kept. Error: cancelled.
-[[nodiscard]] Result<HuVolume> bone_field(const HuVolume& volume, const VoxelMask& bones, double threshold_hu, const KeepGoing& keep_going);
+[[nodiscard]] Result<HuVolume> bone_field(const HuVolume& volume, const VoxelMask& bones, double threshold_hu,
+                                          const KeepGoing& keep_going);
 
 }  // namespace osteon::imaging

@@ -1,7 +1,6 @@
 #include "common/imaging/cancellous.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "common/imaging/components.hpp"
 
@@ -14,7 +13,8 @@ constexpr int kCorner = 8;  // voxels that belong to a solid round one at its co
 Error stopped() { return {ErrorCode::cancelled, "stopped while looking for cancellous bone"}; }
 
 // How many voxels of a 3 x 3 square within the slice are at or above a value; beyond the volume none is.
-void count_in_slice(const HuVolume& volume, double least_hu, int slice, std::vector<std::uint8_t>& row, std::vector<std::uint8_t>& out) {
+void count_in_slice(const HuVolume& volume, double least_hu, int slice, std::vector<std::uint8_t>& row,
+                    std::vector<std::uint8_t>& out) {
   const int columns = volume.dims[0], rows = volume.dims[1];
   row.assign(out.size(), 0);
   std::ranges::fill(out, std::uint8_t{0});
@@ -40,12 +40,15 @@ void count_in_slice(const HuVolume& volume, double least_hu, int slice, std::vec
 class CountAround {
  public:
   CountAround(const HuVolume& volume, double least_hu) : volume_(volume), least_hu_(least_hu) {
-    for (auto& count : counts_) count.assign(static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]), 0);
+    for (auto& count : counts_)
+      count.assign(static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]), 0);
     count_in_slice(volume_, least_hu_, 0, row_, at(0));
   }
   void go_to(int slice) {
-    if (slice + 1 < volume_.dims[2]) count_in_slice(volume_, least_hu_, slice + 1, row_, at(slice + 1));
-    else std::ranges::fill(at(slice + 1), std::uint8_t{0});
+    if (slice + 1 < volume_.dims[2])
+      count_in_slice(volume_, least_hu_, slice + 1, row_, at(slice + 1));
+    else
+      std::ranges::fill(at(slice + 1), std::uint8_t{0});
   }
   [[nodiscard]] int around(std::size_t i) const { return counts_[0][i] + counts_[1][i] + counts_[2][i]; }
 
@@ -57,9 +60,11 @@ class CountAround {
   std::vector<std::uint8_t> row_;
 };
 
-// Voxels that may be cancellous bone: so bright on most of their 27, which takes noise out. Air has no vote, so that a solid in
-// air keeps its edges; in other surroundings a voxel at an edge or corner, where fewer belong to the solid, must be bright itself.
-Result<VoxelMask> candidates(const HuVolume& volume, const VoxelMask& dense, const SegmentationParams& params, const KeepGoing& keep_going) {
+// Voxels that may be cancellous bone: so bright on most of their 27, which takes noise out. Air voxels are not counted, so that a
+// solid in air keeps its edges; in other surroundings a voxel at an edge or corner, where fewer belong to the solid, must be
+// bright itself.
+Result<VoxelMask> candidates(const HuVolume& volume, const VoxelMask& dense, const SegmentationParams& params,
+                             const KeepGoing& keep_going) {
   VoxelMask out(volume.dims);
   const std::size_t area = static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]);
   CountAround bright(volume, params.cancellous_hu), no_air(volume, params.air_hu);
@@ -86,17 +91,12 @@ Result<bool> keep_with_core(VoxelMask& mask, const VoxelMask& core, double share
   if (!found) return tl::unexpected(found.error());
   const std::vector<std::int64_t> all = found->voxels();
   std::vector<std::int64_t> of_core(found->count, 0);
-  for (const VoxelRun& run : found->runs) {
-    const std::uint8_t* row = core.values.data() + core.index(0, run.row, run.slice);
-    of_core[run.component] += std::count_if(row + run.first, row + run.last + 1, [](std::uint8_t v) { return v != 0; });
-  }
+  for (const VoxelRun& run : found->runs) of_core[run.component] += count_in_run(core, run);
   std::vector<bool> kept(found->count, false);
-  for (std::size_t i = 0; i < kept.size(); ++i) kept[i] = of_core[i] > 0 && static_cast<double>(of_core[i]) >= share * static_cast<double>(all[i]);
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    kept[i] = of_core[i] > 0 && static_cast<double>(of_core[i]) >= share * static_cast<double>(all[i]);
   for (const VoxelRun& run : found->runs)
-    if (!kept[run.component]) {
-      std::uint8_t* row = mask.values.data() + mask.index(0, run.row, run.slice);
-      std::fill(row + run.first, row + run.last + 1, std::uint8_t{0});
-    }
+    if (!kept[run.component]) fill_run(mask, run, 0);
   return std::ranges::any_of(kept, [](bool k) { return k; });
 }
 
@@ -129,9 +129,14 @@ Result<VoxelMask> between_dense(const VoxelMask& candidate, const VoxelMask& den
       const std::size_t i = candidate.index(x, y, z);
       return static_cast<std::uint8_t>(dense.values[i] != 0 || (candidate.values[i] != 0 && leads.values[i] != 0) ? 1 : 0);
     };
-    if (!keep_going(direction / 13.0)) return tl::unexpected(stopped());
-    for (const Place& p : places) back.at(p.column, p.row, p.slice) = lead(p, -1, back);
+    std::size_t asked = 0;
+    const auto stop = [&] { return (asked++ & 0xfffff) == 0 && !keep_going(direction / 13.0); };
+    for (const Place& p : places) {
+      if (stop()) return tl::unexpected(stopped());
+      back.at(p.column, p.row, p.slice) = lead(p, -1, back);
+    }
     for (auto p = places.rbegin(); p != places.rend(); ++p) {
+      if (stop()) return tl::unexpected(stopped());
       const std::uint8_t leads = lead(*p, 1, fore);
       fore.at(p->column, p->row, p->slice) = leads;
       if (leads != 0 && back.at(p->column, p->row, p->slice) != 0) between.at(p->column, p->row, p->slice) = 1;
@@ -149,7 +154,10 @@ void add_edge_to_air(const HuVolume& volume, double air_hu, VoxelMask& found) {
     const double half_hu = 0.5 * (volume.at(p.column, p.row, p.slice) + kAir_hu);
     for (int side = 0; side < 6; ++side) {
       const int step = side % 2 == 0 ? -1 : 1, axis = side / 2;
-      const auto at = [&](int steps) { return std::array<int, 3>{p.column + (axis == 0 ? steps : 0), p.row + (axis == 1 ? steps : 0), p.slice + (axis == 2 ? steps : 0)}; };
+      const auto at = [&](int steps) {
+        return std::array<int, 3>{p.column + (axis == 0 ? steps : 0), p.row + (axis == 1 ? steps : 0),
+                                  p.slice + (axis == 2 ? steps : 0)};
+      };
       const auto inside = [&, columns = columns, rows = rows, slices = slices](const std::array<int, 3>& c) {
         return c[0] >= 0 && c[1] >= 0 && c[2] >= 0 && c[0] < columns && c[1] < rows && c[2] < slices;
       };
@@ -165,7 +173,8 @@ void add_edge_to_air(const HuVolume& volume, double air_hu, VoxelMask& found) {
 
 }  // namespace
 
-Result<VoxelMask> cancellous_between(const HuVolume& volume, const VoxelMask& dense, const SegmentationParams& params, const KeepGoing& keep_going) {
+Result<VoxelMask> cancellous_between(const HuVolume& volume, const VoxelMask& dense, const SegmentationParams& params,
+                                     const KeepGoing& keep_going) {
   auto candidate = candidates(volume, dense, params, part(keep_going, 0.0, 0.3));
   if (!candidate) return candidate;
   // A core is farther from dense bone than half of a joint's width.
@@ -183,7 +192,8 @@ Result<VoxelMask> cancellous_between(const HuVolume& volume, const VoxelMask& de
   auto found = between_dense(*candidate, dense, part(keep_going, 0.6, 0.85));
   if (!found) return found;
   // A vessel with contrast medium and chalk in its wall has a few such lines; of cancellous bone most is between dense bone.
-  if (const auto left = keep_with_core(*candidate, *found, kLeastBetween, part(keep_going, 0.85, 0.9)); !left) return tl::unexpected(left.error());
+  if (const auto left = keep_with_core(*candidate, *found, kLeastBetween, part(keep_going, 0.85, 0.9)); !left)
+    return tl::unexpected(left.error());
   for (std::size_t i = 0; i < found->values.size(); ++i)
     if (candidate->values[i] == 0) found->values[i] = 0;
   const auto around = within_mm(core_of(*found), volume.spacing_mm, 2.0 * params.bridged_mm, part(keep_going, 0.9, 1.0));

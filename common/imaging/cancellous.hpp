@@ -5,7 +5,7 @@
 namespace osteon::imaging {
 
 // 1 for every such voxel, as segment_bone() says; `dense`: the voxels at or above the threshold. Error: cancelled.
-[[nodiscard]] Result<VoxelMask> cancellous_between(const HuVolume& volume, const VoxelMask& dense, const SegmentationParams& params,
-                                                   const KeepGoing& keep_going);
+[[nodiscard]] Result<VoxelMask> cancellous_between(const HuVolume& volume, const VoxelMask& dense,
+                                                   const SegmentationParams& params, const KeepGoing& keep_going);
 
 }  // namespace osteon::imaging

@@ -34,7 +34,8 @@ std::vector<std::int64_t> Components::voxels() const {
   return size;
 }
 
-Result<Components> find_components(const VoxelMask& mask, const std::bitset<256>& of, Connectivity connectivity, const KeepGoing& keep_going) {
+Result<Components> find_components(const VoxelMask& mask, const std::bitset<256>& of, Connectivity connectivity,
+                                   const KeepGoing& keep_going) {
   const auto [columns, rows, slices] = mask.dims;
   std::array<bool, 256> wanted{};
   for (std::size_t i = 0; i < wanted.size(); ++i) wanted[i] = of[i];
@@ -46,7 +47,8 @@ Result<Components> find_components(const VoxelMask& mask, const std::bitset<256>
   row_begin.reserve(static_cast<std::size_t>(rows) * static_cast<std::size_t>(slices) + 1);
   Forest forest;
   for (int slice = 0; slice < slices; ++slice) {
-    if (!keep_going(static_cast<double>(slice) / slices)) return failure(ErrorCode::cancelled, "stopped while looking for connected voxels");
+    if (!keep_going(static_cast<double>(slice) / slices))
+      return failure(ErrorCode::cancelled, "stopped while looking for connected voxels");
     for (int row = 0; row < rows; ++row) {
       row_begin.push_back(static_cast<std::uint32_t>(runs.size()));
       const std::uint8_t* value = mask.values.data() + mask.index(0, row, slice);
@@ -60,7 +62,8 @@ Result<Components> find_components(const VoxelMask& mask, const std::bitset<256>
       const auto end = static_cast<std::uint32_t>(runs.size());
       const auto join = [&, rows = rows](int other_row, int other_slice) {
         if (other_row < 0 || other_row >= rows || other_slice < 0) return;
-        const std::size_t r = static_cast<std::size_t>(other_slice) * static_cast<std::size_t>(rows) + static_cast<std::size_t>(other_row);
+        const std::size_t r =
+            static_cast<std::size_t>(other_slice) * static_cast<std::size_t>(rows) + static_cast<std::size_t>(other_row);
         std::uint32_t a = row_begin[r], b = row_begin.back();
         const std::uint32_t a_end = row_begin[r + 1];
         while (a < a_end && b < end) {
@@ -76,11 +79,25 @@ Result<Components> find_components(const VoxelMask& mask, const std::bitset<256>
 
   std::vector<std::uint32_t> number(runs.size());
   for (std::uint32_t i = 0; i < runs.size(); ++i) {
+    if ((i & 0xfffff) == 0 && !keep_going(1.0))
+      return failure(ErrorCode::cancelled, "stopped while looking for connected voxels");
     const std::uint32_t root = forest.root(i);
     if (root == i) number[i] = found.count++;
     runs[i].component = number[root];
   }
   return found;
+}
+
+bool any_in_run(const VoxelMask& mask, const VoxelRun& run) { return count_in_run(mask, run) > 0; }
+
+std::int64_t count_in_run(const VoxelMask& mask, const VoxelRun& run) {
+  const std::uint8_t* row = mask.values.data() + mask.index(0, run.row, run.slice);
+  return std::count_if(row + run.first, row + run.last + 1, [](std::uint8_t v) { return v != 0; });
+}
+
+void fill_run(VoxelMask& mask, const VoxelRun& run, std::uint8_t value) {
+  std::uint8_t* row = mask.values.data() + mask.index(0, run.row, run.slice);
+  std::fill(row + run.first, row + run.last + 1, value);
 }
 
 }  // namespace osteon::imaging

@@ -3,7 +3,6 @@
 #include <array>
 #include <bitset>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "common/imaging/voxel_mask.hpp"
@@ -32,5 +31,10 @@ struct Components {
 // Components of the voxels whose value is in `of`. Error: cancelled.
 [[nodiscard]] Result<Components> find_components(const VoxelMask& mask, const std::bitset<256>& of, Connectivity connectivity,
                                                  const KeepGoing& keep_going);
+
+// Voxels of the mask along a run that are not 0.
+[[nodiscard]] bool any_in_run(const VoxelMask& mask, const VoxelRun& run);
+[[nodiscard]] std::int64_t count_in_run(const VoxelMask& mask, const VoxelRun& run);
+void fill_run(VoxelMask& mask, const VoxelRun& run, std::uint8_t value);
 
 }  // namespace osteon::imaging

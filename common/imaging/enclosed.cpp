@@ -18,16 +18,21 @@ class Face {
  public:
   // `fixed`: the axis that the face is normal to.
   Face(const VoxelMask& solid, int fixed, bool last, const ScanEnds& ends)
-      : solid_(solid), fixed_(fixed), u_((fixed + 1) % 3), v_((fixed + 2) % 3), at_(last ? solid.dims[index(fixed)] - 1 : 0),
-        width_(solid.dims[index(u_)]), height_(solid.dims[index(v_)]),
+      : solid_(solid),
+        fixed_(fixed),
+        u_((fixed + 1) % 3),
+        v_((fixed + 2) % 3),
+        at_(last ? solid.dims[index(fixed)] - 1 : 0),
+        width_(solid.dims[index(u_)]),
+        height_(solid.dims[index(v_)]),
         reached_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), 0) {
     if (!ends[index(fixed)][last ? 1 : 0]) {
       for (int v = 0; v < height_; ++v)
         for (int u = 0; u < width_; ++u) reach(u, v);
       return;
     }
-    edge(v_, ends, [&](int i, bool far) { reach(i, far ? height_ - 1 : 0); }, width_);
-    edge(u_, ends, [&](int i, bool far) { reach(far ? width_ - 1 : 0, i); }, height_);
+    edge(v_, ends, width_, [&](int i, bool far) { reach(i, far ? height_ - 1 : 0); });
+    edge(u_, ends, height_, [&](int i, bool far) { reach(far ? width_ - 1 : 0, i); });
     flood();
   }
 
@@ -67,7 +72,7 @@ class Face {
   // Both edges of the face where it meets the two faces across `axis`. An edge of the scan is open from its ends up to the
   // first solid voxel; any other is open throughout.
   template <class Reach>
-  void edge(int axis, const ScanEnds& ends, Reach reach_at, int length) {
+  void edge(int axis, const ScanEnds& ends, int length, Reach reach_at) {
     for (const bool far : {false, true}) {
       const bool scan_ends = ends[index(axis)][far ? 1 : 0];
       const auto is_free = [&](int i) { return axis == v_ ? free(i, far ? height_ - 1 : 0) : free(far ? width_ - 1 : 0, i); };
@@ -104,7 +109,9 @@ VoxelMask open_faces(const VoxelMask& solid, const ScanEnds& ends) {
 
 // Whether a sphere of `radius_mm` has room in one component. The scan's ends are no walls: what goes on beyond them may be as
 // wide as it is here.
-bool has_room(const Components& spaces, std::uint32_t component, const std::array<int, 3>& dims, const Vec3& spacing_mm, double radius_mm) {
+// Error: cancelled.
+Result<bool> has_room(const Components& spaces, std::uint32_t component, const std::array<int, 3>& dims, const Vec3& spacing_mm,
+                      double radius_mm, const KeepGoing& keep_going) {
   std::array<int, 3> step{}, coarse{};
   Vec3 coarse_mm;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -125,7 +132,8 @@ bool has_room(const Components& spaces, std::uint32_t component, const std::arra
         const std::int64_t all = static_cast<std::int64_t>(size(x, 0)) * size(y, 1) * size(z, 2);
         wall.at(x, y, z) = free[wall.index(x, y, z)] < all ? 1 : 0;
       }
-  const auto near = within_mm(wall, coarse_mm, radius_mm - 0.5 * kCoarse_mm, [](double) { return true; });
+  const auto near = within_mm(wall, coarse_mm, radius_mm - 0.5 * kCoarse_mm, keep_going);
+  if (!near) return tl::unexpected(near.error());
   return std::ranges::any_of(near->values, [](std::uint8_t v) { return v == 0; });
 }
 
@@ -139,26 +147,23 @@ Result<void> mark_closed(const VoxelMask& solid, const Vec3& spacing_mm, const S
   if (!spaces) return tl::unexpected(spaces.error());
   const VoxelMask open = open_faces(solid, ends);
   std::vector<bool> outside(spaces->count, false);
-  for (const VoxelRun& run : spaces->runs) {
-    const std::uint8_t* row = open.values.data() + open.index(0, run.row, run.slice);
-    outside[run.component] = outside[run.component] || std::any_of(row + run.first, row + run.last + 1, [](std::uint8_t v) { return v != 0; });
-  }
+  for (const VoxelRun& run : spaces->runs) outside[run.component] = outside[run.component] || any_in_run(open, run);
   const std::vector<std::int64_t> voxels = spaces->voxels();
   const double widest_mm3 = 4.0 / 3.0 * std::numbers::pi * std::pow(params.widest_mm, 3);
   for (std::uint32_t i = 0; i < spaces->count; ++i)
-    if (!outside[i] && static_cast<double>(voxels[i]) * spacing_mm.prod() > widest_mm3)
-      outside[i] = has_room(*spaces, i, solid.dims, spacing_mm, params.widest_mm);
-  for (const VoxelRun& run : spaces->runs)
-    if (!outside[run.component]) {
-      std::uint8_t* row = marked.values.data() + marked.index(0, run.row, run.slice);
-      std::fill(row + run.first, row + run.last + 1, std::uint8_t{1});
+    if (!outside[i] && static_cast<double>(voxels[i]) * spacing_mm.prod() > widest_mm3) {
+      const auto wide = has_room(*spaces, i, solid.dims, spacing_mm, params.widest_mm, [&](double) { return keep_going(1.0); });
+      if (!wide) return tl::unexpected(wide.error());
+      outside[i] = *wide;
     }
+  for (const VoxelRun& run : spaces->runs)
+    if (!outside[run.component]) fill_run(marked, run, 1);
   return {};
 }
 
 // The space around each core that belongs to it: free, near a core, connected to it, and out of reach of the ball.
-Result<VoxelMask> grow_cores(const VoxelMask& solid, const VoxelMask& cores, const VoxelMask& within_reach, const Vec3& spacing_mm,
-                             double reach_mm, const KeepGoing& keep_going) {
+Result<VoxelMask> grow_cores(const VoxelMask& solid, const VoxelMask& cores, const VoxelMask& within_reach,
+                             const Vec3& spacing_mm, double reach_mm, const KeepGoing& keep_going) {
   auto near = within_mm(cores, spacing_mm, reach_mm, part(keep_going, 0.0, 0.5));
   if (!near) return near;
   for (std::size_t i = 0; i < near->values.size(); ++i)
@@ -168,32 +173,28 @@ Result<VoxelMask> grow_cores(const VoxelMask& solid, const VoxelMask& cores, con
   const auto pieces = find_components(*near, one, Connectivity::faces, part(keep_going, 0.5, 1.0));
   if (!pieces) return tl::unexpected(pieces.error());
   std::vector<bool> has_core(pieces->count, false);
-  for (const VoxelRun& run : pieces->runs) {
-    const std::uint8_t* row = cores.values.data() + cores.index(0, run.row, run.slice);
-    has_core[run.component] = has_core[run.component] || std::any_of(row + run.first, row + run.last + 1, [](std::uint8_t v) { return v != 0; });
-  }
+  for (const VoxelRun& run : pieces->runs) has_core[run.component] = has_core[run.component] || any_in_run(cores, run);
   for (const VoxelRun& run : pieces->runs)
-    if (!has_core[run.component]) {
-      std::uint8_t* row = near->values.data() + near->index(0, run.row, run.slice);
-      std::fill(row + run.first, row + run.last + 1, std::uint8_t{0});
-    }
+    if (!has_core[run.component]) fill_run(*near, run, 0);
   return near;
 }
 
 }  // namespace
 
-Result<VoxelMask> enclosed_by(const VoxelMask& solid, const Vec3& spacing_mm, const SegmentationParams& params, const ScanEnds& ends,
-                              const KeepGoing& keep_going) {
+Result<VoxelMask> enclosed_by(const VoxelMask& solid, const Vec3& spacing_mm, const SegmentationParams& params,
+                              const ScanEnds& ends, const KeepGoing& keep_going) {
   // Where the centre of the ball cannot be: in the bone or nearer to it than the ball's radius.
   const auto wall = within_mm(solid, spacing_mm, params.bridged_mm, part(keep_going, 0.0, 0.15));
   if (!wall) return wall;
   VoxelMask cores(solid.dims);
-  if (auto marked = mark_closed(*wall, spacing_mm, params, ends, cores, part(keep_going, 0.15, 0.35)); !marked) return tl::unexpected(marked.error());
+  if (auto marked = mark_closed(*wall, spacing_mm, params, ends, cores, part(keep_going, 0.15, 0.35)); !marked)
+    return tl::unexpected(marked.error());
 
   VoxelMask closed = solid;
   if (std::ranges::any_of(cores.values, [](std::uint8_t v) { return v != 0; })) {
     VoxelMask centres(solid.dims);  // of the ball, outside
-    for (std::size_t i = 0; i < centres.values.size(); ++i) centres.values[i] = wall->values[i] == 0 && cores.values[i] == 0 ? 1 : 0;
+    for (std::size_t i = 0; i < centres.values.size(); ++i)
+      centres.values[i] = wall->values[i] == 0 && cores.values[i] == 0 ? 1 : 0;
     const auto reach = within_mm(centres, spacing_mm, params.bridged_mm, part(keep_going, 0.35, 0.5));
     if (!reach) return reach;
     const auto grown = grow_cores(solid, cores, *reach, spacing_mm, 2.0 * params.bridged_mm, part(keep_going, 0.5, 0.8));
@@ -204,7 +205,8 @@ Result<VoxelMask> enclosed_by(const VoxelMask& solid, const Vec3& spacing_mm, co
   if (!keep_going(0.8)) return tl::unexpected(stopped());
   // What is left of narrow spaces behind them, and every other hole that no path of voxels leaves.
   VoxelMask enclosed(solid.dims);
-  if (auto marked = mark_closed(closed, spacing_mm, params, ends, enclosed, part(keep_going, 0.8, 1.0)); !marked) return tl::unexpected(marked.error());
+  if (auto marked = mark_closed(closed, spacing_mm, params, ends, enclosed, part(keep_going, 0.8, 1.0)); !marked)
+    return tl::unexpected(marked.error());
   for (std::size_t i = 0; i < enclosed.values.size(); ++i)
     if (closed.values[i] != 0 && solid.values[i] == 0) enclosed.values[i] = 1;
   return enclosed;

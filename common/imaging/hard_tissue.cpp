@@ -6,22 +6,27 @@ namespace osteon::imaging {
 namespace {
 
 constexpr double kBlur_voxels = 2.0;
+constexpr std::size_t kOften = 1 << 20;  // voxels between two questions
 constexpr auto kMetal = static_cast<std::uint8_t>(Tissue::metal);
 constexpr auto kEnamel = static_cast<std::uint8_t>(Tissue::enamel);
 
 }  // namespace
 
-Result<HardTissue> find_hard_tissue(const HuVolume& volume, const VoxelMask& bones, const DensityCalibration& calibration, const KeepGoing& keep_going) {
+Result<HardTissue> find_hard_tissue(const HuVolume& volume, const VoxelMask& bones, const DensityCalibration& calibration,
+                                    const KeepGoing& keep_going) {
   const double hard_hu = hounsfield(calibration, kCompactBone_g_cm3);
   HardTissue found;
   VoxelMask metal(volume.dims);
   bool any = false, any_metal = false;
+  const auto stopped = [&](double done) { return !keep_going(done); };
+  const Error cancelled{ErrorCode::cancelled, "stopped while looking for metal"};
   for (std::size_t i = 0; i < volume.values.size(); ++i) {
+    if (i % kOften == 0 && stopped(0.3 * static_cast<double>(i) / static_cast<double>(volume.values.size())))
+      return tl::unexpected(cancelled);
     any = any || volume.values[i] > hard_hu;
     metal.values[i] = volume.values[i] >= kMetal_hu ? 1 : 0;
     any_metal = any_metal || metal.values[i] != 0;
   }
-  if (!keep_going(0.3)) return failure(ErrorCode::cancelled, "stopped while looking for metal");
   if (!any) return found;
   if (any_metal) {
     auto near = within_mm(metal, Vec3::Ones(), kBlur_voxels, [&](double done) { return keep_going(0.3 + 0.6 * done); });
@@ -31,6 +36,7 @@ Result<HardTissue> find_hard_tissue(const HuVolume& volume, const VoxelMask& bon
   found.tissue = VoxelMask(volume.dims);
   std::int64_t metal_voxels = 0, enamel_voxels = 0;
   for (std::size_t i = 0; i < volume.values.size(); ++i) {
+    if (i % kOften == 0 && stopped(0.9)) return tl::unexpected(cancelled);
     if (volume.values[i] <= hard_hu || bones.values[i] == 0) continue;
     const bool is_metal = metal.values[i] != 0;
     found.tissue.values[i] = is_metal ? kMetal : kEnamel;

@@ -12,7 +12,8 @@ constexpr int kMostNumbers = 255;
 
 }  // namespace
 
-Result<Islands> find_islands(const HuVolume& volume, const VoxelMask& bone, const DensityCalibration& calibration, const KeepGoing& keep_going) {
+Result<Islands> find_islands(const HuVolume& volume, const VoxelMask& bone, const DensityCalibration& calibration,
+                             const KeepGoing& keep_going) {
   std::bitset<256> not_zero;
   not_zero.set().reset(0);
   auto components = find_components(bone, not_zero, Connectivity::corners, [&](double done) { return keep_going(0.6 * done); });
@@ -30,7 +31,8 @@ Result<Islands> find_islands(const HuVolume& volume, const VoxelMask& bone, cons
   }
   std::size_t done = 0;
   for (const VoxelRun& run : components->runs) {
-    if ((done++ & 0xffff) == 0 && !keep_going(0.6 + 0.4 * static_cast<double>(done) / static_cast<double>(components->runs.size())))
+    if ((done++ & 0xffff) == 0 &&
+        !keep_going(0.6 + 0.4 * static_cast<double>(done) / static_cast<double>(components->runs.size())))
       return failure(ErrorCode::cancelled, "stopped while measuring the islands of bone");
     Sums& s = sums[run.component];
     const std::array<int, 3> low{run.first, run.row, run.slice}, high{run.last, run.row, run.slice};
@@ -65,13 +67,13 @@ Result<Islands> find_islands(const HuVolume& volume, const VoxelMask& bone, cons
 VoxelMask number_bones(const Islands& islands, std::span<const int> kept, bool merge, const std::array<int, 3>& dims) {
   std::vector<std::uint8_t> bone_of(islands.list.size() + 1, 0);
   int next = 1;
-  for (const int island : kept) bone_of[static_cast<std::size_t>(island)] = static_cast<std::uint8_t>(merge ? 1 : std::min(next++, kMostNumbers));
+  for (const int island : kept)
+    bone_of[static_cast<std::size_t>(island)] = static_cast<std::uint8_t>(merge ? 1 : std::min(next++, kMostNumbers));
   VoxelMask bones(dims);
   for (const VoxelRun& run : islands.components.runs) {
     const std::uint8_t bone = bone_of[static_cast<std::size_t>(islands.number[run.component])];
     if (bone == 0) continue;
-    std::uint8_t* row = bones.values.data() + bones.index(0, run.row, run.slice);
-    std::fill(row + run.first, row + run.last + 1, bone);
+    fill_run(bones, run, bone);
   }
   return bones;
 }

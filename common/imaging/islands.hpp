@@ -14,17 +14,17 @@ namespace osteon::imaging {
 // An island: voxels of bone that are connected across faces, edges or corners.
 struct Island {
   std::int64_t voxels = 0;
-  double volume_cm3 = 0.0;          // of its voxels
-  double density_g_cm3 = 0.0;       // mean over its voxels
-  Vec3 centre_mm = Vec3::Zero();    // of its voxels, LPS
-  std::array<int, 3> first{};       // voxel box, both ends included
+  double volume_cm3 = 0.0;        // of its voxels
+  double density_g_cm3 = 0.0;     // mean over its voxels
+  Vec3 centre_mm = Vec3::Zero();  // of its voxels, LPS
+  std::array<int, 3> first{};     // voxel box, both ends included
   std::array<int, 3> last{};
 };
 
 struct Islands {
-  std::vector<Island> list;         // largest first; among equals the first in memory. Number N is list[N - 1].
+  std::vector<Island> list;  // largest first; among equals the first in memory. Number N is list[N - 1].
   Components components;
-  std::vector<int> number;          // of each component, from 1
+  std::vector<int> number;  // of each component, from 1
 };
 
 // Islands of the voxels that are not 0. Error: cancelled.
@@ -34,6 +34,7 @@ struct Islands {
 // Numbers of bones, from 1: what voxels of the kept islands get in a mask of the volume's dims; others get 0. The islands
 // `kept`, by number, become bones 1, 2, 3 ... in this order, all of them bone 1 where `merge` is true. From the 255th on they
 // share the number 255.
-[[nodiscard]] VoxelMask number_bones(const Islands& islands, std::span<const int> kept, bool merge, const std::array<int, 3>& dims);
+[[nodiscard]] VoxelMask number_bones(const Islands& islands, std::span<const int> kept, bool merge,
+                                     const std::array<int, 3>& dims);
 
 }  // namespace osteon::imaging

@@ -11,7 +11,7 @@ namespace osteon::imaging {
 namespace {
 
 constexpr double kThresholdEnd = 0.05, kCancellousEnd = 0.35, kEnclosedEnd = 0.9;  // shares of the time
-constexpr int kFewest = 3;            // voxels that say whether a space holds air; fewer are noise within bone
+constexpr int kFewest = 3;               // voxels that say whether a space holds air; fewer are noise within bone
 constexpr double kAirEdge_voxels = 2.0;  // over which a scanner blurs the edge between air and bone
 
 Error stopped() { return {ErrorCode::cancelled, "stopped while looking for the bone"}; }
@@ -30,8 +30,8 @@ Result<VoxelMask> dense_voxels(const HuVolume& volume, double threshold_hu, cons
     }
   }
   if (!any)
-    return failure(ErrorCode::invalid_input, "no voxel reaches the bone threshold of " + std::to_string(std::lround(threshold_hu)) +
-                                                 " HU; give a lower --threshold");
+    return failure(ErrorCode::invalid_input, "no voxel reaches the bone threshold of " +
+                                                 std::to_string(std::lround(threshold_hu)) + " HU; give a lower --threshold");
   return dense;
 }
 
@@ -50,7 +50,8 @@ bool is_air(const HuVolume& volume, const VoxelMask& dense, std::array<int, 3> c
 }
 
 // Opens the spaces that hold air again, with the blurred edge around it.
-Result<void> remove_air(const HuVolume& volume, const VoxelMask& dense, double air_hu, VoxelMask& enclosed, const KeepGoing& keep_going) {
+Result<void> remove_air(const HuVolume& volume, const VoxelMask& dense, double air_hu, VoxelMask& enclosed,
+                        const KeepGoing& keep_going) {
   VoxelMask air(volume.dims);
   bool any = false;
   for (int slice = 0; slice < volume.dims[2]; ++slice) {
@@ -72,7 +73,8 @@ Result<void> remove_air(const HuVolume& volume, const VoxelMask& dense, double a
 
 }  // namespace
 
-Result<VoxelMask> segment_bone(const HuVolume& volume, const SegmentationParams& params, const ScanEnds& ends, const KeepGoing& keep_going) {
+Result<VoxelMask> segment_bone(const HuVolume& volume, const SegmentationParams& params, const ScanEnds& ends,
+                               const KeepGoing& keep_going) {
   auto dense = dense_voxels(volume, params.threshold_hu, part(keep_going, 0.0, kThresholdEnd));
   if (!dense || params.hollow) return dense;
 

@@ -20,10 +20,11 @@ struct SegmentationParams {
   // Cancellous bone that the dense bone does not close in, as at a saw cut, is at or above this. [A] Above muscle, blood and
   // discs without contrast medium (30 to 110 HU), below healthy cancellous bone.
   double cancellous_hu = 130.0;
-  double bridged_mm = 1.5;   // radius: narrower openings in dense bone, as for vessels, do not make a marrow space open
-  double widest_mm = 35.0;   // radius of the largest sphere in a marrow space; a wider one is the brain's, not marrow
-  double air_hu = -400.0;    // what is enclosed and below this on average is air, as in a sinus
-  bool hollow = false;       // only what is at or above the threshold is bone
+  // [A] The lengths and air's limit too.
+  double bridged_mm = 1.5;  // radius: narrower openings in dense bone, as for vessels, do not make a marrow space open
+  double widest_mm = 35.0;  // radius of the largest sphere in a marrow space; a wider one is the brain's, not marrow
+  double air_hu = -400.0;   // what is enclosed and below this on average is air, as in a sinus
+  bool hollow = false;      // only what is at or above the threshold is bone
 };
 
 // On which sides the volume ends where the scan ends: columns, rows, slices; first and last. A marrow space that is cut by
@@ -34,7 +35,8 @@ inline constexpr ScanEnds kAllScanEnds{{{true, true}, {true, true}, {true, true}
 // A marrow space is what a ball of `bridged_mm` cannot reach from outside the bone, where such a ball has room within, and
 // every hole that no path of voxels leaves. So narrow clefts on the outside of a bone, as sutures and joints, stay open.
 // Cancellous bone is `cancellous_hu` or more on most of its 27 voxels, lies on a straight line between two dense voxels, is wider
-// than a joint, and is so for the most part of what is connected and as bright. Errors: invalid_input (no voxel reaches the threshold), cancelled.
+// than a joint, and is so for the most part of what is connected and as bright. Errors: invalid_input (no voxel reaches the
+// threshold), cancelled.
 [[nodiscard]] Result<VoxelMask> segment_bone(const HuVolume& volume, const SegmentationParams& params, const ScanEnds& ends,
                                              const KeepGoing& keep_going);
 

@@ -24,7 +24,8 @@ bool along_row(const std::uint8_t* mask, int columns, float spacing_mm, int reac
   last = columns + reach;
   for (int x = columns - 1; x >= 0; --x) {
     if (mask[x] != 0) last = x;
-    if (last - x <= reach && last < columns) squared[x] = std::min(squared[x], step * static_cast<float>((last - x) * (last - x)));
+    if (last - x <= reach && last < columns)
+      squared[x] = std::min(squared[x], step * static_cast<float>((last - x) * (last - x)));
   }
   return true;
 }
@@ -36,8 +37,8 @@ struct Slice {
 };
 
 // The lower envelope over rows: a distance in the plane is the least of the rows' distances with the step across added.
-void across_rows(const std::vector<float>& rows, const std::vector<std::uint8_t>& filled, int columns, int count, float spacing_mm,
-                 int reach, Slice& out) {
+void across_rows(const std::vector<float>& rows, const std::vector<std::uint8_t>& filled, int columns, int count,
+                 float spacing_mm, int reach, Slice& out) {
   out.squared_mm2.assign(rows.size(), kFar);
   for (int y = 0; y < count; ++y) {
     float* to = out.squared_mm2.data() + static_cast<std::ptrdiff_t>(y) * columns;
@@ -70,8 +71,8 @@ Result<VoxelMask> within_mm(const VoxelMask& mask, const Vec3& spacing_mm, doubl
     Slice& made = held(slice);
     made.any = false;
     for (int y = 0; y < rows; ++y) {
-      const bool has = along_row(mask.values.data() + mask.index(0, y, slice), columns, static_cast<float>(spacing_mm.x()), reach(0),
-                                 row_distances.data() + static_cast<std::ptrdiff_t>(y) * columns);
+      const bool has = along_row(mask.values.data() + mask.index(0, y, slice), columns, static_cast<float>(spacing_mm.x()),
+                                 reach(0), row_distances.data() + static_cast<std::ptrdiff_t>(y) * columns);
       filled[static_cast<std::size_t>(y)] = has ? 1 : 0;
       made.any = made.any || has;
     }
@@ -80,7 +81,8 @@ Result<VoxelMask> within_mm(const VoxelMask& mask, const Vec3& spacing_mm, doubl
 
   for (int slice = 0; slice < std::min(reach_z, slices); ++slice) measure(slice);
   for (int slice = 0; slice < slices; ++slice) {
-    if (!keep_going(static_cast<double>(slice) / slices)) return failure(ErrorCode::cancelled, "stopped while measuring distances in the scan");
+    if (!keep_going(static_cast<double>(slice) / slices))
+      return failure(ErrorCode::cancelled, "stopped while measuring distances in the scan");
     if (slice + reach_z < slices) measure(slice + reach_z);
     bool any = false;
     for (int from = std::max(0, slice - reach_z); from <= std::min(slices - 1, slice + reach_z); ++from) {

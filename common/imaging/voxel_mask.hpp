@@ -15,10 +15,13 @@ struct VoxelMask {
   std::vector<std::uint8_t> values;  // columns fastest, then rows, then slices; 0: not in the mask
 
   VoxelMask() = default;
-  explicit VoxelMask(std::array<int, 3> size) : dims(size), values(static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(size[2]), 0) {}
+  explicit VoxelMask(std::array<int, 3> size)
+      : dims(size),
+        values(static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(size[2]), 0) {}
   [[nodiscard]] std::size_t index(int column, int row, int slice) const {
     return (static_cast<std::size_t>(slice) * static_cast<std::size_t>(dims[1]) + static_cast<std::size_t>(row)) *
-               static_cast<std::size_t>(dims[0]) + static_cast<std::size_t>(column);
+               static_cast<std::size_t>(dims[0]) +
+           static_cast<std::size_t>(column);
   }
   [[nodiscard]] std::uint8_t at(int column, int row, int slice) const { return values[index(column, row, slice)]; }
   [[nodiscard]] std::uint8_t& at(int column, int row, int slice) { return values[index(column, row, slice)]; }
@@ -26,6 +29,7 @@ struct VoxelMask {
 
 // 1 for every voxel whose centre is at most `radius_mm` from the centre of a voxel of the mask, that voxel included.
 // Exact Euclidean distances on voxels of `spacing_mm`. Error: cancelled.
-[[nodiscard]] Result<VoxelMask> within_mm(const VoxelMask& mask, const Vec3& spacing_mm, double radius_mm, const KeepGoing& keep_going);
+[[nodiscard]] Result<VoxelMask> within_mm(const VoxelMask& mask, const Vec3& spacing_mm, double radius_mm,
+                                          const KeepGoing& keep_going);
 
 }  // namespace osteon::imaging

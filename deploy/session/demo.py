@@ -38,7 +38,7 @@ def fingerprint(source: Path, importer: Path):
     files = sorted(source.rglob("*")) if source.is_dir() else [source]
     digest = hashlib.sha256()
     for file in [importer, *files]:
-        status = file.stat()
+        status = file.stat() if file.exists() else file.lstat()  # a link may lead nowhere
         name = "" if file == importer else str(file.relative_to(source))
         digest.update(f"{name}\0{status.st_size}\0{status.st_mtime_ns}\n".encode())
     return digest.hexdigest()[:16]

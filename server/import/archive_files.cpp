@@ -20,6 +20,8 @@
 #include <system_error>
 #include <vector>
 
+#include "server/import/isolated_reader.hpp"
+
 namespace osteon::import {
 namespace {
 
@@ -252,17 +254,45 @@ Result<FoundFiles> unpack_archive(const fs::path& archive, const fs::path& into,
   return Unpacker(archive, into, limits, keep_going).run();
 }
 
-InputKind tar_kind(const fs::path& archive, const KeepGoing& keep_going) {
+namespace {
+
+InputKind kind_by_entries(const fs::path& archive, ChildChannel& channel) {
   const Archive a = new_archive();
   if (archive_read_open_filename(a.get(), archive.c_str(), kChunk) != ARCHIVE_OK) return InputKind::other;
   archive_entry* entry = nullptr;
-  for (int entries = 0; entries < kMostFiles && keep_going(0.0); ++entries) {
+  for (int entries = 0; entries < kMostFiles; ++entries) {
     const int status = archive_read_next_header(a.get(), &entry);
     if (status != ARCHIVE_OK && status != ARCHIVE_WARN) return entries == 0 ? InputKind::other : InputKind::archive;
     const char* path = archive_entry_pathname(entry);
     if (path != nullptr && fs::path(path).filename() == "main.plist") return InputKind::inv3;
+    // Read in pieces, not skipped at once: the parent wants to hear that the child is alive.
+    const void* data = nullptr;
+    std::size_t size = 0;
+    la_int64_t offset = 0;
+    do channel.progress(0.0);
+    while (archive_read_data_block(a.get(), &data, &size, &offset) == ARCHIVE_OK);
   }
   return InputKind::archive;
+}
+
+}  // namespace
+
+InputKind tar_kind(const fs::path& archive, const KeepGoing& keep_going) {
+  InputKind kind = InputKind::other;
+  IsolatedWork work;
+  work.run = [&](ChildChannel& channel) -> Result<void> {
+    const char found = static_cast<char>(kind_by_entries(archive, channel));
+    channel.send(std::string_view(&found, 1));
+    return {};
+  };
+  work.on_message = [&](std::string_view message) {
+    if (message.size() != 1) return false;
+    for (const InputKind known : {InputKind::inv3, InputKind::archive})
+      if (message.front() == static_cast<char>(known)) kind = known;
+    return true;
+  };
+  (void)run_isolated(work, keep_going);  // of one that cannot be read the kind is `other`
+  return kind;
 }
 
 }  // namespace osteon::import

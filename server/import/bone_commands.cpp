@@ -141,13 +141,13 @@ double peak_memory_mb() {
   return at == std::string::npos ? 0.0 : std::strtod(status->c_str() + at + 6, nullptr) / 1024.0;
 }
 
-// Why a step removed nothing, for a person: how far its tip stays from bone, and where bone is.
-std::string nothing_removed(std::size_t number, const CarveStep& step, const Case& bone) {
-  double nearest_mm = std::numeric_limits<double>::infinity();
+// Why a step removed nothing, for a person: what its tip meets on its way, and where bone is.
+std::string nothing_removed(std::size_t number, const CarveStep& step, const StepReport& report, const Case& bone) {
+  bool in_bone = false;
+  double free_mm = std::numeric_limits<double>::infinity();  // a lower bound of the distance to bone, all along
   const auto look = [&](const Vec3& tip) {
-    const double surface_mm = bone.surface_mm(tip);
-    const bool in_band = surface_mm < 3.99 * bone.pitch_mm();
-    nearest_mm = std::min(nearest_mm, in_band ? surface_mm : bone.clearance_mm(tip));
+    in_bone = in_bone || bone.surface_mm(tip) < 0.0;
+    free_mm = std::min(free_mm, std::max(bone.clearance_mm(tip), std::max(0.0, bone.surface_mm(tip))));
   };
   look(step.path.front().position_mm);
   for (std::size_t i = 1; i < step.path.size(); ++i) {
@@ -156,12 +156,12 @@ std::string nothing_removed(std::size_t number, const CarveStep& step, const Cas
     for (int part = 1; part <= parts; ++part) look(from + (to - from) * part / parts);
   }
   const Box box = bone.bounds();
-  char where[200], text[320];
-  // In bone that an earlier step has taken away there is nothing left to remove either.
-  if (nearest_mm > 0.0) std::snprintf(where, sizeof where, "its tip stays at least %.1f mm from bone", nearest_mm);
-  else std::snprintf(where, sizeof where, "what it meets was removed before");
-  std::snprintf(text, sizeof text, "       step %zu removed nothing: %s; bone lies within x %.0f..%.0f, y %.0f..%.0f, z %.0f..%.0f mm\n", number, where, box.min_mm.x(),
-                box.max_mm.x(), box.min_mm.y(), box.max_mm.y(), box.min_mm.z(), box.max_mm.z());
+  char why[120], text[320];
+  if (report.metal_refused > 0) std::snprintf(why, sizeof why, "it meets metal, which no tool cuts");
+  else if (in_bone) std::snprintf(why, sizeof why, "what its tip meets was removed before");
+  else std::snprintf(why, sizeof why, "its tip stays at least %.1f mm from bone", free_mm);
+  std::snprintf(text, sizeof text, "       step %zu removed nothing: %s; bone lies within x %.0f..%.0f, y %.0f..%.0f, z %.0f..%.0f mm\n", number, why,
+                box.min_mm.x(), box.max_mm.x(), box.min_mm.y(), box.max_mm.y(), box.min_mm.z(), box.max_mm.z());
   return text;
 }
 
@@ -187,7 +187,7 @@ Result<std::string> run_carve(const Arguments& a, const StopSignal& stop) {
       if (!report) return tl::unexpected(report.error());
       reports.push_back(*report);
       text += line(i + 1, *report);
-      if (report->removed_mm3 <= 0.0) text += nothing_removed(i + 1, (*steps)[i], carving.field(0).bone());
+      if (report->removed_mm3 <= 0.0) text += nothing_removed(i + 1, (*steps)[i], *report, carving.field(0).bone());
     }
   }
   if (stop.requested()) return tl::unexpected(stopped());

@@ -34,7 +34,7 @@ struct Arguments {
   std::optional<double> pitch_mm, threshold_hu;
   std::optional<int> series;
   double width_mm = 20.0, density_g_cm3 = 1.9;
-  bool json = false, merge = false, hollow = false;
+  bool json = false, merge = false, hollow = false, list = false;
 };
 
 Result<void> save(const Case& bone, const std::string& out, const StopSignal& stop) {
@@ -81,11 +81,14 @@ Result<CtScan> read_scan(const Arguments& a, const KeepGoing& reading) {
 }
 
 Result<std::string> run_ct(const Arguments& a, const StopSignal& stop) {
-  if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
+  if (a.out.empty() && !a.list) return failure(ErrorCode::invalid_input, "--out is missing; name the folder of the case, or give --list to see the islands alone");
+  if (!a.out.empty())
+    if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
   CtOptions options;
   if (auto parsed = parse_keep(a.keep, options); !parsed) return tl::unexpected(parsed.error());
   options.merge = a.merge;
   options.hollow = a.hollow;
+  options.list_only = a.list;
   Bar bar(stop);
   auto scan = read_scan(a, bar.stage(0.0, 0.2));
   if (!scan) return tl::unexpected(scan.error());
@@ -96,6 +99,10 @@ Result<std::string> run_ct(const Arguments& a, const StopSignal& stop) {
   if (!a.title.empty()) options.title = a.title;
   const auto made = import_ct(std::move(*scan), options, bar.stage(0.2, 0.95));
   if (!made) return tl::unexpected(about(a.input, made.error()));
+  if (a.list) {
+    bar.stage(1.0, 1.0)(1.0);
+    return series + segmentation_text(made->found);
+  }
   if (auto saved = save(*made->bone, a.out, stop); !saved) return tl::unexpected(saved.error());
   bar.stage(1.0, 1.0)(1.0);
   return report_text(*made->bone) + series + segmentation_text(made->found);
@@ -244,10 +251,11 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
                  "DICOM: a folder (with all its subfolders), a zip or an ISO image; or an InVesalius project (.inv3)")
       ->required();
   ct->add_option("--series", a.series, "Number of the series, as osteon-import series lists them (default: the largest CT)");
-  ct->add_option("--out", a.out, "Folder of the case, made by this command")->required();
+  ct->add_option("--out", a.out, "Folder of the case, made by this command");
   ct->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the scan's smallest spacing)")->check(CLI::Range(0.02, 10.0));
   ct->add_option("--threshold", a.threshold_hu, "Bone is at or above it, HU (default: 226, usual for adult skulls in slices of 1.5 mm)")->check(CLI::Range(-1000.0, 4000.0));
   ct->add_option("--keep", a.keep, "Islands of bone by their number in the printed list, such as 1,3, or all (default: 1, the largest)");
+  ct->add_flag("--list", a.list, "List the islands and write nothing");
   ct->add_flag("--merge", a.merge, "Count the kept islands as one bone; otherwise each has a bone number of its own");
   ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone");
   ct->add_option("--title", a.title, "Name shown to people; do not use a patient's");

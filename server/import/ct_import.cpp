@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <numeric>
 
 #include "common/imaging/bone_field.hpp"
@@ -14,7 +15,8 @@ namespace osteon::import {
 namespace {
 
 // Shares of the time that the stages take, for one bar over all of them.
-constexpr double kSegmentEnd = 0.3, kIslandsEnd = 0.35, kFieldEnd = 0.4, kResampleEnd = 0.5, kSurfaceEnd = 0.85;
+constexpr double kSegmentEnd = 0.35, kSurfaceEnd = 0.85;
+constexpr double kLeastSpacing_mm = 0.01, kMostSpacing_mm = 20.0;  // of a CT's voxels
 // Around the voxels at work, so that whatever the segmentation looks at beside a bone is there.
 constexpr double kMargin_mm = 5.0;
 
@@ -35,10 +37,11 @@ Region grown(const std::array<int, 3>& first, const std::array<int, 3>& last, co
   return region;
 }
 
-// Around everything at or above the threshold; all of the scan where nothing is.
-Region dense_region(const imaging::HuVolume& volume, double threshold_hu) {
+// Around everything at or above the threshold; all of the scan where nothing is. Error: cancelled.
+Result<Region> dense_region(const imaging::HuVolume& volume, double threshold_hu, const KeepGoing& keep_going) {
   std::array<int, 3> first = volume.dims, last{-1, -1, -1};
-  for (int slice = 0; slice < volume.dims[2]; ++slice)
+  for (int slice = 0; slice < volume.dims[2]; ++slice) {
+    if (!keep_going(0.0)) return failure(ErrorCode::cancelled, "stopped before looking for the bone");
     for (int row = 0; row < volume.dims[1]; ++row) {
       const std::int16_t* hu = volume.values.data() + volume.index(0, row, slice);
       for (int column = 0; column < volume.dims[0]; ++column) {
@@ -47,24 +50,28 @@ Region dense_region(const imaging::HuVolume& volume, double threshold_hu) {
         last = {std::max(last[0], column), std::max(last[1], row), std::max(last[2], slice)};
       }
     }
+  }
   if (last[0] < 0) return grown({0, 0, 0}, {volume.dims[0] - 1, volume.dims[1] - 1, volume.dims[2] - 1}, volume);
   return grown(first, last, volume);
 }
 
 // The bone's voxels, the cell around each, and the band beyond.
-CoordBox lattice_box(const imaging::HuVolume& volume, const std::array<int, 3>& bone_first, const std::array<int, 3>& bone_last, double pitch_mm) {
+CoordBox lattice_box(const imaging::HuVolume& volume, const std::array<int, 3>& bone_first, const std::array<int, 3>& bone_last,
+                     double pitch_mm) {
   const Vec3 first(bone_first[0], bone_first[1], bone_first[2]), last(bone_last[0], bone_last[1], bone_last[2]);
   const Box cells = imaging::enclosing_box(volume, first - Vec3::Ones(), last + Vec3::Ones());
   return covering_samples(cells.grown(5.0 * pitch_mm), pitch_mm);
 }
 
 // Bone ends where the scan does: the intersection of two solids is the maximum of their distances.
-Result<void> cap_at_scan(const imaging::HuVolume& scan, double pitch_mm, DenseVolume<float>& surface_mm, const KeepGoing& keep_going) {
+Result<void> cap_at_scan(const imaging::HuVolume& scan, double pitch_mm, DenseVolume<float>& surface_mm,
+                         const KeepGoing& keep_going) {
   const auto band = static_cast<float>(4.0 * pitch_mm);
   const CoordBox& box = surface_mm.box;
   float* value = surface_mm.values.data();
   for (int x = box.min.x; x <= box.max.x; ++x) {
-    if (!keep_going(static_cast<double>(x - box.min.x) / box.dims().x)) return failure(ErrorCode::cancelled, "stopped at the ends of the scan");
+    if (!keep_going(static_cast<double>(x - box.min.x) / box.dims().x))
+      return failure(ErrorCode::cancelled, "stopped at the ends of the scan");
     for (int y = box.min.y; y <= box.max.y; ++y)
       for (int z = box.min.z; z <= box.max.z; ++z, ++value) {
         if (*value >= band) continue;
@@ -83,7 +90,8 @@ Result<std::vector<int>> islands_to_keep(const CtOptions& options, const std::ve
   std::vector<int> kept;
   for (const int number : options.keep) {
     if (number < 1 || number > static_cast<int>(islands.size()))
-      return failure(ErrorCode::invalid_input, "--keep names island " + std::to_string(number) + ", but at this threshold there are islands 1 to " +
+      return failure(ErrorCode::invalid_input, "--keep names island " + std::to_string(number) +
+                                                   ", but at this threshold there are islands 1 to " +
                                                    std::to_string(islands.size()) + "; give numbers of the list, or all");
     if (std::ranges::find(kept, number) == kept.end()) kept.push_back(number);
   }
@@ -99,11 +107,13 @@ class NearestLabel {
   [[nodiscard]] std::size_t voxel(const Vec3& position_mm) const {
     const Vec3 at = volume_.voxel(position_mm);
     const auto clamped = [&](double c, std::size_t axis) { return std::clamp(static_cast<int>(c), 0, volume_.dims[axis] - 1); };
-    const std::size_t nearest = bones_.index(clamped(std::round(at.x()), 0), clamped(std::round(at.y()), 1), clamped(std::round(at.z()), 2));
+    const std::size_t nearest =
+        bones_.index(clamped(std::round(at.x()), 0), clamped(std::round(at.y()), 1), clamped(std::round(at.z()), 2));
     if (bones_.values[nearest] != 0) return nearest;
     for (int corner = 0; corner < 8; ++corner) {
-      const std::size_t beside = bones_.index(clamped(std::floor(at.x()) + (corner & 1), 0), clamped(std::floor(at.y()) + (corner >> 1 & 1), 1),
-                                              clamped(std::floor(at.z()) + (corner >> 2), 2));
+      const std::size_t beside =
+          bones_.index(clamped(std::floor(at.x()) + (corner & 1), 0), clamped(std::floor(at.y()) + (corner >> 1 & 1), 1),
+                       clamped(std::floor(at.z()) + (corner >> 2), 2));
       if (bones_.values[beside] != 0) return beside;
     }
     return nearest;
@@ -119,17 +129,26 @@ class CaseSamples {
  public:
   CaseSamples(const imaging::HuVolume& volume, const imaging::VoxelMask& bones, const imaging::VoxelMask& hard, bool several,
               const DenseVolume<float>& surface_mm, const CtOptions& options, double pitch_mm)
-      : volume_(volume), bones_(bones), hard_(hard), several_(several), surface_mm_(surface_mm), calibration_(options.calibration), pitch_mm_(pitch_mm),
-        band_(static_cast<float>(4.0 * pitch_mm)), label_(volume, bones) {}
+      : volume_(volume),
+        bones_(bones),
+        hard_(hard),
+        several_(several),
+        surface_mm_(surface_mm),
+        calibration_(options.calibration),
+        pitch_mm_(pitch_mm),
+        band_(static_cast<float>(4.0 * pitch_mm)),
+        label_(volume, bones) {}
 
   PartKind fill(const CoordBox& part, PartBuffers& to) {
     const Coord dims = part.dims();
-    const std::size_t count = static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z);
+    const std::size_t count =
+        static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z);
     to.surface_mm.resize(count);
     const auto row = static_cast<std::size_t>(dims.z);
     std::size_t n = 0;
     for (int x = part.min.x; x <= part.max.x; ++x)
-      for (int y = part.min.y; y <= part.max.y; ++y, n += row) std::copy_n(&surface_mm_.values[surface_mm_.index({x, y, part.min.z})], row, &to.surface_mm[n]);
+      for (int y = part.min.y; y <= part.max.y; ++y, n += row)
+        std::copy_n(&surface_mm_.values[surface_mm_.index({x, y, part.min.z})], row, &to.surface_mm[n]);
     if (std::ranges::all_of(to.surface_mm, [&](float s) { return s >= band_; })) return PartKind::outside;
 
     to.density_g_cm3.assign(count, 0.0f);
@@ -145,11 +164,14 @@ class CaseSamples {
  private:
   void fill_leaf(Coord origin, const CoordBox& part, PartBuffers& to) {
     const CoordBox box{{std::max(origin.x, part.min.x), std::max(origin.y, part.min.y), std::max(origin.z, part.min.z)},
-                       {std::min(origin.x + kLeafSize - 1, part.max.x), std::min(origin.y + kLeafSize - 1, part.max.y), std::min(origin.z + kLeafSize - 1, part.max.z)}};
+                       {std::min(origin.x + kLeafSize - 1, part.max.x), std::min(origin.y + kLeafSize - 1, part.max.y),
+                        std::min(origin.z + kLeafSize - 1, part.max.z)}};
     const Coord dims = part.dims();
     const auto index = [&](Coord c) {
-      return (static_cast<std::size_t>(c.x - part.min.x) * static_cast<std::size_t>(dims.y) + static_cast<std::size_t>(c.y - part.min.y)) *
-                 static_cast<std::size_t>(dims.z) + static_cast<std::size_t>(c.z - part.min.z);
+      return (static_cast<std::size_t>(c.x - part.min.x) * static_cast<std::size_t>(dims.y) +
+              static_cast<std::size_t>(c.y - part.min.y)) *
+                 static_cast<std::size_t>(dims.z) +
+             static_cast<std::size_t>(c.z - part.min.z);
     };
     const auto each = [&](auto visit) {
       for (int x = box.min.x; x <= box.max.x; ++x)
@@ -184,11 +206,12 @@ class CaseSamples {
 };
 
 // What was found and what became of it, without the components, which are large.
-CtSegmentation summary(const imaging::HuVolume& volume, const imaging::VoxelMask& bone, const imaging::VoxelMask& bones, const imaging::Islands& islands,
-                       const std::vector<int>& kept) {
+CtSegmentation summary(const imaging::HuVolume& volume, const imaging::VoxelMask& bone, const imaging::VoxelMask& bones,
+                       const imaging::Islands& islands, const std::vector<int>& kept) {
   CtSegmentation found;
   std::int64_t marrow = 0;
-  for (std::size_t i = 0; i < bone.values.size(); ++i) marrow += bones.values[i] != 0 && bone.values[i] == static_cast<std::uint8_t>(imaging::BoneVoxel::marrow) ? 1 : 0;
+  for (std::size_t i = 0; i < bone.values.size(); ++i)
+    marrow += bones.values[i] != 0 && bone.values[i] == static_cast<std::uint8_t>(imaging::BoneVoxel::marrow) ? 1 : 0;
   found.marrow_cm3 = static_cast<double>(marrow) * volume.spacing_mm.prod() * 1e-3;
   found.region = imaging::enclosing_box(volume, Vec3::Zero(), Vec3(volume.dims[0] - 1, volume.dims[1] - 1, volume.dims[2] - 1));
   found.islands = islands.list;
@@ -199,57 +222,80 @@ CtSegmentation summary(const imaging::HuVolume& volume, const imaging::VoxelMask
   return found;
 }
 
-}  // namespace
+// The part of the scan with dense voxels, its islands, and which bone each voxel belongs to.
+struct Segmented {
+  imaging::HuVolume volume;
+  imaging::VoxelMask bones;
+  std::array<int, 3> first{}, last{};  // voxel box of the kept islands
+  CtSegmentation found;
+};
 
-Result<CtImport> import_ct(CtScan scan, const CtOptions& options, const KeepGoing& keep_going) {
+Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, const KeepGoing& keep_going) {
+  const auto work = dense_region(scan, options.threshold_hu, keep_going);
+  if (!work) return tl::unexpected(work.error());
+  Segmented s;
+  s.volume = imaging::cropped(std::move(scan), work->first, work->last);
+  imaging::SegmentationParams params;
+  params.threshold_hu = options.threshold_hu;
+  params.hollow = options.hollow;
+  const auto bone = imaging::segment_bone(s.volume, params, work->ends, part(keep_going, 0.0, 0.8));
+  if (!bone) return tl::unexpected(bone.error());
+  const auto islands = imaging::find_islands(s.volume, *bone, options.calibration, part(keep_going, 0.8, 1.0));
+  if (!islands) return tl::unexpected(islands.error());
+  auto kept = options.list_only ? Result<std::vector<int>>{} : islands_to_keep(options, islands->list);
+  if (!kept) return tl::unexpected(kept.error());
+  s.bones = imaging::number_bones(*islands, *kept, options.merge, s.volume.dims);
+  s.found = summary(s.volume, *bone, s.bones, *islands, *kept);
+  s.found.merged = options.merge;
+  s.first = s.volume.dims;
+  s.last = {-1, -1, -1};
+  for (const int number : *kept)
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const imaging::Island& island = islands->list[static_cast<std::size_t>(number - 1)];
+      s.first[axis] = std::min(s.first[axis], island.first[axis]);
+      s.last[axis] = std::max(s.last[axis], island.last[axis]);
+    }
+  return s;
+}
+
+// The signed distance to the kept bones, which end where the scan does. `geometry`: of the whole scan.
+Result<DenseVolume<float>> measure_surface(const Segmented& s, const imaging::HuVolume& geometry, double threshold_hu,
+                                           double pitch_mm, const KeepGoing& keep_going) {
+  const CoordBox box = lattice_box(s.volume, s.first, s.last, pitch_mm);
+  if (Result<void> fits = check_lattice(box, pitch_mm); !fits) return tl::unexpected(fits.error());
+  auto field = imaging::bone_field(s.volume, s.bones, threshold_hu, part(keep_going, 0.0, 0.1));
+  if (!field) return tl::unexpected(field.error());
+  auto samples = imaging::resample(*field, box, pitch_mm, part(keep_going, 0.1, 0.25));
+  if (!samples) return tl::unexpected(samples.error());
+  field->values = {};
+  auto surface_mm = signed_distance_mm(*samples, static_cast<float>(threshold_hu), pitch_mm, part(keep_going, 0.25, 0.9));
+  if (!surface_mm) return surface_mm;
+  if (auto capped = cap_at_scan(geometry, pitch_mm, *surface_mm, part(keep_going, 0.9, 1.0)); !capped)
+    return tl::unexpected(capped.error());
+  return surface_mm;
+}
+
+Result<CtImport> make_case(CtScan scan, const CtOptions& options, const KeepGoing& keep_going) {
   imaging::HuVolume geometry;  // of the whole scan, without its values
   geometry.dims = scan.volume.dims;
   geometry.spacing_mm = scan.volume.spacing_mm;
   geometry.origin_mm = scan.volume.origin_mm;
   geometry.directions = scan.volume.directions;
+  if (!(geometry.spacing_mm.minCoeff() >= kLeastSpacing_mm) || !(geometry.spacing_mm.maxCoeff() <= kMostSpacing_mm))
+    return failure(ErrorCode::invalid_input, "voxels of " + imaging::describe(geometry) + " are of no CT; export the scan again");
+
+  auto s = segment(std::move(scan.volume), options, part(keep_going, 0.0, kSegmentEnd));
+  if (!s) return tl::unexpected(s.error());
+  if (options.list_only) return CtImport{std::move(s->found), {}};
   const double pitch_mm = options.pitch_mm.value_or(geometry.spacing_mm.minCoeff());
-  if (!keep_going(0.0)) return failure(ErrorCode::cancelled, "stopped before looking for the bone");
-
-  const Region work = dense_region(scan.volume, options.threshold_hu);
-  imaging::HuVolume volume = imaging::cropped(std::move(scan.volume), work.first, work.last);
-  imaging::SegmentationParams params;
-  params.threshold_hu = options.threshold_hu;
-  params.hollow = options.hollow;
-  auto bone = imaging::segment_bone(volume, params, work.ends, part(keep_going, 0.0, kSegmentEnd));
-  if (!bone) return tl::unexpected(bone.error());
-  auto islands = imaging::find_islands(volume, *bone, options.calibration, part(keep_going, kSegmentEnd, kIslandsEnd));
-  if (!islands) return tl::unexpected(islands.error());
-  const auto kept = islands_to_keep(options, islands->list);
-  if (!kept) return tl::unexpected(kept.error());
-  imaging::VoxelMask bones = imaging::number_bones(*islands, *kept, options.merge, volume.dims);
-  CtImport made{summary(volume, *bone, bones, *islands, *kept), {}};
-  islands->components = {};
-  bone->values = {};
-
-  std::array<int, 3> first = volume.dims, last{-1, -1, -1};
-  for (const int number : *kept)
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const imaging::Island& island = islands->list[static_cast<std::size_t>(number - 1)];
-      first[axis] = std::min(first[axis], island.first[axis]);
-      last[axis] = std::max(last[axis], island.last[axis]);
-    }
-  const CoordBox box = lattice_box(volume, first, last, pitch_mm);
-  if (Result<void> fits = check_lattice(box, pitch_mm); !fits) return tl::unexpected(fits.error());
-
-  auto field = imaging::bone_field(volume, bones, options.threshold_hu, part(keep_going, kIslandsEnd, kFieldEnd));
-  if (!field) return tl::unexpected(field.error());
-  auto samples = imaging::resample(*field, box, pitch_mm, part(keep_going, kFieldEnd, kResampleEnd));
-  if (!samples) return tl::unexpected(samples.error());
-  field->values = {};
-  auto surface_mm = signed_distance_mm(*samples, static_cast<float>(options.threshold_hu), pitch_mm, part(keep_going, kResampleEnd, kSurfaceEnd));
+  const auto surface_mm =
+      measure_surface(*s, geometry, options.threshold_hu, pitch_mm, part(keep_going, kSegmentEnd, kSurfaceEnd));
   if (!surface_mm) return tl::unexpected(surface_mm.error());
-  *samples = {};
   const KeepGoing building = part(keep_going, kSurfaceEnd, 1.0);
-  if (auto capped = cap_at_scan(geometry, pitch_mm, *surface_mm, part(building, 0.0, 0.1)); !capped) return tl::unexpected(capped.error());
-  auto hard = imaging::find_hard_tissue(volume, bones, options.calibration, part(building, 0.1, 0.2));
+  const auto hard = imaging::find_hard_tissue(s->volume, s->bones, options.calibration, part(building, 0.0, 0.2));
   if (!hard) return tl::unexpected(hard.error());
-  made.found.metal_cm3 = hard->metal_cm3;
-  made.found.enamel_cm3 = hard->enamel_cm3;
+  s->found.metal_cm3 = hard->metal_cm3;
+  s->found.enamel_cm3 = hard->enamel_cm3;
 
   CaseInfo info;
   info.title = options.title;
@@ -257,12 +303,21 @@ Result<CtImport> import_ct(CtScan scan, const CtOptions& options, const KeepGoin
   info.pitch_mm = pitch_mm;
   info.calibration = options.calibration;
   info.threshold_hu = options.threshold_hu;
-  CaseSamples content(volume, bones, hard->tissue, kept->size() > 1 && !options.merge, *surface_mm, options, pitch_mm);
+  const bool several = s->found.kept.size() > 1 && !options.merge;
+  CaseSamples content(s->volume, s->bones, hard->tissue, several, *surface_mm, options, pitch_mm);
   const FillLabelledPart fill = [&](const CoordBox& part_box, PartBuffers& to) { return content.fill(part_box, to); };
-  auto built = Case::build(std::move(info), box, fill, part(building, 0.2, 1.0));
+  auto built = Case::build(std::move(info), surface_mm->box, fill, part(building, 0.2, 1.0));
   if (!built) return tl::unexpected(built.error());
-  made.bone.emplace(std::move(*built));
-  return made;
+  return CtImport{std::move(s->found), std::move(*built)};
+}
+
+}  // namespace
+
+Result<CtImport> import_ct(CtScan scan, const CtOptions& options, const KeepGoing& keep_going) try {
+  return make_case(std::move(scan), options, keep_going);
+} catch (const std::bad_alloc&) {
+  return failure(ErrorCode::exhausted,
+                 "this machine has no memory for a scan of that size; export thicker slices or a smaller region");
 }
 
 }  // namespace osteon::import

@@ -212,7 +212,7 @@ void read_dicom(const fs::path& file, DicomHeader& h) {
 
 }  // namespace
 
-void DicomHeader::pack(Packer& to) const {
+void DicomHeader::pack(ByteWriter& to) const {
   to.add(file), to.add(bytes), to.add(pixel_offset), to.add(kind), to.add(modality);
   to.add(series), to.add(instance), to.add(transfer_syntax), to.add(photometric), to.add(image_type), to.add(description),
       to.add(kernel);
@@ -221,8 +221,8 @@ void DicomHeader::pack(Packer& to) const {
   to.add(position), to.add(orientation), to.add(spacing), to.add(slope), to.add(intercept);
 }
 
-bool DicomHeader::unpack(Unpacker& from) {
-  return from.get(file) && from.get(bytes) && from.get(pixel_offset) && from.get(kind) && from.get(modality) &&
+bool DicomHeader::unpack(ByteReader& from) {
+  return from.get(file) && from.get(bytes) && from.get(pixel_offset) && from.get(kind) && kind <= FileKind::too_deep && from.get(modality) &&
          from.get(series) && from.get(instance) && from.get(transfer_syntax) && from.get(photometric) && from.get(image_type) &&
          from.get(description) && from.get(kernel) && from.get(series_number) && from.get(acquisition) &&
          from.get(temporal_position) && from.get(frames) && from.get(columns) && from.get(rows) && from.get(bits_allocated) &&

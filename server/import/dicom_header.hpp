@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "server/import/packed.hpp"
+#include "server/import/byte_stream.hpp"
 #include "server/import/skipped_files.hpp"
 
 namespace osteon::import {
@@ -28,8 +28,8 @@ struct DicomHeader {
   int bits_allocated = 0, bits_stored = 0, samples = 1;
   std::vector<double> position, orientation, spacing, slope, intercept;
 
-  void pack(Packer& to) const;
-  bool unpack(Unpacker& from);
+  void pack(ByteWriter& to) const;
+  bool unpack(ByteReader& from);
 };
 
 // The library may abort on a damaged file: call it in a process that may die.

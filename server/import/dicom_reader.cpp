@@ -39,7 +39,7 @@ struct Input {
   std::optional<std::size_t> named_file;  // when a slice was given
 };
 
-void pack(const FoundFiles& found, Packer& to) {
+void pack(const FoundFiles& found, ByteWriter& to) {
   to.add(found.files.size());
   for (const FoundFile& f : found.files) to.add(f.path.string()), to.add(f.name);
   to.add(found.skipped.counts().size());
@@ -49,7 +49,7 @@ void pack(const FoundFiles& found, Packer& to) {
   }
 }
 
-bool unpack(Unpacker& from, FoundFiles& found) {
+bool unpack(ByteReader& from, FoundFiles& found) {
   std::size_t size = 0;
   if (!from.get(size) || size > kMostFiles) return false;
   for (std::size_t i = 0; i < size; ++i) {
@@ -81,19 +81,19 @@ Result<Input> unpacked(const fs::path& archive, const KeepGoing& keep_going) {
   Input input{.found = {}, .folder = std::move(*folder), .named_file = {}};
   const fs::path into = input.folder->path();
   IsolatedWork work;
-  work.run = [&](Speaker& speaker) -> Result<void> {
+  work.run = [&](ChildChannel& channel) -> Result<void> {
     const auto found = unpack_archive(archive, into, {}, [&](double fraction) {
-      speaker.progress(fraction);
+      channel.progress(fraction);
       return true;  // the parent ends this process when the user wants it stopped
     });
     if (!found) return tl::unexpected(found.error());
-    Packer packer;
+    ByteWriter packer;
     pack(*found, packer);
-    speaker.tell(packer.bytes());
+    channel.send(packer.bytes());
     return {};
   };
-  work.hear = [&](std::string_view message) {
-    Unpacker from(message);
+  work.on_message = [&](std::string_view message) {
+    ByteReader from(message);
     return unpack(from, input.found);
   };
   const IsolatedEnd end = run_isolated(work, keep_going);
@@ -111,21 +111,21 @@ Result<std::vector<DicomHeader>> read_headers(const FoundFiles& found, const Kee
   const std::size_t files = found.files.size();
   std::size_t next = 0;
   IsolatedWork work;
-  work.run = [&](Speaker& speaker) -> Result<void> {
+  work.run = [&](ChildChannel& channel) -> Result<void> {
     silence_library();
     for (std::size_t i = next; i < files; ++i) {
-      speaker.at_file(i);
-      speaker.progress(static_cast<double>(i) / static_cast<double>(files));
+      channel.at_file(i);
+      channel.progress(static_cast<double>(i) / static_cast<double>(files));
       DicomHeader h = read_header(found.files[i].path);
       h.file = i;
-      Packer packer;
+      ByteWriter packer;
       h.pack(packer);
-      speaker.tell(packer.bytes());
+      channel.send(packer.bytes());
     }
     return {};
   };
-  work.hear = [&](std::string_view message) {
-    Unpacker from(message);
+  work.on_message = [&](std::string_view message) {
+    ByteReader from(message);
     DicomHeader h;
     if (!h.unpack(from) || h.file != next || next >= files) return false;
     headers.push_back(std::move(h));
@@ -195,21 +195,21 @@ Result<void> read_volume(CtSeries& series, const FoundFiles& found, const KeepGo
   std::size_t next = 0;
   IsolatedWork work;
   work.memory_bytes = std::size_t{4} << 30;
-  work.run = [&](Speaker& speaker) -> Result<void> {
+  work.run = [&](ChildChannel& channel) -> Result<void> {
     silence_library();
     std::vector<std::int16_t> slice(pixels);
     for (std::size_t i = 0; i < slices; ++i) {
-      speaker.at_file(series.slices[i].file);
+      channel.at_file(series.slices[i].file);
       if (auto read =
               read_pixels(series.slices[i], found.files[series.slices[i].file].path, found.shown(series.slices[i].file), slice);
           !read)
         return read;
-      speaker.tell({reinterpret_cast<const char*>(slice.data()), pixels * sizeof(std::int16_t)});
-      speaker.progress(static_cast<double>(i + 1) / static_cast<double>(slices));
+      channel.send({reinterpret_cast<const char*>(slice.data()), pixels * sizeof(std::int16_t)});
+      channel.progress(static_cast<double>(i + 1) / static_cast<double>(slices));
     }
     return {};
   };
-  work.hear = [&](std::string_view message) {
+  work.on_message = [&](std::string_view message) {
     if (next == slices || message.size() != pixels * sizeof(std::int16_t)) return false;
     std::memcpy(volume.values.data() + pixels * next++, message.data(), message.size());
     return true;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kLargestAxis = 1 << 14;
 constexpr double kMostVoxels = 4e9;
-constexpr double kThickest_mm = 1000.0;
+constexpr double kLeastSpacing_mm = 0.01, kMostSpacing_mm = 20.0;
 constexpr int kFewSlices = 8;                // fewer are no volume to operate on
 constexpr std::size_t kGroupsCompared = 64;  // of one UID; hostile files could have each slice differ
 
@@ -22,9 +22,12 @@ using Slices = std::vector<DicomHeader>;
 Vec3 vec(const std::vector<double>& v, std::size_t first = 0) { return {v[first], v[first + 1], v[first + 2]}; }
 
 bool has_spacing(const DicomHeader& h) {
-  return h.spacing.size() == 2 && std::ranges::all_of(h.spacing, [](double mm) { return mm > 0.0 && mm <= kThickest_mm; });
+  return h.spacing.size() == 2 && std::ranges::all_of(h.spacing, [](double mm) { return mm >= kLeastSpacing_mm && mm <= kMostSpacing_mm; });
 }
-bool has_orientation(const DicomHeader& h) { return h.orientation.size() == 6; }
+// Two unit vectors; others would make positions along the normal that are no numbers.
+bool has_orientation(const DicomHeader& h) {
+  return h.orientation.size() == 6 && std::ranges::all_of(h.orientation, [](double part) { return std::abs(part) <= 1.1; });
+}
 bool has_place(const DicomHeader& h) { return has_spacing(h) && has_orientation(h) && h.position.size() == 3; }
 
 // What sets the second apart from the first; nothing where both may be slices of one volume.
@@ -64,7 +67,7 @@ Slices without_copies(Slices slices, SkippedFiles& skipped, const FoundFiles& fo
 }
 
 // Slices of one UID that may be of one volume.
-std::vector<Slices> alike(Slices slices) {
+std::vector<Slices> group_compatible(Slices slices) {
   std::vector<Slices> groups;
   for (DicomHeader& h : slices) {
     const std::size_t compared = std::min(groups.size(), kGroupsCompared);
@@ -110,7 +113,7 @@ bool places_repeat(const Slices& slices) {
 }
 
 // Parts a group whose places repeat, by the first mark that leaves no part with repeated ones.
-std::vector<Slices> parted(Slices slices) {
+std::vector<Slices> split_by_acquisition(Slices slices) {
   if (!places_repeat(slices)) return {std::move(slices)};
   using Mark = std::function<std::string(const DicomHeader&)>;
   const std::array<Mark, 4> marks = {[](const DicomHeader& h) { return std::to_string(h.acquisition); },
@@ -280,7 +283,7 @@ SeriesEntry entry_of(const Slices& slices) {
 
 // Files that belong to a series by its UID and are none of its slices: what may be missing in a gap. `groups` and
 // `no_pixels` lie together by UID.
-std::string strangers(const std::vector<Slices>& groups, std::size_t at, const Slices& no_pixels, const FoundFiles& found,
+std::string possible_gap_causes(const std::vector<Slices>& groups, std::size_t at, const Slices& no_pixels, const FoundFiles& found,
                       const SkippedFiles& skipped) {
   const DicomHeader& own = groups[at].front();
   std::string text;
@@ -344,8 +347,8 @@ std::vector<CtSeries> sort_series(std::vector<DicomHeader> headers, const FoundF
   std::ranges::stable_sort(no_pixels, {}, &DicomHeader::series);
   std::vector<Slices> groups;
   for (auto& [key, slices] : by_uid)
-    for (Slices& group : alike(without_copies(std::move(slices), skipped, found)))
-      for (Slices& part : parted(std::move(group))) groups.push_back(std::move(part));
+    for (Slices& group : group_compatible(without_copies(std::move(slices), skipped, found)))
+      for (Slices& part : split_by_acquisition(std::move(group))) groups.push_back(std::move(part));
 
   std::vector<CtSeries> series(groups.size());
   for (std::size_t i = 0; i < groups.size(); ++i) {
@@ -354,7 +357,7 @@ std::vector<CtSeries> sort_series(std::vector<DicomHeader> headers, const FoundF
     s.entry = entry_of(s.slices);
     s.entry.number = static_cast<int>(i) + 1;
     const std::string subject = groups.size() == 1 ? found.input : "series " + std::to_string(i + 1) + " of " + found.input;
-    s.fault = Arranger(s, found, subject, [&] { return strangers(groups, i, no_pixels, found, skipped); }).run();
+    s.fault = Arranger(s, found, subject, [&] { return possible_gap_causes(groups, i, no_pixels, found, skipped); }).run();
     if (s.fault) s.entry.problem = s.fault->brief;
   }
   return series;

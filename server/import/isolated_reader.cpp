@@ -70,8 +70,8 @@ void limit_memory([[maybe_unused]] std::size_t more_bytes) {
 #endif
 }
 
-Result<void> run_guarded(const IsolatedWork& work, Speaker& speaker) try {
-  return work.run(speaker);
+Result<void> run_guarded(const IsolatedWork& work, ChildChannel& channel) try {
+  return work.run(channel);
 } catch (const std::bad_alloc&) {
   ::_exit(1);  // as if it had died: the parent knows the file
 } catch (const std::exception& error) {
@@ -87,8 +87,8 @@ Result<void> run_guarded(const IsolatedWork& work, Speaker& speaker) try {
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
   limit_memory(work.memory_bytes);
-  Speaker speaker(out);
-  const Result<void> result = run_guarded(work, speaker);
+  ChildChannel channel(out);
+  const Result<void> result = run_guarded(work, channel);
   if (result) {
     put(out, Record::done);
   } else {
@@ -166,7 +166,7 @@ IsolatedEnd listen(Line& line, const IsolatedWork& work) {
       end.file = file;
     } else if (record == Record::progress) {
       if (!line.get(line.fraction) || !line.ask()) break;
-    } else if (!line.get_text(message) || !work.hear(message)) {
+    } else if (!line.get_text(message) || !work.on_message(message)) {
       break;
     }
   }
@@ -183,17 +183,17 @@ IsolatedEnd listen(Line& line, const IsolatedWork& work) {
 
 bool limits_memory() { return !OSTEON_SANITIZED; }
 
-void Speaker::at_file(std::size_t file) {
+void ChildChannel::at_file(std::size_t file) {
   put(descriptor_, Record::file);
   put(descriptor_, file);
 }
 
-void Speaker::progress(double fraction) {
+void ChildChannel::progress(double fraction) {
   put(descriptor_, Record::progress);
   put(descriptor_, fraction);
 }
 
-void Speaker::tell(std::string_view message) {
+void ChildChannel::send(std::string_view message) {
   put(descriptor_, Record::message);
   put_text(descriptor_, message);
 }

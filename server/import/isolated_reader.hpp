@@ -13,20 +13,20 @@
 namespace osteon::import {
 
 // How the child speaks to its parent. It never returns from a call when the parent is gone.
-class Speaker {
+class ChildChannel {
  public:
-  explicit Speaker(int descriptor) : descriptor_(descriptor) {}
+  explicit ChildChannel(int descriptor) : descriptor_(descriptor) {}
   void at_file(std::size_t file);  // the one that it opens now
   void progress(double fraction);
-  void tell(std::string_view message);
+  void send(std::string_view message);
 
  private:
   int descriptor_;
 };
 
 struct IsolatedWork {
-  std::function<Result<void>(Speaker&)> run;           // in the child
-  std::function<bool(std::string_view message)> hear;  // in the parent; false: the message makes no sense
+  std::function<Result<void>(ChildChannel&)> run;           // in the child
+  std::function<bool(std::string_view message)> on_message;  // in the parent; false: the message makes no sense
   std::size_t memory_bytes = std::size_t{1} << 30;     // that the child may take beside what it begins with
 };
 

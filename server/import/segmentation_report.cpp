@@ -6,8 +6,8 @@
 namespace osteon::import {
 namespace {
 
-constexpr std::size_t kMostListed = 12;
-constexpr double kLeastListed_cm3 = 0.05;  // smaller ones are summed up, unless they are kept
+constexpr std::size_t kMostListed = 40;
+constexpr double kLeastListed_cm3 = 0.05;  // smaller ones are summed up
 
 template <class... Values>
 std::string line(const char* format, Values... values) {
@@ -28,7 +28,12 @@ std::string place_words(const Vec3& at, const Box& box) {
   return words.empty() ? "middle" : words;
 }
 
-bool is_kept(const CtSegmentation& found, std::size_t number) { return std::ranges::find(found.kept, static_cast<int>(number)) != found.kept.end(); }
+// Of each island, in the order of the list.
+std::vector<bool> which_are_kept(const CtSegmentation& found) {
+  std::vector<bool> kept(found.islands.size(), false);
+  for (const int number : found.kept) kept[static_cast<std::size_t>(number - 1)] = true;
+  return kept;
+}
 
 }  // namespace
 
@@ -37,9 +42,10 @@ std::string segmentation_text(const CtSegmentation& found) {
   double kept_cm3 = 0.0, others_cm3 = 0.0, all_cm3 = 0.0, largest_other_cm3 = 0.0;
   std::size_t listed = 0, others = 0;
   text += "islands    number     cm3   g/cm3       centre, mm (LPS)\n";
+  const std::vector<bool> is_kept = which_are_kept(found);
   for (std::size_t i = 0; i < found.islands.size(); ++i) {
     const imaging::Island& island = found.islands[i];
-    const bool kept = is_kept(found, i + 1);
+    const bool kept = is_kept[i];
     all_cm3 += island.volume_cm3;
     if (kept) kept_cm3 += island.volume_cm3;
     if (listed >= kMostListed || (listed > 0 && island.volume_cm3 < kLeastListed_cm3)) {
@@ -49,22 +55,34 @@ std::string segmentation_text(const CtSegmentation& found) {
       continue;
     }
     ++listed;
-    text += line("           %6zu  %7.2f  %6.2f  %8.1f %8.1f %8.1f  %-4s  %s\n", i + 1, island.volume_cm3, island.density_g_cm3, island.centre_mm.x(),
-                 island.centre_mm.y(), island.centre_mm.z(), kept ? "kept" : "", place_words(island.centre_mm, found.region).c_str());
+    text += line("           %6zu  %7.2f  %6.2f  %8.1f %8.1f %8.1f  %-4s  %s\n", i + 1, island.volume_cm3, island.density_g_cm3,
+                 island.centre_mm.x(), island.centre_mm.y(), island.centre_mm.z(), kept ? "kept" : "",
+                 place_words(island.centre_mm, found.region).c_str());
   }
-  if (others > 0) text += line("           and %zu more of at most %.2f cm3 each, %.2f cm3 together\n", others, largest_other_cm3, others_cm3);
+  if (others > 0)
+    text += line("           and %zu more of at most %.2f cm3 each, %.2f cm3 together\n", others, largest_other_cm3, others_cm3);
+  if (found.kept.empty()) return text;
   const std::size_t left_out = found.islands.size() - found.kept.size();
   if (left_out == 0)
     text += line("kept       all %.2f cm3; nothing was left out\n", kept_cm3);
   else
-    text += line("kept       %.2f of %.2f cm3; %zu %s with %.2f cm3 (%.0f %%) left out: --keep 1,2 takes these numbers, --keep all takes all\n", kept_cm3, all_cm3,
-                 left_out, left_out == 1 ? "island" : "islands", found.left_out_cm3, 100.0 * found.left_out_cm3 / all_cm3);
+    text += line(
+        "kept       %.2f of %.2f cm3; %zu %s with %.2f cm3 (%.0f %%) left out: --keep 1,2 takes these numbers, --keep all takes "
+        "all\n",
+        kept_cm3, all_cm3, left_out, left_out == 1 ? "island" : "islands", found.left_out_cm3,
+        100.0 * found.left_out_cm3 / all_cm3);
+  if (found.kept.size() > 1)
+    text += found.merged ? "bones      1 in the case, of all kept islands\n"
+                         : line("bones      %zu in the case, one for each kept island\n", found.kept.size());
   if (found.marrow_cm3 > 0.0)
-    text += line("marrow     %.2f cm3 of that is below the threshold, enclosed by bone or between it; --hollow leaves it out\n", found.marrow_cm3);
+    text += line("marrow     %.2f cm3 of that is below the threshold, enclosed by bone or between it; --hollow leaves it out\n",
+                 found.marrow_cm3);
   if (found.metal_cm3 > 0.0)
-    text += line("metal      %.3f cm3 at or around %.0f HU and above: it is shown as metal, and no tool cuts it\n", found.metal_cm3, imaging::kMetal_hu);
+    text += line("metal      %.3f cm3 at or around %.0f HU and above: it is shown as metal, and no tool cuts it\n",
+                 found.metal_cm3, imaging::kMetal_hu);
   if (found.enamel_cm3 > 0.0)
-    text += line("enamel     %.3f cm3, or mineral as dense: shown as enamel, cut like compact bone of %.1f g/cm3\n", found.enamel_cm3, imaging::kCompactBone_g_cm3);
+    text += line("enamel     %.3f cm3, or mineral as dense: shown as enamel, cut like compact bone of %.1f g/cm3\n",
+                 found.enamel_cm3, imaging::kCompactBone_g_cm3);
   return text;
 }
 

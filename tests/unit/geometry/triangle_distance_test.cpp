@@ -44,7 +44,8 @@ TEST(TriangleDistance, IsFiniteAndRightWithoutArea) {
   const auto point = [&] { return Vec3(place(random), place(random), place(random)); };
   for (int i = 0; i < 300; ++i) {
     const Vec3 p = point(), a = point(), b = point(), on_line = a + (b - a) * place(random);
-    const std::array<std::array<Vec3, 3>, 7> triangles{{{a, a, b}, {a, b, a}, {b, a, a}, {a, a, a}, {a, b, on_line}, {on_line, a, b}, {a, on_line, b}}};
+    const std::array<std::array<Vec3, 3>, 7> triangles{
+        {{a, a, b}, {a, b, a}, {b, a, a}, {a, a, a}, {a, b, on_line}, {on_line, a, b}, {a, on_line, b}}};
     for (const auto& [u, v, w] : triangles) {
       const double sampled = by_sampling(p, u, v, w, 400), step = std::max((v - u).norm(), (w - u).norm()) / 400;
       for (const double d : {distance<double>(p, u, v, w), distance<float>(p, u, v, w)}) {

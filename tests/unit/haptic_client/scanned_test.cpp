@@ -12,7 +12,8 @@ bool keep_going(double) { return true; }
 
 // The layered block as a scanner sees it, entered along +z at z = 0.
 Case scanned_block() {
-  const import::Phantom slab{.kind = import::PhantomKind::block, .layers = {{5.0, 1.9}, {20.0, 0.3}, {5.0, 1.9}}, .width_mm = 20.0};
+  const import::Phantom slab{
+      .kind = import::PhantomKind::block, .layers = {{5.0, 1.9}, {20.0, 0.3}, {5.0, 1.9}}, .width_mm = 20.0};
   auto volume = import::scan_phantom(slab, 0.5, keep_going);
   EXPECT_TRUE(volume);
   volume->origin_mm.z() += 30.0;

@@ -28,7 +28,8 @@ HuVolume draw(std::array<int, 3> dims, const Vec3& spacing_mm, const std::functi
 
 BoneVoxel kind_at(const HuVolume& volume, const VoxelMask& bone, const Vec3& position_mm) {
   const Vec3 v = volume.voxel(position_mm);
-  return static_cast<BoneVoxel>(bone.at(static_cast<int>(std::lround(v.x())), static_cast<int>(std::lround(v.y())), static_cast<int>(std::lround(v.z()))));
+  return static_cast<BoneVoxel>(
+      bone.at(static_cast<int>(std::lround(v.x())), static_cast<int>(std::lround(v.y())), static_cast<int>(std::lround(v.z()))));
 }
 
 VoxelMask segment(const HuVolume& volume, const SegmentationParams& params = {}, const ScanEnds& ends = kAllScanEnds) {
@@ -138,7 +139,8 @@ TEST(Segmentation, NoiseDoesNotMakeHolesInMarrow) {
   // A sharp kernel: 150 HU of noise everywhere.
   std::mt19937 random(7);
   std::normal_distribution<double> noise(0.0, 150.0);
-  const HuVolume volume = draw({48, 48, 16}, Vec3(0.8, 0.8, 2.0), [&](const Vec3& p) { return static_cast<std::int16_t>(shaft(p) + noise(random)); });
+  const HuVolume volume =
+      draw({48, 48, 16}, Vec3(0.8, 0.8, 2.0), [&](const Vec3& p) { return static_cast<std::int16_t>(shaft(p) + noise(random)); });
   const VoxelMask bone = segment(volume);
   std::int64_t holes = 0, within = 0;
   for (int k = 0; k < 16; ++k)
@@ -171,7 +173,8 @@ TEST(Segmentation, CancellousBoneBetweenCortexIsBoneAlsoWhereItIsOpenAtTheSides)
 TEST(Segmentation, WithNoiseToo) {
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0.0, 30.0);
-  const HuVolume volume = draw({52, 52, 72}, Vec3::Constant(0.5), [&](const Vec3& p) { return static_cast<std::int16_t>(slab(p, 158) + noise(random)); });
+  const HuVolume volume = draw({52, 52, 72}, Vec3::Constant(0.5),
+                               [&](const Vec3& p) { return static_cast<std::int16_t>(slab(p, 158) + noise(random)); });
   const VoxelMask bone = segment(volume);
   std::int64_t wrong = 0, all = 0;
   for (int k = 0; k < 72; ++k)

@@ -23,7 +23,8 @@ bool is_near(const VoxelMask& mask, const Vec3& spacing_mm, double radius_mm, in
   for (int k = 0; k < mask.dims[2]; ++k)
     for (int j = 0; j < mask.dims[1]; ++j)
       for (int i = 0; i < mask.dims[0]; ++i)
-        if (mask.at(i, j, k) != 0 && spacing_mm.cwiseProduct(Vec3(i - x, j - y, k - z)).norm() <= radius_mm * (1.0 + 1e-7)) return true;
+        if (mask.at(i, j, k) != 0 && spacing_mm.cwiseProduct(Vec3(i - x, j - y, k - z)).norm() <= radius_mm * (1.0 + 1e-7))
+          return true;
   return false;
 }
 

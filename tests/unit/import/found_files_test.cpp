@@ -201,12 +201,12 @@ TEST(TemporaryFolder, GoesWithItsScope) {
 TEST(Isolated, ADeadChildIsToldWithItsFile) {
   std::vector<std::string> heard;
   IsolatedWork work;
-  work.run = [](Speaker& speaker) -> Result<void> {
-    speaker.at_file(7);
-    speaker.tell("before");
+  work.run = [](ChildChannel& channel) -> Result<void> {
+    channel.at_file(7);
+    channel.send("before");
     std::abort();
   };
-  work.hear = [&](std::string_view message) {
+  work.on_message = [&](std::string_view message) {
     heard.emplace_back(message);
     return true;
   };
@@ -219,10 +219,10 @@ TEST(Isolated, ADeadChildIsToldWithItsFile) {
 
 TEST(Isolated, AChildThatHangsIsStopped) {
   IsolatedWork work;
-  work.run = [](Speaker&) -> Result<void> {
+  work.run = [](ChildChannel&) -> Result<void> {
     for (;;) ::pause();
   };
-  work.hear = [](std::string_view) { return true; };
+  work.on_message = [](std::string_view) { return true; };
   int asked = 0;
   const IsolatedEnd end = run_isolated(work, [&](double) { return ++asked < 5; });
   ASSERT_FALSE(end.result);
@@ -233,11 +233,11 @@ TEST(Isolated, AChildThatTakesTheMachinesMemoryDies) {
   if (!limits_memory()) GTEST_SKIP() << "sanitizers reserve far more memory than they use";
   IsolatedWork work;
   work.memory_bytes = std::size_t{64} << 20;
-  work.run = [](Speaker&) -> Result<void> {
+  work.run = [](ChildChannel&) -> Result<void> {
     std::vector<std::string> all;
     for (;;) all.emplace_back(std::size_t{1} << 20, 'x');
   };
-  work.hear = [](std::string_view) { return true; };
+  work.on_message = [](std::string_view) { return true; };
   EXPECT_TRUE(run_isolated(work, keep_going).died);
 }
 

@@ -152,6 +152,87 @@ TEST_F(Program, ImportsTheLargestSeriesOfADiscAndSaysSo) {
   EXPECT_LT(first->volume_mm3(), 0.5 * second->volume_mm3());
 }
 
+// Two hollow boxes of cortex with fat in them, 64 and 27 mm3 of fat, apart from each other.
+void write_two_boxes(const fs::path& folder) {
+  imaging::HuVolume volume;
+  volume.dims = {30, 16, 16};
+  volume.values.assign(volume.count(), -1000);
+  const auto box = [&](int from, int edge) {
+    for (int k = 3; k < 3 + edge; ++k)
+      for (int j = 3; j < 3 + edge; ++j)
+        for (int i = from; i < from + edge; ++i) {
+          const auto inner = [&](int c, int low) { return c >= low + 2 && c < low + edge - 2; };
+          volume.values[volume.index(i, j, k)] = inner(i, from) && inner(j, 3) && inner(k, 3) ? -90 : 1400;
+        }
+  };
+  box(3, 8);
+  box(17, 7);
+  ASSERT_TRUE(write_dicom_series(volume, folder, keep_going));
+}
+
+TEST_F(Program, KeepsTheIslandsThatAreAskedForAndSaysWhatItLeavesOut) {
+  ASSERT_NO_FATAL_FAILURE(write_two_boxes(path("series")));
+  const auto listed = test::run(kProgram, {"ct", path("series"), "--list"});
+  ASSERT_EQ(listed.exit_code, 0) << listed.err;
+  EXPECT_NE(listed.out.find("     1     0.51"), std::string::npos) << listed.out;
+  EXPECT_NE(listed.out.find("     2     0.34"), std::string::npos) << listed.out;
+  EXPECT_EQ(files_of(folder_.path()).size(), 1u) << "--list wrote something";
+
+  const auto import = [&](const char* name, std::vector<std::string> more) {
+    std::vector<std::string> arguments{"ct", path("series"), "--out", path(name)};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const auto result = test::run(kProgram, arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.out;
+  };
+  EXPECT_NE(import("one", {}).find("1 island with 0.34 cm3 (40 %) left out"), std::string::npos);
+  EXPECT_NE(import("second", {"--keep", "2"}).find("1 island with 0.51 cm3 (60 %) left out"), std::string::npos);
+  EXPECT_NE(import("all", {"--keep", "all"}).find("2 in the case"), std::string::npos);
+  EXPECT_NE(import("merged", {"--keep", "1,2", "--merge"}).find("1 in the case"), std::string::npos);
+  const auto numbers = [&](const char* name) {
+    const auto bone = Case::load(path(name));
+    EXPECT_TRUE(bone);
+    return std::pair{bone->bone_number({7, 7, 4}), bone->bone_number({20, 6, 4})};
+  };
+  EXPECT_EQ(numbers("one"), (std::pair{1, 0}));
+  EXPECT_EQ(numbers("second"), (std::pair{0, 1}));
+  EXPECT_EQ(numbers("all"), (std::pair{1, 2}));
+  EXPECT_EQ(numbers("merged"), (std::pair{1, 1}));
+}
+
+TEST_F(Program, MarrowIsBoneUnlessHollowIsAskedFor) {
+  ASSERT_NO_FATAL_FAILURE(write_two_boxes(path("series")));
+  ASSERT_EQ(test::run(kProgram, {"ct", path("series"), "--out", path("whole")}).exit_code, 0);
+  ASSERT_EQ(test::run(kProgram, {"ct", path("series"), "--out", path("hollow"), "--hollow"}).exit_code, 0);
+  const auto whole = Case::load(path("whole")), hollow = Case::load(path("hollow"));
+  ASSERT_TRUE(whole && hollow);
+  EXPECT_LT(whole->surface_mm({6.5, 6.5, 6.5}), 0.0);
+  EXPECT_GT(hollow->surface_mm({6.5, 6.5, 6.5}), 0.0);
+}
+
+TEST_F(Program, WrongIslandsAreOneSentence) {
+  ASSERT_NO_FATAL_FAILURE(write_two_boxes(path("series")));
+  for (const char* wrong : {"0", "-1", "1,", ",1", "1;2", "some", "1.5", "99999999999", "ALL"})
+    expect_refused({"ct", path("series"), "--out", path("case"), std::string("--keep=") + wrong}, "--keep", folder_);
+  expect_refused({"ct", path("series"), "--out", path("case"), "--keep", "1,3"}, "island 3", folder_);
+  expect_refused({"ct", path("series")}, "--out", folder_);
+}
+
+TEST_F(Program, AStepThatRemovesNothingSaysWhy) {
+  ASSERT_EQ(test::run(kProgram, {"phantom", "block", "--layers", "6:1.9", "--width", "10", "--pitch", "0.5", "--out", path("case")}).exit_code, 0);
+  std::ofstream(folder_ / "script.yaml") << "steps:\n"
+      "  - {tool: burr-round-5, axis: [0, 0, -1], from: [0, 0, -2], to: [1, 0, -2]}\n"
+      "  - {tool: burr-round-5, axis: [0, 0, -1], from: [0, 0, -2], to: [1, 0, -2]}\n"
+      "  - {tool: burr-round-5, axis: [0, 0, -1], from: [0, 0, 80], to: [1, 0, 80]}\n"
+      "  - {tool: burr-round-5, axis: [0, 0, -1], from: [0, 0, 5], to: [1, 0, 5]}\n";
+  const auto carved = test::run(kProgram, {"carve", path("case"), path("script.yaml"), "--out", path("cut.vdb")});
+  ASSERT_EQ(carved.exit_code, 0) << carved.err;
+  EXPECT_EQ(carved.out.find("step 1 removed nothing"), std::string::npos) << carved.out;
+  EXPECT_NE(carved.out.find("step 2 removed nothing: what its tip meets was removed before"), std::string::npos) << carved.out;
+  EXPECT_NE(carved.out.find("step 3 removed nothing: its tip stays at least"), std::string::npos) << carved.out;
+  EXPECT_NE(carved.out.find("step 4 removed nothing: its tip stays at least"), std::string::npos) << carved.out;
+}
+
 TEST_F(Program, ListsSeriesForPrograms) {
   ASSERT_NO_FATAL_FAILURE(write_disc(folder_ / "disc"));
   const auto listed = test::run(kProgram, {"series", path("disc"), "--json"});

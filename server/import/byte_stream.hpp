@@ -8,7 +8,7 @@
 
 namespace osteon::import {
 
-class Packer {
+class ByteWriter {
  public:
   template <class T>
   requires std::is_trivially_copyable_v<T>
@@ -28,9 +28,9 @@ class Packer {
 };
 
 // Takes out in the order of packing. Once bytes are missing, everything is refused.
-class Unpacker {
+class ByteReader {
  public:
-  explicit Unpacker(std::string_view bytes) : bytes_(bytes) {}
+  explicit ByteReader(std::string_view bytes) : bytes_(bytes) {}
 
   template <class T>
   requires std::is_trivially_copyable_v<T>
