@@ -91,8 +91,8 @@ Result<VoxelMask> segment_bone(const HuVolume& volume, const SegmentationParams&
 
   for (std::size_t i = 0; i < solid.values.size(); ++i) {
     if (dense->values[i] != 0) continue;
-    const bool marrow = solid.values[i] != 0 || enclosed->values[i] != 0;
-    solid.values[i] = static_cast<std::uint8_t>(marrow ? BoneVoxel::marrow : BoneVoxel::none);
+    const BoneVoxel kind = solid.values[i] != 0 ? BoneVoxel::cancellous : enclosed->values[i] != 0 ? BoneVoxel::marrow : BoneVoxel::none;
+    solid.values[i] = static_cast<std::uint8_t>(kind);
   }
   return solid;
 }

@@ -11,8 +11,9 @@ namespace osteon::imaging {
 // Values of a mask that segment_bone() makes.
 enum class BoneVoxel : std::uint8_t {
   none = 0,
-  dense = 1,   // at or above the threshold
-  marrow = 2,  // below it, but part of the bone: enclosed by dense bone, or cancellous bone between dense bone
+  dense = 1,       // at or above the threshold
+  cancellous = 2,  // below it, between dense bone
+  marrow = 3,      // below it, enclosed by dense and cancellous bone
 };
 
 struct SegmentationParams {

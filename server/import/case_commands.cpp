@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -97,6 +98,8 @@ Result<std::string> run_ct(const Arguments& a, const StopSignal& stop) {
   options.pitch_mm = a.pitch_mm;
   if (a.threshold_hu) options.threshold_hu = *a.threshold_hu;
   if (!a.title.empty()) options.title = a.title;
+  if (std::ranges::any_of(options.title, [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
+    return failure(ErrorCode::invalid_input, "--title has control characters; write it in one line of plain text");
   const auto made = import_ct(std::move(*scan), options, bar.stage(0.2, 0.95));
   if (!made) return tl::unexpected(about(a.input, made.error()));
   if (a.list) {
@@ -201,6 +204,20 @@ Result<std::string> run_labels(const Arguments& a, const StopSignal& stop) {
   return text;
 }
 
+// A number within these bounds. Unlike CLI::Range it refuses "nan".
+CLI::Validator within(double low, double high) {
+  char text[64];
+  std::snprintf(text, sizeof text, "NUMBER in [%g - %g]", low, high);
+  const auto check = [low, high](const std::string& value) {
+    double number = 0.0;
+    if (CLI::detail::lexical_cast(value, number) && number >= low && number <= high) return std::string();
+    char wrong[64];
+    std::snprintf(wrong, sizeof wrong, " is not a number from %g to %g", low, high);
+    return value + wrong;
+  };
+  return {check, text, "within"};
+}
+
 double millimetres_of(const std::string& unit) { return unit == "m" ? 1000.0 : unit == "inch" ? 25.4 : unit == "cm" ? 10.0 : 1.0; }
 
 Result<std::string> run_stl(const Arguments& a, const StopSignal& stop) {
@@ -252,8 +269,8 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       ->required();
   ct->add_option("--series", a.series, "Number of the series, as osteon-import series lists them (default: the largest CT)");
   ct->add_option("--out", a.out, "Folder of the case, made by this command");
-  ct->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the scan's smallest spacing)")->check(CLI::Range(0.02, 10.0));
-  ct->add_option("--threshold", a.threshold_hu, "Bone is at or above it, HU (default: 226, usual for adult skulls in slices of 1.5 mm)")->check(CLI::Range(-1000.0, 4000.0));
+  ct->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the scan's smallest spacing)")->check(within(0.02, 10.0));
+  ct->add_option("--threshold", a.threshold_hu, "Bone is at or above it, HU (default: 226, usual for adult skulls in slices of 1.5 mm)")->check(within(-1000.0, 4000.0));
   ct->add_option("--keep", a.keep, "Islands of bone by their number in the printed list, such as 1,3, or all (default: 1, the largest)");
   ct->add_flag("--list", a.list, "List the islands and write nothing");
   ct->add_flag("--merge", a.merge, "Count the kept islands as one bone; otherwise each has a bone number of its own");
@@ -269,8 +286,8 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   CLI::App* phantom = app.add_subcommand("phantom", "Make a case whose true shape and density are known");
   phantom->add_option("KIND", a.kind, "block (layers from the top down) or tube (layers from the outside in)")->required()->check(CLI::IsMember({"block", "tube"}));
   phantom->add_option("--layers", a.layers, "THICKNESS_MM:DENSITY_G_CM3,... such as 5:1.9,20:0.3,5:1.9")->required();
-  phantom->add_option("--width", a.width_mm, "Edge of the block, or length of the tube, mm")->check(CLI::Range(1.0, 1000.0))->capture_default_str();
-  phantom->add_option("--pitch", a.pitch_mm, "Voxel edge, mm (default: 0.4)")->check(CLI::Range(0.02, 10.0));
+  phantom->add_option("--width", a.width_mm, "Edge of the block, or length of the tube, mm")->check(within(1.0, 1000.0))->capture_default_str();
+  phantom->add_option("--pitch", a.pitch_mm, "Voxel edge, mm (default: 0.4)")->check(within(0.02, 10.0));
   phantom->add_option("--out", a.out, "Folder of the case, made by this command")->required();
   phantom->add_option("--dicom", a.dicom, "Also write what a CT scanner would see of it, as a DICOM series, to this folder");
   phantom->add_option("--title", a.title, "Name shown to people");
@@ -280,7 +297,7 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   labels->add_option("DIR", a.input, "Folder with the slices, numbered at the end of their names")->required();
   labels->add_option("--out", a.out, "Folder of the case, made by this command")->required();
   labels->add_option("--spacing", a.spacing, "Size of a voxel, mm: X,Y,Z, or one number for all")->required();
-  labels->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the smallest spacing)")->check(CLI::Range(0.02, 10.0));
+  labels->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the smallest spacing)")->check(within(0.02, 10.0));
   labels->add_option("--bone", a.bone_colours, "R,G,B or R,G,B:DENSITY_G_CM3 of a colour that is bone; may be repeated (default: 255,249,219:1.9)");
   labels->add_option("--legend", a.legend, "The same from a YAML file");
   labels->add_option("--title", a.title, "Name shown to people; do not use a patient's");
@@ -289,8 +306,8 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   CLI::App* stl = app.add_subcommand("stl", "Make a case of one density from a closed triangle mesh");
   stl->add_option("FILE", a.input, "STL file, binary or text")->required();
   stl->add_option("--out", a.out, "Folder of the case, made by this command")->required();
-  stl->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: 0.5)")->check(CLI::Range(0.02, 10.0));
-  stl->add_option("--density", a.density_g_cm3, "Of all its bone, g/cm3")->check(CLI::Range(0.05, 3.0))->capture_default_str();
+  stl->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: 0.5)")->check(within(0.02, 10.0));
+  stl->add_option("--density", a.density_g_cm3, "Of all its bone, g/cm3")->check(within(0.05, 3.0))->capture_default_str();
   stl->add_option("--unit", a.unit, "Of the file's numbers: mm, cm, m or inch")->check(CLI::IsMember({"mm", "cm", "m", "inch"}))->capture_default_str();
   stl->add_option("--title", a.title, "Name shown to people; do not use a patient's");
   commands.push_back({stl, [shared](const StopSignal& stop) { return run_stl(*shared, stop); }});

@@ -1,6 +1,7 @@
 #include "server/import/ct_import.hpp"
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
 #include <new>
 #include <numeric>
@@ -16,6 +17,9 @@ namespace {
 
 // Shares of the time that the stages take, for one bar over all of them.
 constexpr double kSegmentEnd = 0.35, kSurfaceEnd = 0.85;
+// Pieces of an island that are told when marrow alone joins them: this large, also beside the largest.
+constexpr double kLargePiece_cm3 = 0.5, kLargePiece = 0.1;
+constexpr double kLeastPitch_mm = 0.02, kMostPitch_mm = 10.0;
 constexpr double kLeastSpacing_mm = 0.01, kMostSpacing_mm = 20.0;  // of a CT's voxels
 // Around the voxels at work, so that whatever the segmentation looks at beside a bone is there.
 constexpr double kMargin_mm = 5.0;
@@ -205,23 +209,6 @@ class CaseSamples {
   std::vector<float> hu_;
 };
 
-// What was found and what became of it, without the components, which are large.
-CtSegmentation summary(const imaging::HuVolume& volume, const imaging::VoxelMask& bone, const imaging::VoxelMask& bones,
-                       const imaging::Islands& islands, const std::vector<int>& kept) {
-  CtSegmentation found;
-  std::int64_t marrow = 0;
-  for (std::size_t i = 0; i < bone.values.size(); ++i)
-    marrow += bones.values[i] != 0 && bone.values[i] == static_cast<std::uint8_t>(imaging::BoneVoxel::marrow) ? 1 : 0;
-  found.marrow_cm3 = static_cast<double>(marrow) * volume.spacing_mm.prod() * 1e-3;
-  found.region = imaging::enclosing_box(volume, Vec3::Zero(), Vec3(volume.dims[0] - 1, volume.dims[1] - 1, volume.dims[2] - 1));
-  found.islands = islands.list;
-  found.kept = kept;
-  for (const imaging::Island& island : islands.list) found.left_out_cm3 += island.volume_cm3;
-  for (const int number : kept) found.left_out_cm3 -= islands.list[static_cast<std::size_t>(number - 1)].volume_cm3;
-  if (kept.size() == islands.list.size()) found.left_out_cm3 = 0.0;
-  return found;
-}
-
 // The part of the scan with dense voxels, its islands, and which bone each voxel belongs to.
 struct Segmented {
   imaging::HuVolume volume;
@@ -229,6 +216,48 @@ struct Segmented {
   std::array<int, 3> first{}, last{};  // voxel box of the kept islands
   CtSegmentation found;
 };
+
+// Large pieces of dense and cancellous bone that are parts of kept islands, cm³, largest first. Error: cancelled.
+Result<std::vector<double>> pieces_without_marrow(const Segmented& s, const imaging::VoxelMask& bone, const KeepGoing& keep_going) {
+  imaging::VoxelMask firm(s.volume.dims);
+  for (std::size_t i = 0; i < firm.values.size(); ++i)
+    firm.values[i] = s.bones.values[i] != 0 && bone.values[i] != static_cast<std::uint8_t>(imaging::BoneVoxel::marrow) ? 1 : 0;
+  std::bitset<256> one;
+  one.set(1);
+  const auto pieces = imaging::find_components(firm, one, imaging::Connectivity::corners, keep_going);
+  if (!pieces) return tl::unexpected(pieces.error());
+  std::vector<double> volumes_cm3;
+  for (const std::int64_t voxels : pieces->voxels())
+    volumes_cm3.push_back(static_cast<double>(voxels) * s.volume.spacing_mm.prod() * 1e-3);
+  std::ranges::sort(volumes_cm3, std::ranges::greater{});
+  const double least_cm3 = volumes_cm3.empty() ? 0.0 : std::max(kLargePiece_cm3, kLargePiece * volumes_cm3.front());
+  std::erase_if(volumes_cm3, [&](double volume) { return volume < least_cm3; });
+  return volumes_cm3;
+}
+
+// What was found and what became of it, into `s.found`. Error: cancelled.
+Result<void> summarise(const imaging::VoxelMask& bone, const imaging::Islands& islands, std::vector<int> kept, Segmented& s,
+                       const KeepGoing& keep_going) {
+  CtSegmentation& found = s.found;
+  std::int64_t below = 0;
+  for (std::size_t i = 0; i < bone.values.size(); ++i)
+    below += s.bones.values[i] != 0 && bone.values[i] != static_cast<std::uint8_t>(imaging::BoneVoxel::dense) ? 1 : 0;
+  found.marrow_cm3 = static_cast<double>(below) * s.volume.spacing_mm.prod() * 1e-3;
+  found.region =
+      imaging::enclosing_box(s.volume, Vec3::Zero(), Vec3(s.volume.dims[0] - 1, s.volume.dims[1] - 1, s.volume.dims[2] - 1));
+  found.islands = islands.list;
+  for (const imaging::Island& island : islands.list) found.left_out_cm3 += island.volume_cm3;
+  for (const int number : kept) found.left_out_cm3 -= islands.list[static_cast<std::size_t>(number - 1)].volume_cm3;
+  if (kept.size() == islands.list.size()) found.left_out_cm3 = 0.0;
+  // Of several islands each has pieces of its own, which nobody takes for a fracture.
+  if (kept.size() == 1) {
+    auto pieces = pieces_without_marrow(s, bone, keep_going);
+    if (!pieces) return tl::unexpected(pieces.error());
+    found.joined_cm3 = std::move(*pieces);
+  }
+  found.kept = std::move(kept);
+  return {};
+}
 
 Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, const KeepGoing& keep_going) {
   const auto work = dense_region(scan, options.threshold_hu, keep_going);
@@ -240,12 +269,11 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, cons
   params.hollow = options.hollow;
   const auto bone = imaging::segment_bone(s.volume, params, work->ends, part(keep_going, 0.0, 0.8));
   if (!bone) return tl::unexpected(bone.error());
-  const auto islands = imaging::find_islands(s.volume, *bone, options.calibration, part(keep_going, 0.8, 1.0));
+  const auto islands = imaging::find_islands(s.volume, *bone, options.calibration, part(keep_going, 0.8, 0.9));
   if (!islands) return tl::unexpected(islands.error());
   auto kept = options.list_only ? Result<std::vector<int>>{} : islands_to_keep(options, islands->list);
   if (!kept) return tl::unexpected(kept.error());
   s.bones = imaging::number_bones(*islands, *kept, options.merge, s.volume.dims);
-  s.found = summary(s.volume, *bone, s.bones, *islands, *kept);
   s.found.merged = options.merge;
   s.first = s.volume.dims;
   s.last = {-1, -1, -1};
@@ -255,6 +283,8 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, cons
       s.first[axis] = std::min(s.first[axis], island.first[axis]);
       s.last[axis] = std::max(s.last[axis], island.last[axis]);
     }
+  if (auto told = summarise(*bone, *islands, std::move(*kept), s, part(keep_going, 0.9, 1.0)); !told)
+    return tl::unexpected(told.error());
   return s;
 }
 
@@ -284,10 +314,15 @@ Result<CtImport> make_case(CtScan scan, const CtOptions& options, const KeepGoin
   if (!(geometry.spacing_mm.minCoeff() >= kLeastSpacing_mm) || !(geometry.spacing_mm.maxCoeff() <= kMostSpacing_mm))
     return failure(ErrorCode::invalid_input, "voxels of " + imaging::describe(geometry) + " are of no CT; export the scan again");
 
+  const double pitch_mm = options.pitch_mm.value_or(std::max(kLeastPitch_mm, geometry.spacing_mm.minCoeff()));
+  if (!(pitch_mm >= kLeastPitch_mm) || !(pitch_mm <= kMostPitch_mm))
+    return failure(ErrorCode::invalid_input, "the pitch must be a number from 0.02 to 10 mm; give another --pitch");
+  if (!std::isfinite(options.threshold_hu))
+    return failure(ErrorCode::invalid_input, "the threshold must be a number; give another --threshold");
+
   auto s = segment(std::move(scan.volume), options, part(keep_going, 0.0, kSegmentEnd));
   if (!s) return tl::unexpected(s.error());
   if (options.list_only) return CtImport{std::move(s->found), {}};
-  const double pitch_mm = options.pitch_mm.value_or(geometry.spacing_mm.minCoeff());
   const auto surface_mm =
       measure_surface(*s, geometry, options.threshold_hu, pitch_mm, part(keep_going, kSegmentEnd, kSurfaceEnd));
   if (!surface_mm) return tl::unexpected(surface_mm.error());
@@ -308,6 +343,7 @@ Result<CtImport> make_case(CtScan scan, const CtOptions& options, const KeepGoin
   const FillLabelledPart fill = [&](const CoordBox& part_box, PartBuffers& to) { return content.fill(part_box, to); };
   auto built = Case::build(std::move(info), surface_mm->box, fill, part(building, 0.2, 1.0));
   if (!built) return tl::unexpected(built.error());
+  s->found.case_cm3 = built->volume_mm3() * 1e-3;
   return CtImport{std::move(s->found), std::move(*built)};
 }
 

@@ -31,6 +31,8 @@ struct CtSegmentation {
   bool merged = false;                       // the kept ones are one bone
   double left_out_cm3 = 0.0;                 // of the islands that were not kept
   double marrow_cm3 = 0.0;                   // below the threshold, within what was kept
+  std::vector<double> joined_cm3;        // large pieces of dense and cancellous bone that only marrow joins, if several
+  double case_cm3 = 0.0;                 // of the case's bone
   double metal_cm3 = 0.0, enamel_cm3 = 0.0;  // within what was kept
   Box region;                                // of the scan around all that reaches the threshold, LPS
 };

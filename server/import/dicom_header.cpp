@@ -171,6 +171,7 @@ void read_slice(const Values& values, const gdcm::File& file, DicomHeader& h) {
   h.spacing = near(numbers(text(0x0028, 0x0030)));
   h.intercept = numbers(text(0x0028, 0x1052));
   h.slope = numbers(text(0x0028, 0x1053));
+  h.padding = numbers(text(0x0028, 0x0120));
 }
 
 // Other programs write whole CT volumes as secondary captures; pictures of a screen have no place in the patient.
@@ -218,7 +219,7 @@ void DicomHeader::pack(ByteWriter& to) const {
       to.add(kernel);
   to.add(series_number), to.add(acquisition), to.add(temporal_position), to.add(frames), to.add(columns), to.add(rows);
   to.add(bits_allocated), to.add(bits_stored), to.add(samples);
-  to.add(position), to.add(orientation), to.add(spacing), to.add(slope), to.add(intercept);
+  to.add(position), to.add(orientation), to.add(spacing), to.add(slope), to.add(intercept), to.add(padding);
 }
 
 bool DicomHeader::unpack(ByteReader& from) {
@@ -227,7 +228,7 @@ bool DicomHeader::unpack(ByteReader& from) {
          from.get(description) && from.get(kernel) && from.get(series_number) && from.get(acquisition) &&
          from.get(temporal_position) && from.get(frames) && from.get(columns) && from.get(rows) && from.get(bits_allocated) &&
          from.get(bits_stored) && from.get(samples) && from.get(position) && from.get(orientation) && from.get(spacing) &&
-         from.get(slope) && from.get(intercept);
+         from.get(slope) && from.get(intercept) && from.get(padding);
 }
 
 FileKind kind_of(std::string_view sop_class, std::string_view modality, std::string_view image_type) {

@@ -27,6 +27,7 @@ struct DicomHeader {
   int columns = 0, rows = 0;
   int bits_allocated = 0, bits_stored = 0, samples = 1;
   std::vector<double> position, orientation, spacing, slope, intercept;
+  std::vector<double> padding;  // stored value of pixels that are no part of the scan
 
   void pack(ByteWriter& to) const;
   bool unpack(ByteReader& from);

@@ -14,6 +14,9 @@
 namespace osteon::import {
 namespace {
 
+constexpr double kBrightPadding_hu = 100.0;
+constexpr std::int16_t kPadding_hu = -1024;  // air
+
 namespace fs = std::filesystem;
 
 const gdcm::Tag kPixelData(0x7fe0, 0x0010);
@@ -76,12 +79,15 @@ Result<void> read_pixels(const DicomHeader& h, const fs::path& file, const std::
   // Signed values may lack their sign in the bits above the stored ones.
   const bool is_signed = image.GetPixelFormat().GetPixelRepresentation() == 1;
   const int unused = is_signed ? 16 - static_cast<int>(image.GetPixelFormat().GetBitsStored()) : 0;
+  // Padding counts as air, but only where it would be bright: some files name a value that their pixels have too.
+  const bool has_padding = h.padding.size() == 1 && h.padding[0] * h.slope[0] + h.intercept[0] > kBrightPadding_hu;
+  const auto padding = has_padding ? static_cast<std::uint16_t>(static_cast<std::int64_t>(h.padding[0])) : std::uint16_t{0};
   for (std::size_t i = 0; i < pixels; ++i) {
     std::uint16_t raw = static_cast<std::uint8_t>(buffer[i]);
     if (width == 2) std::memcpy(&raw, buffer.data() + 2 * i, 2);
     const int stored = is_signed ? static_cast<std::int16_t>(static_cast<std::uint16_t>(raw << unused)) >> unused : raw;
     const double hu = stored * h.slope[0] + h.intercept[0];
-    out[i] = static_cast<std::int16_t>(std::lround(std::clamp(hu, -32768.0, 32767.0)));
+    out[i] = has_padding && raw == padding ? kPadding_hu : static_cast<std::int16_t>(std::lround(std::clamp(hu, -32768.0, 32767.0)));
   }
   return {};
 } catch (const std::bad_alloc&) {

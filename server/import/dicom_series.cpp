@@ -175,7 +175,7 @@ class Arranger {
     if (h.columns < 2 || h.rows < 2 || h.columns > kLargestAxis || h.rows > kLargestAxis)
       return lacks("Rows and Columns (0028,0010-0011)");
     if (h.samples != 1 || h.photometric != "MONOCHROME2")
-      return cannot("colours", "has colours (" + h.photometric + ") instead of Hounsfield units; export original CT slices");
+      return cannot("no Hounsfield units", "stores " + h.photometric + " pixels instead of Hounsfield units (MONOCHROME2); export original CT slices");
     if (h.bits_allocated != 8 && h.bits_allocated != 16)
       return cannot("neither 8 nor 16 bits",
                     "stores " + std::to_string(h.bits_allocated) + " bits for a pixel; only 8 and 16 can be read");
@@ -251,7 +251,8 @@ class Arranger {
     series_.entry.slice_mm = usual_mm;
     char brief[64], text[96];
     std::snprintf(brief, sizeof brief, gaps[at] < 1e-3 ? "several slices at one place" : "a gap of %.3g mm", gaps[at]);
-    std::snprintf(text, sizeof text, " are %.3g mm apart where %.3g mm is usual", gaps[at], usual_mm);
+    if (usual_mm < 1e-3) std::snprintf(text, sizeof text, " lie at the same place, as most do");
+    else std::snprintf(text, sizeof text, " are %.3g mm apart where %.3g mm is usual", gaps[at], usual_mm);
     return wrong(brief, subject_ + ": the slices " + name(at) + " and " + name(at + 1) + text +
                             (gaps[at] > usual_mm ? missing_() : "") + "; add the missing slices or remove the doubled ones");
   }
@@ -379,7 +380,11 @@ Result<std::size_t> choose_series(const std::vector<CtSeries>& series, const Fou
     if (voxels(series[i]) > voxels(series[largest])) largest = i;
     if (!series[i].fault && (!best || voxels(series[i]) > voxels(series[*best]))) best = i;
   }
-  const bool whole = best && (series[*best].entry.slices >= kFewSlices || series[largest].entry.slices < kFewSlices);
+  // A larger one with a missing or damaged slice is most likely the one that is meant: another bone without a question would be
+  // wrong. One of a kind that nobody can import, as a tilted one, gives way.
+  const CtSeries& most = series[largest];
+  const bool is_meant = most.fault && most.fault->error.code != ErrorCode::unsupported && most.entry.slices >= kFewSlices;
+  const bool whole = best && !is_meant && (series[*best].entry.slices >= kFewSlices || most.entry.slices < kFewSlices);
   return whole ? *best : largest;
 }
 

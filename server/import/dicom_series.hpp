@@ -31,7 +31,8 @@ struct CtSeries {
 [[nodiscard]] std::vector<CtSeries> sort_series(std::vector<DicomHeader> headers, const FoundFiles& found, SkippedFiles& skipped);
 
 // The index of the series to import: `number`, or else the one with `file` among its slices, or else the largest. One that
-// can be imported goes before a larger one that cannot, unless only a few slices can.
+// can be imported goes before a larger one of a kind that cannot (tilted, several frames), unless only a few slices can. A larger
+// one that lacks a slice or has a damaged one is chosen, so that its fault is told.
 // Errors: invalid_input and unsupported (no CT, no such number). The chosen one may still have a fault.
 [[nodiscard]] Result<std::size_t> choose_series(const std::vector<CtSeries>& series, const FoundFiles& found,
                                                 const SkippedFiles& skipped, std::optional<int> number,

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include "server/import/ct_import.hpp"
@@ -7,6 +8,7 @@ namespace osteon::import {
 namespace {
 
 constexpr std::size_t kMostListed = 40;
+constexpr double kDifference = 0.05;       // between voxels and case that is told
 constexpr double kLeastListed_cm3 = 0.05;  // smaller ones are summed up
 
 template <class... Values>
@@ -67,8 +69,7 @@ std::string segmentation_text(const CtSegmentation& found) {
     text += line("kept       all %.2f cm3; nothing was left out\n", kept_cm3);
   else
     text += line(
-        "kept       %.2f of %.2f cm3; %zu %s with %.2f cm3 (%.0f %%) left out: --keep 1,2 takes these numbers, --keep all takes "
-        "all\n",
+        "kept       %.2f of %.2f cm3; %zu %s with %.2f cm3 (%.0f %%) left out: --keep N,M takes islands by number, --keep all all\n",
         kept_cm3, all_cm3, left_out, left_out == 1 ? "island" : "islands", found.left_out_cm3,
         100.0 * found.left_out_cm3 / all_cm3);
   if (found.kept.size() > 1)
@@ -77,6 +78,14 @@ std::string segmentation_text(const CtSegmentation& found) {
   if (found.marrow_cm3 > 0.0)
     text += line("marrow     %.2f cm3 of that is below the threshold, enclosed by bone or between it; --hollow leaves it out\n",
                  found.marrow_cm3);
+  if (found.joined_cm3.size() > 1) {
+    std::string pieces;
+    for (std::size_t i = 0; i < found.joined_cm3.size(); ++i) pieces += line(i == 0 ? "%.2f" : " and %.2f", found.joined_cm3[i]);
+    text += "joined     by marrow alone: pieces with " + pieces + " cm3 of denser bone, as at a narrow fracture; --hollow parts them\n";
+  }
+  if (found.case_cm3 > 0.0 && std::abs(found.case_cm3 - kept_cm3) > kDifference * kept_cm3)
+    text += line("case       %.2f cm3, %+.0f %% of the voxels kept: walls about as thin as a voxel, noise, or a coarse --pitch do that\n", found.case_cm3,
+                 100.0 * (found.case_cm3 - kept_cm3) / kept_cm3);
   if (found.metal_cm3 > 0.0)
     text += line("metal      %.3f cm3 at or around %.0f HU and above: it is shown as metal, and no tool cuts it\n",
                  found.metal_cm3, imaging::kMetal_hu);

@@ -112,6 +112,32 @@ TEST(CtImport, HollowLeavesTheMarrowOut) {
   EXPECT_LT(hollow->volume_mm3(), 1.15 * shell);
 }
 
+// A shaft that is broken right through. A narrow gap is bridged by the marrow space, and the import says so.
+TEST(CtImport, PiecesThatOnlyMarrowJoinsAreTold) {
+  const auto broken = [](double gap_mm) {
+    CtScan scan;
+    scan.volume.dims = {60, 60, 60};
+    scan.volume.spacing_mm = Vec3::Constant(0.5);
+    scan.volume.values.resize(scan.volume.count());
+    for (int k = 0; k < 60; ++k)
+      for (int j = 0; j < 60; ++j)
+        for (int i = 0; i < 60; ++i) {
+          const double r = 0.5 * std::hypot(i - 29.5, j - 29.5);
+          const bool in_gap = std::abs(0.5 * (k - 29.5)) < 0.5 * gap_mm;
+          scan.volume.values[scan.volume.index(i, j, k)] = r < 8.0 ? -60 : r < 12.0 && !in_gap ? 1500 : 50;
+        }
+    return import_ct(std::move(scan), {}, keep_going);
+  };
+  const auto whole = broken(0.0), narrow = broken(2.0), wide = broken(6.0);
+  ASSERT_TRUE(whole && narrow && wide);
+  EXPECT_EQ(whole->found.joined_cm3.size(), 1u);
+  ASSERT_EQ(narrow->found.joined_cm3.size(), 2u);
+  const double half_cm3 = std::numbers::pi * (144.0 - 64.0) * 14.0 * 1e-3;
+  EXPECT_NEAR(narrow->found.joined_cm3[1], half_cm3, 0.05 * half_cm3);
+  EXPECT_NE(segmentation_text(narrow->found).find("joined     by marrow alone"), std::string::npos);
+  EXPECT_EQ(wide->found.islands.size(), 2u);
+}
+
 TEST(CtImport, DensityEndsAtCompactBoneAndMetalIsLabelled) {
   CtScan scan;
   scan.volume.dims = {30, 30, 30};

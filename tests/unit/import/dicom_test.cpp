@@ -1,5 +1,7 @@
 #include "server/import/dicom_reader.hpp"
 
+#include <gdcmVR.h>
+
 #include <fstream>
 
 #include "server/import/dicom_writer.hpp"
@@ -31,6 +33,20 @@ TEST(DicomSeries, KeepsAnObliqueGeometry) {
   // Positions are decimal text of at most 16 characters.
   for (const Vec3& voxel : {Vec3(0, 0, 0), Vec3(6, 0, 3), Vec3(6, 4, 3)})
     EXPECT_LT((scan->volume.position_mm(voxel) - volume.position_mm(voxel)).norm(), 1e-4);
+}
+
+TEST(DicomSeries, BrightPaddingIsAir) {
+  const test::TempDir folder;
+  auto volume = numbered_volume(7, 5, 4);
+  volume.values[3] = 3071;
+  ASSERT_TRUE(write_dicom_series(volume, folder / "series", keep_going));
+  const std::int16_t stored = 3071 + 1024;  // with the intercept that the writer uses
+  const std::string bytes(reinterpret_cast<const char*>(&stored), sizeof stored);
+  for (const fs::path& file : files_of(folder / "series")) set_tag(file, 0x0028, 0x0120, bytes, gdcm::VR::SS);
+  const auto scan = read_dicom_series(folder / "series", keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  EXPECT_EQ(scan->volume.values[3], -1024);
+  EXPECT_EQ(scan->volume.values[4], volume.values[4]);
 }
 
 TEST(DicomSeries, OrderOfFileNamesDoesNotMatter) {

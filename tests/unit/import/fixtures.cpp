@@ -54,12 +54,13 @@ void edit(const fs::path& file, Change change) {
 
 }  // namespace
 
-void set_tag(const fs::path& file, std::uint16_t group, std::uint16_t element, const std::string& value) {
+void set_tag(const fs::path& file, std::uint16_t group, std::uint16_t element, const std::string& value,
+             int vr_if_new) {
   edit(file, [&](gdcm::DataSet& data) {
     const gdcm::Tag tag(group, element);
     gdcm::DataElement changed(tag);
     if (data.FindDataElement(tag)) changed.SetVR(data.GetDataElement(tag).GetVR());
-    else changed.SetVR(gdcm::VR::IS);
+    else changed.SetVR(vr_if_new == 0 ? gdcm::VR(gdcm::VR::IS) : gdcm::VR(static_cast<gdcm::VR::VRType>(vr_if_new)));
     const std::string even = value.size() % 2 == 0 ? value : value + ' ';
     changed.SetByteValue(even.data(), static_cast<std::uint32_t>(even.size()));
     data.Replace(changed);
@@ -171,8 +172,9 @@ void write_archive(const fs::path& folder, const fs::path& file, const std::stri
     }
     archive_entry_set_size(entry, static_cast<la_int64_t>(content.size()));
     ASSERT_EQ(archive_write_header(a, entry), ARCHIVE_OK);
-    if (!content.empty())
+    if (!content.empty()) {
       ASSERT_EQ(archive_write_data(a, content.data(), content.size()), static_cast<la_ssize_t>(content.size()));
+    }
     archive_entry_free(entry);
   }
   ASSERT_EQ(archive_write_close(a), ARCHIVE_OK);

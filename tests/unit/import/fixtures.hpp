@@ -26,7 +26,8 @@ void write_small_series(const std::filesystem::path& folder);
 [[nodiscard]] std::vector<std::filesystem::path> files_of(const std::filesystem::path& folder);
 
 // Sets an attribute of a DICOM file, or takes it out; the file stays valid otherwise.
-void set_tag(const std::filesystem::path& file, std::uint16_t group, std::uint16_t element, const std::string& value);
+void set_tag(const std::filesystem::path& file, std::uint16_t group, std::uint16_t element, const std::string& value,
+             int vr_if_new = 0);
 void remove_tag(const std::filesystem::path& file, std::uint16_t group, std::uint16_t element);
 
 // An InVesalius project of `columns` x `rows` x `slices` whose voxel value is column + 100 row + 1000 slice.

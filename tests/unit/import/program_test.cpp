@@ -214,7 +214,12 @@ TEST_F(Program, WrongIslandsAreOneSentence) {
   ASSERT_NO_FATAL_FAILURE(write_two_boxes(path("series")));
   for (const char* wrong : {"0", "-1", "1,", ",1", "1;2", "some", "1.5", "99999999999", "ALL"})
     expect_refused({"ct", path("series"), "--out", path("case"), std::string("--keep=") + wrong}, "--keep", folder_);
-  expect_refused({"ct", path("series"), "--out", path("case"), "--keep", "1,3"}, "island 3", folder_);
+  for (const char* option : {"--pitch", "--threshold"})
+    for (const char* wrong : {"nan", "inf", "-inf", "1e400", "x"})
+      expect_refused({"ct", path("series"), "--out", path("case"), std::string(option) + "=" + wrong}, option, folder_);
+  const auto absent = test::run(kProgram, {"ct", path("series"), "--out", path("case"), "--keep", "1,3"});
+  EXPECT_EQ(absent.exit_code, 1);
+  EXPECT_NE(absent.err.find("--keep names island 3, but at this threshold there are islands 1 to 2"), std::string::npos) << absent.err;
   expect_refused({"ct", path("series")}, "--out", folder_);
 }
 
