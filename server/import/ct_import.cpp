@@ -218,7 +218,8 @@ struct Segmented {
 };
 
 // Large pieces of dense and cancellous bone that are parts of kept islands, cm³, largest first. Error: cancelled.
-Result<std::vector<double>> pieces_without_marrow(const Segmented& s, const imaging::VoxelMask& bone, const KeepGoing& keep_going) {
+Result<std::vector<double>> pieces_without_marrow(const Segmented& s, const imaging::VoxelMask& bone,
+                                                  const KeepGoing& keep_going) {
   imaging::VoxelMask firm(s.volume.dims);
   for (std::size_t i = 0; i < firm.values.size(); ++i)
     firm.values[i] = s.bones.values[i] != 0 && bone.values[i] != static_cast<std::uint8_t>(imaging::BoneVoxel::marrow) ? 1 : 0;

@@ -69,7 +69,8 @@ std::string segmentation_text(const CtSegmentation& found) {
     text += line("kept       all %.2f cm3; nothing was left out\n", kept_cm3);
   else
     text += line(
-        "kept       %.2f of %.2f cm3; %zu %s with %.2f cm3 (%.0f %%) left out: --keep N,M takes islands by number, --keep all all\n",
+        "kept       %.2f of %.2f cm3; %zu %s with %.2f cm3 (%.0f %%) left out: --keep N,M takes islands by number, --keep all "
+        "all\n",
         kept_cm3, all_cm3, left_out, left_out == 1 ? "island" : "islands", found.left_out_cm3,
         100.0 * found.left_out_cm3 / all_cm3);
   if (found.kept.size() > 1)
@@ -81,11 +82,13 @@ std::string segmentation_text(const CtSegmentation& found) {
   if (found.joined_cm3.size() > 1) {
     std::string pieces;
     for (std::size_t i = 0; i < found.joined_cm3.size(); ++i) pieces += line(i == 0 ? "%.2f" : " and %.2f", found.joined_cm3[i]);
-    text += "joined     by marrow alone: pieces with " + pieces + " cm3 of denser bone, as at a narrow fracture; --hollow parts them\n";
+    text += "joined     by marrow alone: pieces with " + pieces +
+            " cm3 of denser bone, as at a narrow fracture; --hollow parts them\n";
   }
   if (found.case_cm3 > 0.0 && std::abs(found.case_cm3 - kept_cm3) > kDifference * kept_cm3)
-    text += line("case       %.2f cm3, %+.0f %% of the voxels kept: walls about as thin as a voxel, noise, or a coarse --pitch do that\n", found.case_cm3,
-                 100.0 * (found.case_cm3 - kept_cm3) / kept_cm3);
+    text += line(
+        "case       %.2f cm3, %+.0f %% of the voxels kept: walls about as thin as a voxel, noise, or a coarse --pitch do that\n",
+        found.case_cm3, 100.0 * (found.case_cm3 - kept_cm3) / kept_cm3);
   if (found.metal_cm3 > 0.0)
     text += line("metal      %.3f cm3 at or around %.0f HU and above: it is shown as metal, and no tool cuts it\n",
                  found.metal_cm3, imaging::kMetal_hu);
