@@ -69,8 +69,8 @@ std::string segmentation_text(const CtSegmentation& found) {
     text += line("kept       all %.2f cm3; nothing was left out\n", kept_cm3);
   else
     text += line(
-        "kept       %.2f of %.2f cm3; %zu %s with %.2f cm3 (%.0f %%) left out: --keep N,M takes islands by number, --keep all "
-        "all\n",
+        "kept       %.2f of %.2f cm3; %zu %s with %.2f cm3 (%.0f %%) left out: --keep N,M takes islands by number, --keep all takes "
+        "every one\n",
         kept_cm3, all_cm3, left_out, left_out == 1 ? "island" : "islands", found.left_out_cm3,
         100.0 * found.left_out_cm3 / all_cm3);
   if (found.kept.size() > 1)
