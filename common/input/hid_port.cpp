@@ -62,6 +62,7 @@ Error hid_open_error(const std::string& what, const std::string& path, int numbe
                  "; install deploy/udev/70-osteon-devices.rules and plug it in again");
     case ENOENT:
     case ENODEV:
+    case ENOTTY:  // the node is there for a moment yet, but no device behind it
     case ENXIO: return say(what + " at " + path + " was unplugged; plug it in again");
     case EBUSY: return say("another program uses " + what + " at " + path + "; end it");
     default:
