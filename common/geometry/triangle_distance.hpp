@@ -24,8 +24,9 @@ struct TriangleDistance {
   unsigned corners = 0;  // bits of the corners that span the nearest part: one a corner, two a side, three the face
 };
 
-// From p to the triangle a, b, c, in the square of their unit. Finite for finite corners: where the triangle has no area the
-// nearest of its sides counts. Regions of the plane as in Ericson, Real-Time Collision Detection, 2005, section 5.1.5.
+// From p to the triangle a, b, c, in the square of their unit. Finite for finite corners: where the triangle has no
+// area the nearest of its sides counts. Regions of the plane as in Ericson, Real-Time Collision Detection, 2005,
+// section 5.1.5.
 template <class Scalar>
 [[nodiscard]] TriangleDistance<Scalar> distance_to_triangle(const Eigen::Matrix<Scalar, 3, 1>& p,
                                                             const Eigen::Matrix<Scalar, 3, 1>& a,

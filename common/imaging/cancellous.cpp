@@ -36,7 +36,8 @@ void count_in_slice(const HuVolume& volume, double least_hu, int slice, std::vec
     }
 }
 
-// For each voxel of a slice, how many of the 27 around it are at or above a value. Slices are asked one after the other.
+// For each voxel of a slice, how many of the 27 around it are at or above a value. Slices are asked one after the
+// other.
 class CountAround {
  public:
   CountAround(const HuVolume& volume, double least_hu) : volume_(volume), least_hu_(least_hu) {
@@ -60,9 +61,9 @@ class CountAround {
   std::vector<std::uint8_t> row_;
 };
 
-// Voxels that may be cancellous bone: so bright on most of their 27, which takes noise out. Air voxels are not counted, so that a
-// solid in air keeps its edges; in other surroundings a voxel at an edge or corner, where fewer belong to the solid, must be
-// bright itself.
+// Voxels that may be cancellous bone: so bright on most of their 27, which takes noise out. Air voxels are not counted,
+// so that a solid in air keeps its edges; in other surroundings a voxel at an edge or corner, where fewer belong to the
+// solid, must be bright itself.
 Result<VoxelMask> candidates(const HuVolume& volume, const VoxelMask& dense, const SegmentationParams& params,
                              const KeepGoing& keep_going) {
   VoxelMask out(volume.dims);
@@ -145,8 +146,8 @@ Result<VoxelMask> between_dense(const VoxelMask& candidate, const VoxelMask& den
   return between;
 }
 
-// Against air the edge of cancellous bone is half way to air, far below `cancellous_hu`: adds the voxels that the bone fills by
-// more than half.
+// Against air the edge of cancellous bone is half way to air, far below `cancellous_hu`: adds the voxels that the bone
+// fills by more than half.
 void add_edge_to_air(const HuVolume& volume, double air_hu, VoxelMask& found) {
   const auto [columns, rows, slices] = volume.dims;
   std::vector<std::size_t> added;
@@ -191,7 +192,8 @@ Result<VoxelMask> cancellous_between(const HuVolume& volume, const VoxelMask& de
 
   auto found = between_dense(*candidate, dense, part(keep_going, 0.6, 0.85));
   if (!found) return found;
-  // A vessel with contrast medium and chalk in its wall has a few such lines; of cancellous bone most is between dense bone.
+  // A vessel with contrast medium and chalk in its wall has a few such lines; of cancellous bone most is between dense
+  // bone.
   if (const auto left = keep_with_core(*candidate, *found, kLeastBetween, part(keep_going, 0.85, 0.9)); !left)
     return tl::unexpected(left.error());
   for (std::size_t i = 0; i < found->values.size(); ++i)

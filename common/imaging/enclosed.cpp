@@ -69,8 +69,8 @@ class Face {
     }
     return true;
   }
-  // Both edges of the face where it meets the two faces across `axis`. An edge of the scan is open from its ends up to the
-  // first solid voxel; any other is open throughout.
+  // Both edges of the face where it meets the two faces across `axis`. An edge of the scan is open from its ends up to
+  // the first solid voxel; any other is open throughout.
   template <class Reach>
   void edge(int axis, const ScanEnds& ends, int length, Reach reach_at) {
     for (const bool far : {false, true}) {
@@ -107,9 +107,8 @@ VoxelMask open_faces(const VoxelMask& solid, const ScanEnds& ends) {
   return open;
 }
 
-// Whether a sphere of `radius_mm` has room in one component. The scan's ends are no walls: what goes on beyond them may be as
-// wide as it is here.
-// Error: cancelled.
+// Whether a sphere of `radius_mm` has room in one component. The scan's ends are no walls: what goes on beyond them may
+// be as wide as it is here. Error: cancelled.
 Result<bool> has_room(const Components& spaces, std::uint32_t component, const std::array<int, 3>& dims, const Vec3& spacing_mm,
                       double radius_mm, const KeepGoing& keep_going) {
   std::array<int, 3> step{}, coarse{};
@@ -137,8 +136,8 @@ Result<bool> has_room(const Components& spaces, std::uint32_t component, const s
   return std::ranges::any_of(near->values, [](std::uint8_t v) { return v == 0; });
 }
 
-// Marks the components of what is free that no open voxel of the faces belongs to and that are no wider than a marrow space.
-// `marked` gets 1 there. Error: cancelled.
+// Marks the components of what is free that no open voxel of the faces belongs to and that are no wider than a marrow
+// space. `marked` gets 1 there. Error: cancelled.
 Result<void> mark_closed(const VoxelMask& solid, const Vec3& spacing_mm, const SegmentationParams& params, const ScanEnds& ends,
                          VoxelMask& marked, const KeepGoing& keep_going) {
   std::bitset<256> free;

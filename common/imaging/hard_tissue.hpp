@@ -12,9 +12,9 @@ struct HardTissue {
   double enamel_cm3 = 0.0;
 };
 
-// Voxels that the calibration takes for denser than kCompactBone_g_cm3. Those from kMetal_hu on are metal, and so are denser
-// ones within two voxels of it, where the scanner has blurred its edge. The others are enamel, or mineral as dense. Errors:
-// cancelled.
+// Voxels that the calibration takes for denser than kCompactBone_g_cm3. Those from kMetal_hu on are metal, and so are
+// denser ones within two voxels of it, where the scanner has blurred its edge. The others are enamel, or mineral as
+// dense. Errors: cancelled.
 [[nodiscard]] Result<HardTissue> find_hard_tissue(const HuVolume& volume, const VoxelMask& bones,
                                                   const DensityCalibration& calibration, const KeepGoing& keep_going);
 

@@ -38,7 +38,8 @@ struct HuVolume {
 // "256x256x108, 0.957x0.957x1.5 mm"
 [[nodiscard]] std::string describe(const HuVolume& volume);
 
-// The voxels from `first` to `last`, both included, as a volume of its own at the same place. Takes the memory of `volume`.
+// The voxels from `first` to `last`, both included, as a volume of its own at the same place. Takes the memory of
+// `volume`.
 [[nodiscard]] HuVolume cropped(HuVolume volume, const std::array<int, 3>& first, const std::array<int, 3>& last);
 
 // The LPS box around voxel coordinates first .. last (both included), taken at the voxels' centres.

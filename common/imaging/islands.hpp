@@ -31,9 +31,9 @@ struct Islands {
 [[nodiscard]] Result<Islands> find_islands(const HuVolume& volume, const VoxelMask& bone, const DensityCalibration& calibration,
                                            const KeepGoing& keep_going);
 
-// Numbers of bones, from 1: what voxels of the kept islands get in a mask of the volume's dims; others get 0. The islands
-// `kept`, by number, become bones 1, 2, 3 ... in this order, all of them bone 1 where `merge` is true. From the 255th on they
-// share the number 255.
+// Numbers of bones, from 1: what voxels of the kept islands get in a mask of the volume's dims; others get 0. The
+// islands `kept`, by number, become bones 1, 2, 3 ... in this order, all of them bone 1 where `merge` is true. From the
+// 255th on they share the number 255.
 [[nodiscard]] VoxelMask number_bones(const Islands& islands, std::span<const int> kept, bool merge,
                                      const std::array<int, 3>& dims);
 

@@ -35,7 +35,8 @@ Result<VoxelMask> dense_voxels(const HuVolume& volume, double threshold_hu, cons
   return dense;
 }
 
-// Mean HU of a voxel and its neighbours that are not dense; the air of a sinus is darker than marrow also where it is noisy.
+// Mean HU of a voxel and its neighbours that are not dense; the air of a sinus is darker than marrow also where it is
+// noisy.
 bool is_air(const HuVolume& volume, const VoxelMask& dense, std::array<int, 3> c, double air_hu) {
   double sum = 0.0;
   int count = 0;

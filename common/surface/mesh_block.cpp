@@ -15,9 +15,9 @@
 namespace osteon {
 namespace {
 
-// Payload: flags; the covered groups and the seams where there are any; the solid bits as below; then for each vertex in
-// the order of the contour its place along the edge, its normal, one cut bit where vertices differ in it, and two bits of
-// tissue where any is metal or enamel.
+// Payload: flags; the covered groups and the seams where there are any; the solid bits as below; then for each vertex
+// in the order of the contour its place along the edge, its normal, one cut bit where vertices differ in it, and two
+// bits of tissue where any is metal or enamel.
 constexpr int kN = kBlockSamples;
 constexpr std::uint8_t kHasCovered = 1, kHasSeams = 2, kAllCut = 4, kSomeCut = 8, kHasTissue = 16, kFlags = 31;
 // Two bits of a vertex; what they say is in kTissues.

@@ -34,8 +34,8 @@ struct CaseInfo {
   friend bool operator==(const CaseInfo&, const CaseInfo&) = default;
 };
 
-// What an importer knows about the samples beyond their distance and density. Each volume has the box of the distance, or
-// is empty.
+// What an importer knows about the samples beyond their distance and density. Each volume has the box of the distance,
+// or is empty.
 struct SampleLabels {
   DenseVolume<std::uint8_t> bone;  // number of the bone, from 1; read inside the surface. Empty: all samples are bone 1.
   DenseVolume<Tissue> tissue;      // metal, enamel, or none: the density decides. Empty: the density decides everywhere.
@@ -51,7 +51,8 @@ enum class PartKind {
 // fastest. Asked once for each part, always in the same order, by one thread.
 using FillPart = std::function<PartKind(const CoordBox& box, std::span<float> surface_mm, std::span<float> density_g_cm3)>;
 
-// What a part holds, with labels: as FillPart's, each of as many samples as the box has, or empty where there are no labels.
+// What a part holds, with labels: as FillPart's, each of as many samples as the box has, or empty where there are no
+// labels.
 struct PartBuffers {
   std::vector<float> surface_mm, density_g_cm3;
   std::vector<std::uint8_t> bone;  // as SampleLabels
@@ -76,8 +77,8 @@ class Case {
   // Errors: not_found (no such folder), invalid_input (no or broken case.json / bone.vdb, or content that does not
   // match its hash), unsupported (schema version).
   [[nodiscard]] static Result<Case> load(const std::filesystem::path& folder);
-  // Writes beside `folder` and renames, so no half-written case is ever seen. `keep_going` is asked before the renaming, too.
-  // Errors: exists, internal (disk), cancelled.
+  // Writes beside `folder` and renames, so no half-written case is ever seen. `keep_going` is asked before the
+  // renaming, too. Errors: exists, internal (disk), cancelled.
   [[nodiscard]] Result<void> save(const std::filesystem::path& folder, const KeepGoing& keep_going = {}) const;
 
   [[nodiscard]] const CaseInfo& info() const;
@@ -102,7 +103,8 @@ class Case {
   // Origins of the leaves that hold metal, and of those that hold metal or enamel; sorted, and empty for most cases.
   [[nodiscard]] const std::vector<Coord>& metal_leaves() const;
   [[nodiscard]] const std::vector<Coord>& hard_leaves() const;
-  // On the samples of a level: metal, enamel, or none for all else, of the nearest sample of level 0 that is bone; z fastest.
+  // On the samples of a level: metal, enamel, or none for all else, of the nearest sample of level 0 that is bone; z
+  // fastest.
   void gather_hard(int level, const CoordBox& box, std::span<Tissue> out) const;
   // Number of the bone that the sample belongs to, from 1; 0: no bone.
   [[nodiscard]] int bone_number(Coord sample) const;

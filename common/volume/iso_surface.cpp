@@ -17,13 +17,14 @@
 #include "common/core/check.hpp"
 #include "common/geometry/triangle_distance.hpp"
 
-// The surface is meshed by dual contouring in its simplest form: every cell with a crossing has one point, the mean
-// of the crossings on its edges, and every crossed lattice edge has a quad between the points of the four cells
-// around it (Gibson, Constrained elastic surface nets, 1998). Only samples of the narrow band get a distance. Those nearer than
-// a voxel look at every triangle beside them. The others get the nearest point of the surface from their neighbours, layer by
-// layer outwards, and then look at the triangles around it: of two sheets they may take the other where a facet of the one is
-// nearer than its corners (2 samples of 1000 of a skull are more than 0.01 voxel off by that). OpenVDB's meshToVolume, tried
-// first, was up to 0.6 voxel wrong at the end of the band and took longer. Every loop is bounded.
+// The surface is meshed by dual contouring in its simplest form: every cell with a crossing has one point, the mean of
+// the crossings on its edges, and every crossed lattice edge has a quad between the points of the four cells around it
+// (Gibson, Constrained elastic surface nets, 1998). Only samples of the narrow band get a distance. Those nearer than a
+// voxel look at every triangle beside them. The others get the nearest point of the surface from their neighbours,
+// layer by layer outwards, and then look at the triangles around it: of two sheets they may take the other where a
+// facet of the one is nearer than its corners (2 samples of 1000 of a skull are more than 0.01 voxel off by that).
+// OpenVDB's meshToVolume, tried first, was up to 0.6 voxel wrong at the end of the band and took longer. Every loop is
+// bounded.
 namespace osteon {
 namespace {
 
@@ -47,8 +48,8 @@ class Slab {
  public:
   Slab(const DenseVolume<float>& field, float iso, const std::atomic<bool>& stopped) : field_(field), iso_(iso), stopped_(stopped) {}
 
-  // Writes the magnitudes of the samples from `first_x` to `last_x`, the latter not included, counted from the box's corner;
-  // their signs are in `out` already. Memory of an earlier slab is used again.
+  // Writes the magnitudes of the samples from `first_x` to `last_x`, the latter not included, counted from the box's
+  // corner; their signs are in `out` already. Memory of an earlier slab is used again.
   void measure(int first_x, int last_x, double pitch_mm, DenseVolume<float>& out) {
     read(first_x, last_x);
     cell_points();
@@ -91,7 +92,8 @@ class Slab {
   }
   static std::size_t at(std::int32_t i) { return static_cast<std::size_t>(i); }
 
-  // A cell is named by its lowest corner. Cells in which the field crosses the value get a point, in the order of memory.
+  // A cell is named by its lowest corner. Cells in which the field crosses the value get a point, in the order of
+  // memory.
   void cell_points() {
     points_.clear();
     cells_.clear();
@@ -198,8 +200,9 @@ class Slab {
     if (squared < limit) nearest = point;
   }
 
-  // The nearest point of the surface for every sample of the band: first at the corners of the points' cells, then one layer of
-  // samples after the other, as many as the band is wide and one more. Each sample looks once at the points that its neighbours have.
+  // The nearest point of the surface for every sample of the band: first at the corners of the points' cells, then one
+  // layer of samples after the other, as many as the band is wide and one more. Each sample looks once at the points
+  // that its neighbours have.
   void spread() {
     nearest_point_.assign(nearest_.size(), kNone);
     waiting_.assign(nearest_.size(), 0);
@@ -252,8 +255,8 @@ class Slab {
     for (std::int32_t n = around_begin_[at(point)]; n < around_begin_[at(point) + 1]; ++n) offer(around_[at(n)], sample, p);
   }
 
-  // From the nearest point to the nearest triangle: those around the point, then over the mesh, around the corners of the part of
-  // the triangle that is nearest, while that leads to a nearer one.
+  // From the nearest point to the nearest triangle: those around the point, then over the mesh, around the corners of
+  // the part of the triangle that is nearest, while that leads to a nearer one.
   void refine(std::int32_t sample) {
     const Vec3f p = position(sample);
     std::int32_t known = nearest_point_[at(sample)];

@@ -104,7 +104,8 @@ std::shared_ptr<const Brick> PatchBuilder::metal_brick(const Case& bone, Coord i
   auto made = std::make_shared<Brick>();
   std::size_t i = 0;
   for_each(samples, [&](Coord at) {
-    // What lies between metal and air is metal up to the surface; what lies between metal and bone is so up to the middle.
+    // What lies between metal and air is metal up to the surface; what lies between metal and bone is so up to the
+    // middle.
     bool metal = bone.tissue(at) == Tissue::metal;
     if (!metal && bone.tissue(at) == Tissue::none)
       for_each(CoordBox{at, at}.grown(1), [&](Coord beside) { metal |= bone.tissue(beside) == Tissue::metal; });

@@ -59,14 +59,7 @@ class Output {
   Output(const Output&) = delete;
   Output& operator=(const Output&) = delete;
   bool write(const char* from, std::size_t size) const {
-    while (size > 0) {
-      const ssize_t n = ::write(descriptor_, from, size);
-      if (n < 0 && errno == EINTR) continue;
-      if (n <= 0) return false;
-      from += n;
-      size -= static_cast<std::size_t>(n);
-    }
-    return descriptor_ >= 0;
+    return descriptor_ >= 0 && write_all(descriptor_, from, size);
   }
 
  private:

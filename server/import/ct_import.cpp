@@ -102,8 +102,8 @@ Result<std::vector<int>> islands_to_keep(const CtOptions& options, const std::ve
   return kept;
 }
 
-// Labels of the lattice's samples out of those of the voxels: the nearest voxel's, and where that is no bone, as next to the
-// surface, any of the cell's.
+// Labels of the lattice's samples out of those of the voxels: the nearest voxel's, and where that is no bone, as next
+// to the surface, any of the cell's.
 class NearestLabel {
  public:
   NearestLabel(const imaging::HuVolume& volume, const imaging::VoxelMask& bones) : volume_(volume), bones_(bones) {}
@@ -128,7 +128,8 @@ class NearestLabel {
   const imaging::VoxelMask& bones_;
 };
 
-// Samples for the case out of the scan, a part at a time: density and labels only where there is bone in or near a leaf.
+// Samples for the case out of the scan, a part at a time: density and labels only where there is bone in or near a
+// leaf.
 class CaseSamples {
  public:
   CaseSamples(const imaging::HuVolume& volume, const imaging::VoxelMask& bones, const imaging::VoxelMask& hard, bool several,

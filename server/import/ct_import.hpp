@@ -42,10 +42,10 @@ struct CtImport {
   std::optional<Case> bone;  // empty only where the islands were only listed
 };
 
-// Bone is what segment_bone() says, of the islands that the options keep. Where the scan ends within bone, the bone ends with the
-// last whole voxel. No density is above that of compact bone; what the scan shows above it is labelled metal or enamel.
-// Errors: invalid_input (no bone, no such island, voxels of an impossible size, too many samples), exhausted (memory), cancelled,
-// internal.
+// Bone is what segment_bone() says, of the islands that the options keep. Where the scan ends within bone, the bone
+// ends with the last whole voxel. No density is above that of compact bone; what the scan shows above it is labelled
+// metal or enamel. Errors: invalid_input (no bone, no such island, voxels of an impossible size, too many samples),
+// exhausted (memory), cancelled, internal.
 [[nodiscard]] Result<CtImport> import_ct(CtScan scan, const CtOptions& options, const KeepGoing& keep_going);
 
 // The islands, what was left out, and metal, as lines for a person.

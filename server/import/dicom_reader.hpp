@@ -12,13 +12,13 @@ struct SeriesOptions {
   std::optional<int> series;  // by its number in the list; else the largest that can be imported
 };
 
-// `input`: a folder with all that is in it, a zip, tar or ISO 9660 image, a DICOMDIR (then its folder is searched), or one
-// slice (then its series). Known by content, never by name. Files are read in other processes: one that a library cannot
-// stand costs that file alone, unless it is a slice of the series that is read.
-// Slices are ordered by their position along the normal of their plane, never by file name or number. What is no CT slice
-// is counted in the report. Refused is what would make the volume's shape or its values doubtful: several frames in a file,
-// a tilted gantry, uneven gaps, missing spacing, position, rescaling or pixels, retired compressions.
-// Errors: not_found, invalid_input, unsupported, exhausted, cancelled, internal (temporary folder).
+// `input`: a folder with all that is in it, a zip, tar or ISO 9660 image, a DICOMDIR (then its folder is searched), or
+// one slice (then its series). Known by content, never by name. Files are read in other processes: one that a library
+// cannot stand costs that file alone, unless it is a slice of the series that is read. Slices are ordered by their
+// position along the normal of their plane, never by file name or number. What is no CT slice is counted in the report.
+// Refused is what would make the volume's shape or its values doubtful: several frames in a file, a tilted gantry,
+// uneven gaps, missing spacing, position, rescaling or pixels, retired compressions. Errors: not_found, invalid_input,
+// unsupported, exhausted, cancelled, internal (temporary folder).
 [[nodiscard]] Result<CtScan> read_dicom_series(const std::filesystem::path& input, const SeriesOptions& options,
                                                const KeepGoing& keep_going);
 [[nodiscard]] inline Result<CtScan> read_dicom_series(const std::filesystem::path& input, const KeepGoing& keep_going) {

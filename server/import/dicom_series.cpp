@@ -380,8 +380,8 @@ Result<std::size_t> choose_series(const std::vector<CtSeries>& series, const Fou
     if (voxels(series[i]) > voxels(series[largest])) largest = i;
     if (!series[i].fault && (!best || voxels(series[i]) > voxels(series[*best]))) best = i;
   }
-  // A larger one with a missing or damaged slice is most likely the one that is meant: another bone without a question would be
-  // wrong. One of a kind that nobody can import, as a tilted one, gives way.
+  // A larger one with a missing or damaged slice is most likely the one that is meant: another bone without a question
+  // would be wrong. One of a kind that nobody can import, as a tilted one, gives way.
   const CtSeries& most = series[largest];
   const bool is_meant = most.fault && most.fault->error.code != ErrorCode::unsupported && most.entry.slices >= kFewSlices;
   const bool whole = best && !is_meant && (series[*best].entry.slices >= kFewSlices || most.entry.slices < kFewSlices);

@@ -30,15 +30,15 @@ struct FoundFiles {
 inline constexpr int kMostFiles = 200'000;
 inline constexpr int kMostLevels = 32;
 
-// Regular files of a folder and of those in it, `levels` deep. A link to a file is one; a link to a folder is not followed.
-// Errors: not_found, invalid_input (too many files), cancelled.
+// Regular files of a folder and of those in it, `levels` deep. A link to a file is one; a link to a folder is not
+// followed. Errors: not_found, invalid_input (too many files), cancelled.
 [[nodiscard]] Result<FoundFiles> find_files(const std::filesystem::path& folder, int levels, const KeepGoing& keep_going);
 
 // What the first bytes of a file say it is.
 enum class Content { empty, dicom, archive, other };
 inline constexpr std::size_t kHeadBytes = 4096;
-// DICOM has its mark at byte 128, or, as old scanners wrote it, begins at once with several sound elements of group 2 or
-// 8: raw numbers are not taken for it. `head`: the first kHeadBytes, or all of a shorter file.
+// DICOM has its mark at byte 128, or, as old scanners wrote it, begins at once with several sound elements of group 2
+// or 8: raw numbers are not taken for it. `head`: the first kHeadBytes, or all of a shorter file.
 [[nodiscard]] Content content_of(std::span<const unsigned char> head);
 
 // How a path can be read as a scan.

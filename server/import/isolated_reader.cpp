@@ -32,18 +32,6 @@ constexpr std::size_t kLargestMessage = std::size_t{1} << 30;  // a slice of 163
 // What the child tells: which file it opens, how far it is, a part of the result, and at last how it ended.
 enum class Record : char { file, progress, message, done, error };
 
-bool write_all(int descriptor, const void* data, std::size_t size) {
-  const char* from = static_cast<const char*>(data);
-  while (size > 0) {
-    const ssize_t n = ::write(descriptor, from, size);
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    from += n;
-    size -= static_cast<std::size_t>(n);
-  }
-  return true;
-}
-
 template <class T>
 void put(int descriptor, const T& value) {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -180,6 +168,18 @@ IsolatedEnd listen(Line& line, const IsolatedWork& work) {
 }
 
 }  // namespace
+
+bool write_all(int descriptor, const void* data, std::size_t size) {
+  const char* from = static_cast<const char*>(data);
+  while (size > 0) {
+    const ssize_t n = ::write(descriptor, from, size);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return false;
+    from += n;
+    size -= static_cast<std::size_t>(n);
+  }
+  return true;
+}
 
 bool limits_memory() { return !OSTEON_SANITIZED; }
 

@@ -36,6 +36,9 @@ struct IsolatedEnd {
   std::optional<std::size_t> file;  // the last that it opened
 };
 
+// Writes all of the bytes to a descriptor, however many calls that takes. False: it takes no more.
+[[nodiscard]] bool write_all(int descriptor, const void* data, std::size_t size);
+
 // False in builds with sanitizers, which reserve far more memory than they use.
 [[nodiscard]] bool limits_memory();
 

@@ -69,8 +69,8 @@ std::string segmentation_text(const CtSegmentation& found) {
     text += line("kept       all %.2f cm3; nothing was left out\n", kept_cm3);
   else
     text += line(
-        "kept       %.2f of %.2f cm3; %zu %s with %.2f cm3 (%.0f %%) left out: --keep N,M takes islands by number, --keep all takes "
-        "every one\n",
+        "kept       %.2f of %.2f cm3; %zu %s with %.2f cm3 (%.0f %%) left out\n"
+        "           --keep N,M takes islands by number, --keep all takes every one\n",
         kept_cm3, all_cm3, left_out, left_out == 1 ? "island" : "islands", found.left_out_cm3,
         100.0 * found.left_out_cm3 / all_cm3);
   if (found.kept.size() > 1)
@@ -87,7 +87,8 @@ std::string segmentation_text(const CtSegmentation& found) {
   }
   if (found.case_cm3 > 0.0 && std::abs(found.case_cm3 - kept_cm3) > kDifference * kept_cm3)
     text += line(
-        "case       %.2f cm3, %+.0f %% of the voxels kept: walls about as thin as a voxel, noise, or a coarse --pitch do that\n",
+        "case       %.2f cm3, %+.0f %% of the voxels kept\n"
+        "           walls about as thin as a voxel, noise, or a coarse --pitch do that\n",
         found.case_cm3, 100.0 * (found.case_cm3 - kept_cm3) / kept_cm3);
   if (found.metal_cm3 > 0.0)
     text += line("metal      %.3f cm3 at or around %.0f HU and above: it is shown as metal, and no tool cuts it\n",

@@ -1,5 +1,5 @@
-// A bone with a plate of metal in it, as real processes: a rig drills onto the plate and stands there, and a client that sends
-// cuts as it likes is refused.
+// A bone with a plate of metal in it, as real processes: a rig drills onto the plate and stands there, and a client
+// that sends cuts as it likes is refused.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -8,8 +8,8 @@
 
 namespace osteon::test {
 
-// Any bone from its signed distance (mm, negative inside) and density (g/cm³) over a box. `tissue`: what its importer knows,
-// metal, enamel or none.
+// Any bone from its signed distance (mm, negative inside) and density (g/cm³) over a box. `tissue`: what its importer
+// knows, metal, enamel or none.
 [[nodiscard]] Case make_bone(const Box& extent, double pitch_mm, const std::function<double(const Vec3&)>& distance_mm,
                              const std::function<double(const Vec3&)>& density_g_cm3,
                              const std::function<Tissue(const Vec3&)>& tissue = {});

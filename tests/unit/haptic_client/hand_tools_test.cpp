@@ -148,7 +148,8 @@ TEST(HandTools, EveryToolThatCutsTakesBone) {
   EXPECT_GE(tried, 21);
 }
 
-// Pushed down on it, aside and turned, no tool takes metal away: nothing that a room would refuse, and nothing of it at all.
+// Pushed down on it, aside and turned, no tool takes metal away: nothing that a room would refuse, and nothing of it at
+// all.
 TEST(HandTools, NoneThatCutsTakesMetal) {
   for (const Tool& tool : builtin_tools()) {
     if (!tool.cuts()) continue;

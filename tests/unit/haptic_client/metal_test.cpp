@@ -121,7 +121,8 @@ TEST(Metal, BearsThePushOfAHand) {
   EXPECT_TRUE(metal_is_whole(bench.replica().committed()));
 }
 
-// Two millimetres beside the edge of a plate that covers half the bone the drill does not meet it: the same hole, bit for bit.
+// Two millimetres beside the edge of a plate that covers half the bone the drill does not meet it: the same hole, bit
+// for bit.
 TEST(Metal, DoesNothingBesideIt) {
   const auto half_plate = [](bool metal) {
     return osteon::test::make_bone(

@@ -23,26 +23,30 @@ Scene block(std::int16_t hu) {
   return s;
 }
 
+HardTissue hard_tissue(const Scene& s) {
+  auto found = find_hard_tissue(s.volume, s.bones, kRho1995, always);
+  EXPECT_TRUE(found);
+  return std::move(*found);
+}
+
 Tissue at(const HardTissue& found, int x, int y, int z) { return static_cast<Tissue>(found.tissue.at(x, y, z)); }
 
 TEST(HardTissue, ThereIsNoneInCompactBone) {
   const Scene s = block(1840);  // 0.131 + 0.001067 · 1840 = 2.094 g/cm3
-  const auto found = find_hard_tissue(s.volume, s.bones, kRho1995, always);
-  ASSERT_TRUE(found);
-  EXPECT_TRUE(found->tissue.values.empty());
+  const HardTissue found = hard_tissue(s);
+  EXPECT_TRUE(found.tissue.values.empty());
 }
 
 TEST(HardTissue, DenserThanCompactBoneIsEnamelAndFrom3000OnMetal) {
   Scene s = block(1200);
   s.volume.values[s.volume.index(3, 3, 3)] = 2500;
   s.volume.values[s.volume.index(10, 10, 10)] = 3000;
-  const auto found = find_hard_tissue(s.volume, s.bones, kRho1995, always);
-  ASSERT_TRUE(found);
-  EXPECT_EQ(at(*found, 3, 3, 3), Tissue::enamel);
-  EXPECT_EQ(at(*found, 10, 10, 10), Tissue::metal);
-  EXPECT_EQ(at(*found, 5, 5, 5), Tissue::none);
-  EXPECT_NEAR(found->metal_cm3, 0.001, 1e-12);
-  EXPECT_NEAR(found->enamel_cm3, 0.001, 1e-12);
+  const HardTissue found = hard_tissue(s);
+  EXPECT_EQ(at(found, 3, 3, 3), Tissue::enamel);
+  EXPECT_EQ(at(found, 10, 10, 10), Tissue::metal);
+  EXPECT_EQ(at(found, 5, 5, 5), Tissue::none);
+  EXPECT_NEAR(found.metal_cm3, 0.001, 1e-12);
+  EXPECT_NEAR(found.enamel_cm3, 0.001, 1e-12);
 }
 
 TEST(HardTissue, TheBlurredEdgeOfMetalIsMetal) {
@@ -51,21 +55,19 @@ TEST(HardTissue, TheBlurredEdgeOfMetalIsMetal) {
   s.volume.values[s.volume.index(11, 10, 10)] = 2400;
   s.volume.values[s.volume.index(12, 10, 10)] = 1900;
   s.volume.values[s.volume.index(13, 10, 10)] = 1900;
-  const auto found = find_hard_tissue(s.volume, s.bones, kRho1995, always);
-  ASSERT_TRUE(found);
-  EXPECT_EQ(at(*found, 11, 10, 10), Tissue::metal);
-  EXPECT_EQ(at(*found, 12, 10, 10), Tissue::metal);
-  EXPECT_EQ(at(*found, 13, 10, 10), Tissue::enamel);
-  EXPECT_EQ(at(*found, 9, 10, 10), Tissue::none) << "bone beside metal stays bone";
+  const HardTissue found = hard_tissue(s);
+  EXPECT_EQ(at(found, 11, 10, 10), Tissue::metal);
+  EXPECT_EQ(at(found, 12, 10, 10), Tissue::metal);
+  EXPECT_EQ(at(found, 13, 10, 10), Tissue::enamel);
+  EXPECT_EQ(at(found, 9, 10, 10), Tissue::none) << "bone beside metal stays bone";
 }
 
 TEST(HardTissue, OnlyWhatIsKeptCounts) {
   Scene s = block(1200);
   s.volume.values[s.volume.index(10, 10, 10)] = 3071;
   s.bones.at(10, 10, 10) = 0;
-  const auto found = find_hard_tissue(s.volume, s.bones, kRho1995, always);
-  ASSERT_TRUE(found);
-  EXPECT_EQ(found->metal_cm3, 0.0);
+  const HardTissue found = hard_tissue(s);
+  EXPECT_EQ(found.metal_cm3, 0.0);
 }
 
 }  // namespace

@@ -157,7 +157,8 @@ TEST(BoneField, MarrowEndsHalfWayToAirAndHalfWayBetweenVoxelsElsewhere) {
       }
   auto field = bone_field(volume, bones, kThreshold_hu, always);
   ASSERT_TRUE(field);
-  // Linear between 100 and -340, the value half way to air, -450, would lie beyond the second voxel, as far as a crossing can be.
+  // Linear between 100 and -340, the value half way to air, -450, would lie beyond the second voxel, as far as a
+  // crossing can be.
   EXPECT_GT(crossing(*field, 7), 0.9);
   EXPECT_LT(crossing(*field, 7), 1.0);
   for (int row = 0; row < 20; ++row)

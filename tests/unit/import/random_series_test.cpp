@@ -1,5 +1,5 @@
-// Small scans of all kinds at thresholds on and between whole numbers: every import ends, within a bounded number of steps, with
-// one clear sentence or a closed surface, and stops wherever it is asked to.
+// Small scans of all kinds at thresholds on and between whole numbers: every import ends, within a bounded number of
+// steps, with one clear sentence or a closed surface, and stops wherever it is asked to.
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -25,7 +25,8 @@ struct Drawn {
   std::string what;
 };
 
-// Noise of three values round the threshold, one value, all bone, no bone, checkerboards, two blocks with a bridge of one voxel.
+// Noise of three values round the threshold, one value, all bone, no bone, checkerboards, two blocks with a bridge of
+// one voxel.
 Drawn draw(std::uint32_t seed) {
   std::mt19937 random(seed);
   const auto integer = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };

@@ -244,8 +244,8 @@ TEST(SurfaceBlocks, FineAndCoarseTogetherDrawEveryFaceOnce) {
   EXPECT_NEAR(after.area - before.area, wall - mouths, 2.0);
 }
 
-// A rod of metal and a cap of enamel in a block: each vertex has the tissue of what is below it, on the imported surface and
-// on faces that cuts have left. Blocks that meet neither have the bytes that they had.
+// A rod of metal and a cap of enamel in a block: each vertex has the tissue of what is below it, on the imported
+// surface and on faces that cuts have left. Blocks that meet neither have the bytes that they had.
 TEST(SurfaceBlocks, MetalAndEnamelAreMarked) {
   const auto tissue = [](const Vec3& p) {
     if (std::hypot(p.x() - 3.0, p.y()) < 1.0) return Tissue::metal;
@@ -253,7 +253,8 @@ TEST(SurfaceBlocks, MetalAndEnamelAreMarked) {
   };
   DrawnSurface plain{CutField(test::plain_block(20.0, 10.0, 0.5), {})};
   DrawnSurface marked{CutField(test::marked_block(20.0, 10.0, 0.5, tissue), {})};
-  // Past the rod, beside which it lays metal bare, and into the enamel: cuts of two levels, and far off in coarse blocks.
+  // Past the rod, beside which it lays metal bare, and into the enamel: cuts of two levels, and far off in coarse
+  // blocks.
   Cut groove = test::straight_cut(*find_tool("burr-round-5"), {3, -8, -1}, {3, -2.4, -1}, {0, 0, -1});
   const Cut across = test::straight_cut(*find_tool("drill-3.2"), {-8, 0, 1}, {-8, 0, -6}, {0, 0, -1});
   for (DrawnSurface* surface : {&plain, &marked})

@@ -74,7 +74,8 @@ TEST_F(Picture, CutFacesAreRedder) {
   EXPECT_GT(cut.x() / cut.y(), 1.25 * imported.x() / imported.y());
 }
 
-// A block of bone with a rod of metal and a cap of enamel, a groove through all of the bone between: over the wire and drawn.
+// A block of bone with a rod of metal and a cap of enamel, a groove through all of the bone between: over the wire and
+// drawn.
 TEST_F(Picture, MetalAndEnamelHaveColoursOfTheirOwn) {
   const auto tissue = [](const Vec3& p) {
     if (std::hypot(p.x() - 8.0, p.z() + 6.0) < 3.0) return Tissue::metal;

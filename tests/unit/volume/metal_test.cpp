@@ -95,7 +95,8 @@ TEST(Metal, IsMetDeeperThanAVoxel) {
                      test::straight_cut(*find_tool("burr-round-5"), {0, 0, 1}, {0, 0, -7}, kDown)));
 }
 
-// Both ends of the way are clear of the rod, and the middle is not: moved across, and turned about the far end of the tool.
+// Both ends of the way are clear of the rod, and the middle is not: moved across, and turned about the far end of the
+// tool.
 TEST(Metal, IsMetAnywhereOnTheWay) {
   const CutField field(test::marked_block(24.0, 12.0, kPitch_mm, rod), BodyId{});
   const Tool burr = *find_tool("burr-round-5");
