@@ -10,7 +10,8 @@ namespace osteon {
 
 // Squared distance from p to the segment from a to b; to a where both are one point.
 template <class Scalar>
-[[nodiscard]] Scalar squared_distance_to_segment(const Eigen::Matrix<Scalar, 3, 1>& p, const Eigen::Matrix<Scalar, 3, 1>& a,
+[[nodiscard]] Scalar squared_distance_to_segment(const Eigen::Matrix<Scalar, 3, 1>& p,
+                                                 const Eigen::Matrix<Scalar, 3, 1>& a,
                                                  const Eigen::Matrix<Scalar, 3, 1>& b) {
   const Eigen::Matrix<Scalar, 3, 1> ab = b - a, ap = p - a;
   const Scalar squared = ab.squaredNorm();

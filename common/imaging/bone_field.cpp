@@ -21,7 +21,8 @@ double crossing(double marrow_hu, double outside_hu) {
 
 }  // namespace
 
-Result<HuVolume> bone_field(const HuVolume& volume, const VoxelMask& bones, double threshold_hu, const KeepGoing& keep_going) {
+Result<HuVolume> bone_field(const HuVolume& volume, const VoxelMask& bones, double threshold_hu,
+                            const KeepGoing& keep_going) {
   HuVolume field = volume;
   const auto [columns, rows, slices] = volume.dims;
   const auto below = static_cast<std::int16_t>(std::ceil(threshold_hu) - 1);

@@ -128,7 +128,8 @@ Result<VoxelMask> between_dense(const VoxelMask& candidate, const VoxelMask& den
       const int x = p.column + sign * d[0], y = p.row + sign * d[1], z = p.slice + sign * d[2];
       if (x < 0 || y < 0 || z < 0 || x >= columns || y >= rows || z >= slices) return std::uint8_t{0};
       const std::size_t i = candidate.index(x, y, z);
-      return static_cast<std::uint8_t>(dense.values[i] != 0 || (candidate.values[i] != 0 && leads.values[i] != 0) ? 1 : 0);
+      return static_cast<std::uint8_t>(dense.values[i] != 0 || (candidate.values[i] != 0 && leads.values[i] != 0) ? 1
+                                                                                                                  : 0);
     };
     std::size_t asked = 0;
     const auto stop = [&] { return (asked++ & 0xfffff) == 0 && !keep_going(direction / 13.0); };
@@ -165,7 +166,8 @@ void add_edge_to_air(const HuVolume& volume, double air_hu, VoxelMask& found) {
       const auto next = at(step), beyond = at(2 * step);
       if (!inside(next) || !inside(beyond) || found.at(next[0], next[1], next[2]) != 0) continue;
       const int hu = volume.at(next[0], next[1], next[2]);
-      if (hu >= half_hu && hu < volume.at(p.column, p.row, p.slice) && volume.at(beyond[0], beyond[1], beyond[2]) < air_hu)
+      if (hu >= half_hu && hu < volume.at(p.column, p.row, p.slice) &&
+          volume.at(beyond[0], beyond[1], beyond[2]) < air_hu)
         added.push_back(found.index(next[0], next[1], next[2]));
     }
   }
@@ -183,7 +185,8 @@ Result<VoxelMask> cancellous_between(const HuVolume& volume, const VoxelMask& de
   if (!near) return near;
   const auto core_of = [&](const VoxelMask& mask) {
     VoxelMask core(mask.dims);
-    for (std::size_t i = 0; i < core.values.size(); ++i) core.values[i] = mask.values[i] != 0 && near->values[i] == 0 ? 1 : 0;
+    for (std::size_t i = 0; i < core.values.size(); ++i)
+      core.values[i] = mask.values[i] != 0 && near->values[i] == 0 ? 1 : 0;
     return core;
   };
   const auto any = keep_with_core(*candidate, core_of(*candidate), 0.0, part(keep_going, 0.5, 0.6));
@@ -198,7 +201,8 @@ Result<VoxelMask> cancellous_between(const HuVolume& volume, const VoxelMask& de
     return tl::unexpected(left.error());
   for (std::size_t i = 0; i < found->values.size(); ++i)
     if (candidate->values[i] == 0) found->values[i] = 0;
-  const auto around = within_mm(core_of(*found), volume.spacing_mm, 2.0 * params.bridged_mm, part(keep_going, 0.9, 1.0));
+  const auto around =
+      within_mm(core_of(*found), volume.spacing_mm, 2.0 * params.bridged_mm, part(keep_going, 0.9, 1.0));
   if (!around) return around;
   for (std::size_t i = 0; i < found->values.size(); ++i)
     if (around->values[i] == 0) found->values[i] = 0;

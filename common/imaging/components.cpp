@@ -62,8 +62,8 @@ Result<Components> find_components(const VoxelMask& mask, const std::bitset<256>
       const auto end = static_cast<std::uint32_t>(runs.size());
       const auto join = [&, rows = rows](int other_row, int other_slice) {
         if (other_row < 0 || other_row >= rows || other_slice < 0) return;
-        const std::size_t r =
-            static_cast<std::size_t>(other_slice) * static_cast<std::size_t>(rows) + static_cast<std::size_t>(other_row);
+        const std::size_t r = static_cast<std::size_t>(other_slice) * static_cast<std::size_t>(rows) +
+                              static_cast<std::size_t>(other_row);
         std::uint32_t a = row_begin[r], b = row_begin.back();
         const std::uint32_t a_end = row_begin[r + 1];
         while (a < a_end && b < end) {

@@ -29,8 +29,8 @@ struct Components {
 };
 
 // Components of the voxels whose value is in `of`. Error: cancelled.
-[[nodiscard]] Result<Components> find_components(const VoxelMask& mask, const std::bitset<256>& of, Connectivity connectivity,
-                                                 const KeepGoing& keep_going);
+[[nodiscard]] Result<Components> find_components(const VoxelMask& mask, const std::bitset<256>& of,
+                                                 Connectivity connectivity, const KeepGoing& keep_going);
 
 // Voxels of the mask along a run that are not 0.
 [[nodiscard]] bool any_in_run(const VoxelMask& mask, const VoxelRun& run);

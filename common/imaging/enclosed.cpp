@@ -75,7 +75,9 @@ class Face {
   void edge(int axis, const ScanEnds& ends, int length, Reach reach_at) {
     for (const bool far : {false, true}) {
       const bool scan_ends = ends[index(axis)][far ? 1 : 0];
-      const auto is_free = [&](int i) { return axis == v_ ? free(i, far ? height_ - 1 : 0) : free(far ? width_ - 1 : 0, i); };
+      const auto is_free = [&](int i) {
+        return axis == v_ ? free(i, far ? height_ - 1 : 0) : free(far ? width_ - 1 : 0, i);
+      };
       for (int i = 0; i < length && (!scan_ends || is_free(i)); ++i) reach_at(i, far);
       for (int i = length - 1; scan_ends && i >= 0 && is_free(i); --i) reach_at(i, far);
     }
@@ -109,8 +111,8 @@ VoxelMask open_faces(const VoxelMask& solid, const ScanEnds& ends) {
 
 // Whether a sphere of `radius_mm` has room in one component. The scan's ends are no walls: what goes on beyond them may
 // be as wide as it is here. Error: cancelled.
-Result<bool> has_room(const Components& spaces, std::uint32_t component, const std::array<int, 3>& dims, const Vec3& spacing_mm,
-                      double radius_mm, const KeepGoing& keep_going) {
+Result<bool> has_room(const Components& spaces, std::uint32_t component, const std::array<int, 3>& dims,
+                      const Vec3& spacing_mm, double radius_mm, const KeepGoing& keep_going) {
   std::array<int, 3> step{}, coarse{};
   Vec3 coarse_mm;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -123,7 +125,8 @@ Result<bool> has_room(const Components& spaces, std::uint32_t component, const s
   VoxelMask wall(coarse);
   for (const VoxelRun& run : spaces.runs)
     if (run.component == component)
-      for (int x = run.first; x <= run.last; ++x) ++free[wall.index(x / step[0], run.row / step[1], run.slice / step[2])];
+      for (int x = run.first; x <= run.last; ++x)
+        ++free[wall.index(x / step[0], run.row / step[1], run.slice / step[2])];
   for (int z = 0; z < coarse[2]; ++z)
     for (int y = 0; y < coarse[1]; ++y)
       for (int x = 0; x < coarse[0]; ++x) {
@@ -138,8 +141,8 @@ Result<bool> has_room(const Components& spaces, std::uint32_t component, const s
 
 // Marks the components of what is free that no open voxel of the faces belongs to and that are no wider than a marrow
 // space. `marked` gets 1 there. Error: cancelled.
-Result<void> mark_closed(const VoxelMask& solid, const Vec3& spacing_mm, const SegmentationParams& params, const ScanEnds& ends,
-                         VoxelMask& marked, const KeepGoing& keep_going) {
+Result<void> mark_closed(const VoxelMask& solid, const Vec3& spacing_mm, const SegmentationParams& params,
+                         const ScanEnds& ends, VoxelMask& marked, const KeepGoing& keep_going) {
   std::bitset<256> free;
   free.set(0);
   const auto spaces = find_components(solid, free, Connectivity::faces, keep_going);
@@ -151,7 +154,8 @@ Result<void> mark_closed(const VoxelMask& solid, const Vec3& spacing_mm, const S
   const double widest_mm3 = 4.0 / 3.0 * std::numbers::pi * std::pow(params.widest_mm, 3);
   for (std::uint32_t i = 0; i < spaces->count; ++i)
     if (!outside[i] && static_cast<double>(voxels[i]) * spacing_mm.prod() > widest_mm3) {
-      const auto wide = has_room(*spaces, i, solid.dims, spacing_mm, params.widest_mm, [&](double) { return keep_going(1.0); });
+      const auto wide =
+          has_room(*spaces, i, solid.dims, spacing_mm, params.widest_mm, [&](double) { return keep_going(1.0); });
       if (!wide) return tl::unexpected(wide.error());
       outside[i] = *wide;
     }
@@ -196,7 +200,8 @@ Result<VoxelMask> enclosed_by(const VoxelMask& solid, const Vec3& spacing_mm, co
       centres.values[i] = wall->values[i] == 0 && cores.values[i] == 0 ? 1 : 0;
     const auto reach = within_mm(centres, spacing_mm, params.bridged_mm, part(keep_going, 0.35, 0.5));
     if (!reach) return reach;
-    const auto grown = grow_cores(solid, cores, *reach, spacing_mm, 2.0 * params.bridged_mm, part(keep_going, 0.5, 0.8));
+    const auto grown =
+        grow_cores(solid, cores, *reach, spacing_mm, 2.0 * params.bridged_mm, part(keep_going, 0.5, 0.8));
     if (!grown) return grown;
     for (std::size_t i = 0; i < closed.values.size(); ++i)
       if (grown->values[i] != 0) closed.values[i] = 1;

@@ -12,8 +12,8 @@ constexpr auto kEnamel = static_cast<std::uint8_t>(Tissue::enamel);
 
 }  // namespace
 
-Result<HardTissue> find_hard_tissue(const HuVolume& volume, const VoxelMask& bones, const DensityCalibration& calibration,
-                                    const KeepGoing& keep_going) {
+Result<HardTissue> find_hard_tissue(const HuVolume& volume, const VoxelMask& bones,
+                                    const DensityCalibration& calibration, const KeepGoing& keep_going) {
   const double hard_hu = hounsfield(calibration, kCompactBone_g_cm3);
   HardTissue found;
   VoxelMask metal(volume.dims);

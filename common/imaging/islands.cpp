@@ -16,7 +16,8 @@ Result<Islands> find_islands(const HuVolume& volume, const VoxelMask& bone, cons
                              const KeepGoing& keep_going) {
   std::bitset<256> not_zero;
   not_zero.set().reset(0);
-  auto components = find_components(bone, not_zero, Connectivity::corners, [&](double done) { return keep_going(0.6 * done); });
+  auto components =
+      find_components(bone, not_zero, Connectivity::corners, [&](double done) { return keep_going(0.6 * done); });
   if (!components) return tl::unexpected(components.error());
 
   struct Sums {
@@ -43,7 +44,8 @@ Result<Islands> find_islands(const HuVolume& volume, const VoxelMask& bone, cons
     const int count = run.last - run.first + 1;
     s.island.voxels += count;
     s.voxels += count * Vec3(0.5 * (run.first + run.last), run.row, run.slice);
-    for (int x = run.first; x <= run.last; ++x) s.density += bone_density_g_cm3(calibration, volume.at(x, run.row, run.slice));
+    for (int x = run.first; x <= run.last; ++x)
+      s.density += bone_density_g_cm3(calibration, volume.at(x, run.row, run.slice));
   }
 
   Islands islands;

@@ -28,8 +28,8 @@ struct Islands {
 };
 
 // Islands of the voxels that are not 0. Error: cancelled.
-[[nodiscard]] Result<Islands> find_islands(const HuVolume& volume, const VoxelMask& bone, const DensityCalibration& calibration,
-                                           const KeepGoing& keep_going);
+[[nodiscard]] Result<Islands> find_islands(const HuVolume& volume, const VoxelMask& bone,
+                                           const DensityCalibration& calibration, const KeepGoing& keep_going);
 
 // Numbers of bones, from 1: what voxels of the kept islands get in a mask of the volume's dims; others get 0. The
 // islands `kept`, by number, become bones 1, 2, 3 ... in this order, all of them bone 1 where `merge` is true. From the

@@ -40,12 +40,14 @@ void resample_aligned(const HuVolume& volume, const CoordBox& box, double pitch_
   const auto brackets = [&](int axis, std::int32_t from, std::int32_t to) {
     std::vector<Bracket> made;
     for (std::int32_t c = from; c <= to; ++c) {
-      const double voxel = volume.directions(axis, axis) * (c * pitch_mm - volume.origin_mm[axis]) / volume.spacing_mm[axis];
+      const double voxel =
+          volume.directions(axis, axis) * (c * pitch_mm - volume.origin_mm[axis]) / volume.spacing_mm[axis];
       made.push_back(bracket(voxel, volume.dims[static_cast<std::size_t>(axis)]));
     }
     return made;
   };
-  const auto x = brackets(0, box.min.x, box.max.x), y = brackets(1, box.min.y, box.max.y), z = brackets(2, box.min.z, box.max.z);
+  const auto x = brackets(0, box.min.x, box.max.x), y = brackets(1, box.min.y, box.max.y),
+             z = brackets(2, box.min.z, box.max.z);
   for (const Bracket& i : x)
     for (const Bracket& j : y)
       for (const Bracket& k : z) *out++ = static_cast<float>(interpolate(volume, i, j, k));
@@ -55,18 +57,21 @@ void resample_aligned(const HuVolume& volume, const CoordBox& box, double pitch_
 
 void resample(const HuVolume& volume, const CoordBox& box, double pitch_mm, std::span<float> out) {
   const Coord dims = box.dims();
-  OSTEON_CHECK(out.size() == static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z));
+  OSTEON_CHECK(out.size() ==
+               static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z));
   if (volume.directions.isDiagonal(1e-12)) return resample_aligned(volume, box, pitch_mm, out.data());
   float* value = out.data();
   for (int x = box.min.x; x <= box.max.x; ++x)
     for (int y = box.min.y; y <= box.max.y; ++y)
       for (int z = box.min.z; z <= box.max.z; ++z) {
         const Vec3 at = volume.voxel(position_mm({x, y, z}, pitch_mm));
-        *value++ = static_cast<float>(interpolate(volume, bracket(at.x(), volume.dims[0]), bracket(at.y(), volume.dims[1]), bracket(at.z(), volume.dims[2])));
+        *value++ = static_cast<float>(interpolate(volume, bracket(at.x(), volume.dims[0]),
+                                                  bracket(at.y(), volume.dims[1]), bracket(at.z(), volume.dims[2])));
       }
 }
 
-Result<DenseVolume<float>> resample(const HuVolume& volume, const CoordBox& box, double pitch_mm, const KeepGoing& keep_going) {
+Result<DenseVolume<float>> resample(const HuVolume& volume, const CoordBox& box, double pitch_mm,
+                                    const KeepGoing& keep_going) {
   DenseVolume<float> out;
   out.box = box;
   const Coord dims = box.dims();
@@ -74,7 +79,8 @@ Result<DenseVolume<float>> resample(const HuVolume& volume, const CoordBox& box,
   out.values.resize(static_cast<std::size_t>(dims.x) * plane);
   for (int x = box.min.x; x <= box.max.x; ++x) {
     const int done = x - box.min.x;
-    if (!keep_going(static_cast<double>(done) / dims.x)) return failure(ErrorCode::cancelled, "stopped while resampling the scan");
+    if (!keep_going(static_cast<double>(done) / dims.x))
+      return failure(ErrorCode::cancelled, "stopped while resampling the scan");
     const CoordBox slice{{x, box.min.y, box.min.z}, {x, box.max.y, box.max.z}};
     resample(volume, slice, pitch_mm, std::span(out.values).subspan(static_cast<std::size_t>(done) * plane, plane));
   }

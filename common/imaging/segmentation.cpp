@@ -31,7 +31,8 @@ Result<VoxelMask> dense_voxels(const HuVolume& volume, double threshold_hu, cons
   }
   if (!any)
     return failure(ErrorCode::invalid_input, "no voxel reaches the bone threshold of " +
-                                                 std::to_string(std::lround(threshold_hu)) + " HU; give a lower --threshold");
+                                                 std::to_string(std::lround(threshold_hu)) +
+                                                 " HU; give a lower --threshold");
   return dense;
 }
 
@@ -92,7 +93,9 @@ Result<VoxelMask> segment_bone(const HuVolume& volume, const SegmentationParams&
 
   for (std::size_t i = 0; i < solid.values.size(); ++i) {
     if (dense->values[i] != 0) continue;
-    const BoneVoxel kind = solid.values[i] != 0 ? BoneVoxel::cancellous : enclosed->values[i] != 0 ? BoneVoxel::marrow : BoneVoxel::none;
+    const BoneVoxel kind = solid.values[i] != 0       ? BoneVoxel::cancellous
+                           : enclosed->values[i] != 0 ? BoneVoxel::marrow
+                                                      : BoneVoxel::none;
     solid.values[i] = static_cast<std::uint8_t>(kind);
   }
   return solid;

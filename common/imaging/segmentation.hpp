@@ -38,7 +38,7 @@ inline constexpr ScanEnds kAllScanEnds{{{true, true}, {true, true}, {true, true}
 // open. Cancellous bone is `cancellous_hu` or more on most of its 27 voxels, lies on a straight line between two dense
 // voxels, is wider than a joint, and is so for the most part of what is connected and as bright. Errors: invalid_input
 // (no voxel reaches the threshold), cancelled.
-[[nodiscard]] Result<VoxelMask> segment_bone(const HuVolume& volume, const SegmentationParams& params, const ScanEnds& ends,
-                                             const KeepGoing& keep_going);
+[[nodiscard]] Result<VoxelMask> segment_bone(const HuVolume& volume, const SegmentationParams& params,
+                                             const ScanEnds& ends, const KeepGoing& keep_going);
 
 }  // namespace osteon::imaging

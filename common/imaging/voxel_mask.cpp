@@ -54,7 +54,8 @@ void across_rows(const std::vector<float>& rows, const std::vector<std::uint8_t>
 
 }  // namespace
 
-Result<VoxelMask> within_mm(const VoxelMask& mask, const Vec3& spacing_mm, double radius_mm, const KeepGoing& keep_going) {
+Result<VoxelMask> within_mm(const VoxelMask& mask, const Vec3& spacing_mm, double radius_mm,
+                            const KeepGoing& keep_going) {
   const auto [columns, rows, slices] = mask.dims;
   VoxelMask out(mask.dims);
   const auto reach = [&](int axis) { return static_cast<int>(std::floor(radius_mm / spacing_mm[axis] + 1e-9)); };
@@ -72,8 +73,9 @@ Result<VoxelMask> within_mm(const VoxelMask& mask, const Vec3& spacing_mm, doubl
     Slice& made = held(slice);
     made.any = false;
     for (int y = 0; y < rows; ++y) {
-      const bool has = along_row(mask.values.data() + mask.index(0, y, slice), columns, static_cast<float>(spacing_mm.x()),
-                                 reach(0), row_distances.data() + static_cast<std::ptrdiff_t>(y) * columns);
+      const bool has =
+          along_row(mask.values.data() + mask.index(0, y, slice), columns, static_cast<float>(spacing_mm.x()), reach(0),
+                    row_distances.data() + static_cast<std::ptrdiff_t>(y) * columns);
       filled[static_cast<std::size_t>(y)] = has ? 1 : 0;
       made.any = made.any || has;
     }

@@ -90,7 +90,8 @@ bool add_leaf(Case::Grids& grids, const PartSamples& part, Coord origin) {
   if (!part.bone.empty()) read_leaf<std::uint8_t>(part.box, part.bone, origin, 0, number);
   if (!part.tissue.empty()) read_leaf<Tissue>(part.box, part.tissue, origin, Tissue::none, known);
   // A sample inside the surface without a number lies between the voxels of the scan: it counts as bone 1.
-  for (std::size_t i = 0; i < kLeafVoxels; ++i) bone[i] = s[i] < 0.0f ? std::max(1.0f, static_cast<float>(number[i])) : 0.0f;
+  for (std::size_t i = 0; i < kLeafVoxels; ++i)
+    bone[i] = s[i] < 0.0f ? std::max(1.0f, static_cast<float>(number[i])) : 0.0f;
   // A leaf of the surface that is not all inside stays one, also if its samples are equal.
   if (std::ranges::all_of(s, [&](float v) { return v == -band; })) {
     grids.surface.set_constant(origin, -band);
@@ -309,7 +310,8 @@ void copy_part(const DenseVolume<T>& from, const CoordBox& part, std::vector<T>&
 
 }  // namespace
 
-Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillLabelledPart& fill, const KeepGoing& keep_going) {
+Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillLabelledPart& fill,
+                         const KeepGoing& keep_going) {
   if (!(info.pitch_mm > 0.0)) return failure(ErrorCode::invalid_input, "a case needs a pitch above zero");
   const float band = band_mm(info.pitch_mm);
   auto grids = std::make_shared<Grids>(Grids{std::move(info), {}, SparseVolume(band), SparseVolume(0.0f), SparseVolume(0.0f),
@@ -323,7 +325,8 @@ Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillLabelledP
     for (std::int32_t py = first.y; py <= last.y; py += kPart)
       for (std::int32_t pz = first.z; pz <= last.z; pz += kPart) {
         const CoordBox part{{std::max(px, box.min.x), std::max(py, box.min.y), std::max(pz, box.min.z)},
-                            {std::min(px + kPart - 1, box.max.x), std::min(py + kPart - 1, box.max.y), std::min(pz + kPart - 1, box.max.z)}};
+                            {std::min(px + kPart - 1, box.max.x), std::min(py + kPart - 1, box.max.y),
+                             std::min(pz + kPart - 1, box.max.z)}};
         const PartKind kind = fill(part, buffers);
         if (kind == PartKind::outside) continue;
         if (kind == PartKind::inside) std::ranges::fill(buffers.surface_mm, -band);
@@ -338,7 +341,9 @@ Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillLabelledP
   }
   measure(*grids);
   if (!has_inside(*grids))
-    return failure(ErrorCode::invalid_input, "no sample lies in bone: there is none, or it is thinner than a sample; choose a lower --threshold or a smaller --pitch");
+    return failure(ErrorCode::invalid_input,
+                   "no sample lies in bone: there is none, or it is thinner than a sample; choose a lower --threshold "
+                   "or a smaller --pitch");
   find_hard_leaves(*grids);
   grids->clearance = make_clearance(grids->surface, grids->info.pitch_mm);
   grids->hash = content_hash(*grids);
@@ -365,7 +370,8 @@ Result<Case> Case::build(CaseInfo info, const DenseVolume<float>& surface_mm, co
 Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillPart& fill, const KeepGoing& keep_going) {
   const FillLabelledPart fill_buffers = [&](const CoordBox& part, PartBuffers& to) {
     const Coord dims = part.dims();
-    const std::size_t samples = static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z);
+    const std::size_t samples =
+        static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z);
     to.surface_mm.resize(samples);
     to.density_g_cm3.resize(samples);
     return fill(part, to.surface_mm, to.density_g_cm3);

@@ -37,8 +37,9 @@ struct CaseInfo {
 // What an importer knows about the samples beyond their distance and density. Each volume has the box of the distance,
 // or is empty.
 struct SampleLabels {
-  DenseVolume<std::uint8_t> bone;  // number of the bone, from 1; read inside the surface. Empty: all samples are bone 1.
-  DenseVolume<Tissue> tissue;      // metal, enamel, or none: the density decides. Empty: the density decides everywhere.
+  DenseVolume<std::uint8_t>
+      bone;                    // number of the bone, from 1; read inside the surface. Empty: all samples are bone 1.
+  DenseVolume<Tissue> tissue;  // metal, enamel, or none: the density decides. Empty: the density decides everywhere.
 };
 
 // What a part of a bone holds, so that a builder need not look at every sample of what is all one.
@@ -73,7 +74,8 @@ class Case {
   static constexpr std::int32_t kPartSamples = 64;
   [[nodiscard]] static Result<Case> build(CaseInfo info, const CoordBox& box, const FillPart& fill,
                                           const KeepGoing& keep_going = {});
-  [[nodiscard]] static Result<Case> build(CaseInfo info, const CoordBox& box, const FillLabelledPart& fill, const KeepGoing& keep_going);
+  [[nodiscard]] static Result<Case> build(CaseInfo info, const CoordBox& box, const FillLabelledPart& fill,
+                                          const KeepGoing& keep_going);
   // Errors: not_found (no such folder), invalid_input (no or broken case.json / bone.vdb, or content that does not
   // match its hash), unsupported (schema version).
   [[nodiscard]] static Result<Case> load(const std::filesystem::path& folder);

@@ -46,7 +46,8 @@ float depth(float value, float iso) {
 // One slab of samples with its margin, in voxel coordinates counted from the margin's corner.
 class Slab {
  public:
-  Slab(const DenseVolume<float>& field, float iso, const std::atomic<bool>& stopped) : field_(field), iso_(iso), stopped_(stopped) {}
+  Slab(const DenseVolume<float>& field, float iso, const std::atomic<bool>& stopped)
+      : field_(field), iso_(iso), stopped_(stopped) {}
 
   // Writes the magnitudes of the samples from `first_x` to `last_x`, the latter not included, counted from the box's
   // corner; their signs are in `out` already. Memory of an earlier slab is used again.
@@ -68,7 +69,8 @@ class Slab {
     nx_ = last_x - first_x + 2 * kMargin;
     ny_ = d.y + 2 * kMargin;
     nz_ = d.z + 2 * kMargin;
-    const std::size_t count = static_cast<std::size_t>(nx_) * static_cast<std::size_t>(ny_) * static_cast<std::size_t>(nz_);
+    const std::size_t count =
+        static_cast<std::size_t>(nx_) * static_cast<std::size_t>(ny_) * static_cast<std::size_t>(nz_);
     OSTEON_CHECK(count < static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()));
     if (values_.size() < squared_.size()) values_.swap(squared_);
     values_.resize(count);
@@ -104,9 +106,11 @@ class Slab {
         const float* line[4];
         for (int c = 0; c < 4; ++c) line[c] = values_.data() + index(x + (c & 1), y + (c >> 1), 0);
         for (int z = 0; z < nz_; ++z)
-          inside[at(z)] = static_cast<std::uint8_t>((line[0][z] < 0) + (line[1][z] < 0) + (line[2][z] < 0) + (line[3][z] < 0));
+          inside[at(z)] =
+              static_cast<std::uint8_t>((line[0][z] < 0) + (line[1][z] < 0) + (line[2][z] < 0) + (line[3][z] < 0));
         for (int z = 0; z + 1 < nz_; ++z)
-          if (const int corners = inside[at(z)] + inside[at(z + 1)]; corners != 0 && corners != 8) add_point(x, y, z, line);
+          if (const int corners = inside[at(z)] + inside[at(z + 1)]; corners != 0 && corners != 8)
+            add_point(x, y, z, line);
       }
   }
 
@@ -127,7 +131,8 @@ class Slab {
     const std::int32_t cell = index(x, y, z);
     nearest_point_[at(cell)] = static_cast<std::int32_t>(points_.size());
     cells_.push_back(cell);
-    points_.push_back(Vec3f(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)) + sum / static_cast<float>(crossings));
+    points_.push_back(Vec3f(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)) +
+                      sum / static_cast<float>(crossings));
   }
 
   // A crossed lattice edge starts at the lowest corner of a cell with a point, so only those are looked at.
@@ -136,7 +141,8 @@ class Slab {
     const std::array<int, 3> step{ny_ * nz_, nz_, 1};
     const auto point = [&](std::int32_t cell) { return nearest_point_[at(cell)]; };
     for (const std::int32_t i : cells_) {
-      if (triangles_.size() > kMostTriangles) throw std::length_error("it has too many triangles; choose a larger --pitch");
+      if (triangles_.size() > kMostTriangles)
+        throw std::length_error("it has too many triangles; choose a larger --pitch");
       const int x = i / (ny_ * nz_), y = i / nz_ % ny_, z = i % nz_;
       if (x == 0 || y == 0 || z == 0) continue;  // the cells around the edge lie beyond the margin
       const bool inside = values_[at(i)] < 0;
@@ -171,7 +177,8 @@ class Slab {
     squared_.swap(values_);  // which nobody reads any more
     for (std::size_t t = 0; t < triangles_.size(); ++t) {
       if ((t & 0xffff) == 0 && stopped_) return;
-      const Vec3f &a = points_[at(triangles_[t][0])], &b = points_[at(triangles_[t][1])], &c = points_[at(triangles_[t][2])];
+      const Vec3f &a = points_[at(triangles_[t][0])], &b = points_[at(triangles_[t][1])],
+                  &c = points_[at(triangles_[t][2])];
       const Vec3f low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
       const int x_end = std::min(nx_ - 1, static_cast<int>(high.x()) + 1), y_end = std::min(ny_ - 1, static_cast<int>(high.y()) + 1),
                 z_end = std::min(nz_ - 1, static_cast<int>(high.z()) + 1);
@@ -196,7 +203,8 @@ class Slab {
   void offer_point(std::int32_t point, std::int32_t sample, const Vec3f& p) {
     const float squared = (points_[at(point)] - p).squaredNorm();
     std::int32_t& nearest = nearest_point_[at(sample)];
-    const float limit = nearest == kNone ? static_cast<float>((kBand + 2) * (kBand + 2)) : (points_[at(nearest)] - p).squaredNorm();
+    const float limit =
+        nearest == kNone ? static_cast<float>((kBand + 2) * (kBand + 2)) : (points_[at(nearest)] - p).squaredNorm();
     if (squared < limit) nearest = point;
   }
 
@@ -252,7 +260,8 @@ class Slab {
 
   // The triangles around a point of the surface to a sample.
   void offer_around(std::int32_t point, std::int32_t sample, const Vec3f& p) {
-    for (std::int32_t n = around_begin_[at(point)]; n < around_begin_[at(point) + 1]; ++n) offer(around_[at(n)], sample, p);
+    for (std::int32_t n = around_begin_[at(point)]; n < around_begin_[at(point) + 1]; ++n)
+      offer(around_[at(n)], sample, p);
   }
 
   // From the nearest point to the nearest triangle: those around the point, then over the mesh, around the corners of
@@ -266,7 +275,8 @@ class Slab {
       if (triangle == kNone) return;
       const unsigned corners = steps == 0 ? 7u : distance(triangle, p).corners;
       for (std::size_t c = 0; c < 3; ++c)
-        if (const std::int32_t point = triangles_[at(triangle)][c]; (corners >> c & 1u) != 0 && point != known) offer_around(point, sample, p);
+        if (const std::int32_t point = triangles_[at(triangle)][c]; (corners >> c & 1u) != 0 && point != known)
+          offer_around(point, sample, p);
       if (nearest_[at(sample)] == triangle) return;
       known = kNone;
     }
@@ -295,7 +305,8 @@ class Slab {
   std::vector<std::int32_t> cells_;    // that have a point, in the order of the points
   std::vector<Vec3f> points_;
   std::vector<std::array<std::int32_t, 3>> triangles_;
-  std::vector<std::int32_t> nearest_point_;  // of each sample; before, while the surface is meshed, the point of each cell
+  std::vector<std::int32_t>
+      nearest_point_;                  // of each sample; before, while the surface is meshed, the point of each cell
   std::vector<std::int32_t> nearest_;  // triangle of each sample
   std::vector<float> squared_;         // and the distance to it, voxels²; nothing where there is none
   std::vector<std::int32_t> layer_, next_layer_;

@@ -115,7 +115,10 @@ class BandDistance {
         if (!nearest_.probeValue(beside, t) || t == last || t < 0 || static_cast<std::size_t>(t) >= mesh_.triangles.size()) continue;
         last = t;
         const auto& [a, b, c] = mesh_.triangles[static_cast<std::size_t>(t)];
-        mm = std::min(mm, std::sqrt(distance_to_triangle<double>(p, position(mesh_, a), position(mesh_, b), position(mesh_, c)).squared));
+        mm = std::min(
+            mm,
+            std::sqrt(
+                distance_to_triangle<double>(p, position(mesh_, a), position(mesh_, b), position(mesh_, c)).squared));
       }
     }
     return std::copysign(mm, rough);

@@ -489,8 +489,10 @@ bool Proxy::meets_metal(const Tick& tick, const ContactQuery& query) const noexc
       const auto p = static_cast<std::size_t>(i);
       if (ahead_.values.distance_mm[p] >= 0.0f) continue;
       const ContactPoint& point = model.active[p];
-      const double reach_mm = query.ahead_mm > 0.0 ? std::min(query.ahead_mm / point.outward.dot(toward), query.most_mm) : 0.0;
-      if (tick.patch.is_metal(pose_.point(point.inset_mm + query.lift_mm * point.outward + reach_mm * toward))) return true;
+      const double reach_mm =
+          query.ahead_mm > 0.0 ? std::min(query.ahead_mm / point.outward.dot(toward), query.most_mm) : 0.0;
+      if (tick.patch.is_metal(pose_.point(point.inset_mm + query.lift_mm * point.outward + reach_mm * toward)))
+        return true;
     }
   }
   return false;

@@ -94,7 +94,8 @@ class Unpacker {
       if (auto taken = take(entry); !taken) return tl::unexpected(taken.error());
     }
     if (!has_end())
-      return failure(ErrorCode::invalid_input, file_.string() + " is truncated (it has no end); copy or export it again");
+      return failure(ErrorCode::invalid_input,
+                     file_.string() + " is truncated (it has no end); copy or export it again");
     std::ranges::sort(found_.files, {}, &FoundFile::name);
     return std::move(found_);
   }
@@ -111,8 +112,8 @@ class Unpacker {
     return in.read(end.data(), end.size()) && std::ranges::all_of(end, [](char c) { return c == 0; });
   }
   [[nodiscard]] tl::unexpected<Error> damaged() const {
-    return failure(ErrorCode::invalid_input,
-                   file_.string() + " is truncated or damaged (" + reason_of(archive_.get()) + "); copy or export it again");
+    return failure(ErrorCode::invalid_input, file_.string() + " is truncated or damaged (" + reason_of(archive_.get()) +
+                                                 "); copy or export it again");
   }
   [[nodiscard]] bool go_on() {
     const double done = static_cast<double>(archive_filter_bytes(archive_.get(), -1)) / size_;
@@ -142,8 +143,10 @@ class Unpacker {
     if (given == nullptr) given = archive_entry_pathname_utf8(entry);
     const std::string name = given != nullptr ? std::string(given).substr(0, 1024) : "without a name";
     if (archive_entry_is_encrypted(entry) != 0)
-      return failure(ErrorCode::invalid_input, file_.string() + " is encrypted; unpack it with its password and give the folder");
-    if (archive_entry_symlink(entry) != nullptr || archive_entry_hardlink(entry) != nullptr) return skip(FileKind::link, name);
+      return failure(ErrorCode::invalid_input,
+                     file_.string() + " is encrypted; unpack it with its password and give the folder");
+    if (archive_entry_symlink(entry) != nullptr || archive_entry_hardlink(entry) != nullptr)
+      return skip(FileKind::link, name);
     if (archive_entry_filetype(entry) == AE_IFDIR) return {};
     if (archive_entry_filetype(entry) != AE_IFREG) return skip(FileKind::special, name);
 
@@ -181,10 +184,13 @@ class Unpacker {
     const Output out(path);
     for (;;) {
       bytes_ += got;
-      if (bytes_ > limits_.bytes) return too_large("more than the " + gigabytes(limits_.bytes) + " of DICOM that are unpacked");
-      if (bytes_ > room_) return too_large("more DICOM than the disk of " + into_.parent_path().string() + " has room for");
+      if (bytes_ > limits_.bytes)
+        return too_large("more than the " + gigabytes(limits_.bytes) + " of DICOM that are unpacked");
+      if (bytes_ > room_)
+        return too_large("more DICOM than the disk of " + into_.parent_path().string() + " has room for");
       if (!out.write(piece_.data(), got))
-        return failure(ErrorCode::internal, "cannot write to " + into_.parent_path().string() + " (" + std::strerror(errno) +
+        return failure(ErrorCode::internal, "cannot write to " + into_.parent_path().string() + " (" +
+                                                std::strerror(errno) +
                                                 "); make room there or set TMPDIR to another folder");
       if (!go_on()) return stopped();
       const auto next = read_piece();
@@ -203,8 +209,9 @@ class Unpacker {
   }
 
   [[nodiscard]] tl::unexpected<Error> too_large(const std::string& what) const {
-    return failure(ErrorCode::exhausted, file_.string() + " holds " + what +
-                                             "; unpack the CT series alone and give its folder, or set TMPDIR to a larger disk");
+    return failure(ErrorCode::exhausted,
+                   file_.string() + " holds " + what +
+                       "; unpack the CT series alone and give its folder, or set TMPDIR to a larger disk");
   }
   static std::string gigabytes(std::uint64_t bytes) {
     char text[32];

@@ -160,8 +160,10 @@ std::string nothing_removed(std::size_t number, const CarveStep& step, const Ste
   if (report.metal_refused > 0) std::snprintf(why, sizeof why, "it meets metal, which no tool cuts");
   else if (in_bone) std::snprintf(why, sizeof why, "what its tip meets was removed before");
   else std::snprintf(why, sizeof why, "its tip stays at least %.1f mm from bone", free_mm);
-  std::snprintf(text, sizeof text, "       step %zu removed nothing: %s; bone lies within x %.0f..%.0f, y %.0f..%.0f, z %.0f..%.0f mm\n", number, why,
-                box.min_mm.x(), box.max_mm.x(), box.min_mm.y(), box.max_mm.y(), box.min_mm.z(), box.max_mm.z());
+  std::snprintf(text, sizeof text,
+                "       step %zu removed nothing: %s; bone lies within x %.0f..%.0f, y %.0f..%.0f, z %.0f..%.0f mm\n",
+                number, why, box.min_mm.x(), box.max_mm.x(), box.min_mm.y(), box.max_mm.y(), box.min_mm.z(),
+                box.max_mm.z());
   return text;
 }
 

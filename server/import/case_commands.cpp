@@ -53,7 +53,8 @@ Result<void> parse_keep(const std::string& text, CtOptions& options) {
     int number = 0;
     const auto [stop, error] = std::from_chars(text.data() + begin, text.data() + end, number);
     if (error != std::errc{} || stop != text.data() + end || number < 1)
-      return failure(ErrorCode::invalid_input, "--keep " + text + " is not a list of islands; write numbers such as 1,3, or all");
+      return failure(ErrorCode::invalid_input,
+                     "--keep " + text + " is not a list of islands; write numbers such as 1,3, or all");
     options.keep.push_back(number);
     begin = end + 1;
   }
@@ -72,17 +73,21 @@ Result<CtScan> read_scan(const Arguments& a, const KeepGoing& reading) {
   if (kind == InputKind::absent)
     return failure(ErrorCode::not_found, "there is no file or folder " + a.input +
                                              "; give a folder, zip or ISO image with a CT series, or an .inv3 file");
-  if (kind != InputKind::inv3 && kind != InputKind::other) return read_dicom_series(a.input, {.series = a.series}, reading);
+  if (kind != InputKind::inv3 && kind != InputKind::other)
+    return read_dicom_series(a.input, {.series = a.series}, reading);
   std::error_code error;
   if (!fs::is_regular_file(a.input, error))
     return failure(ErrorCode::invalid_input, a.input + " is a pipe or device; give a folder or a file");
   if (kind == InputKind::inv3 && a.series)
-    return failure(ErrorCode::invalid_input, "--series is for DICOM; " + a.input + " is an InVesalius project with one scan");
+    return failure(ErrorCode::invalid_input,
+                   "--series is for DICOM; " + a.input + " is an InVesalius project with one scan");
   return read_inv3(a.input, reading);
 }
 
 Result<std::string> run_ct(const Arguments& a, const StopSignal& stop) {
-  if (a.out.empty() && !a.list) return failure(ErrorCode::invalid_input, "--out is missing; name the folder of the case, or give --list to see the islands alone");
+  if (a.out.empty() && !a.list)
+    return failure(ErrorCode::invalid_input,
+                   "--out is missing; name the folder of the case, or give --list to see the islands alone");
   if (!a.out.empty())
     if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
   CtOptions options;
@@ -115,7 +120,8 @@ Result<std::string> run_series(const Arguments& a, const StopSignal& stop) {
   Bar bar(stop, "searching");
   const auto searching = bar.stage(0.0, 1.0);
   if (input_kind(a.input, searching) == InputKind::inv3)
-    return failure(ErrorCode::invalid_input, a.input + " is an InVesalius project with one scan; give it to osteon-import ct");
+    return failure(ErrorCode::invalid_input,
+                   a.input + " is an InVesalius project with one scan; give it to osteon-import ct");
   const auto report = list_dicom_series(a.input, searching);
   if (!report) return tl::unexpected(report.error());
   return a.json ? list_json(*report) : list_text(*report);
@@ -267,11 +273,16 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   ct->add_option("INPUT", a.input,
                  "DICOM: a folder (with all its subfolders), a zip or an ISO image; or an InVesalius project (.inv3)")
       ->required();
-  ct->add_option("--series", a.series, "Number of the series, as osteon-import series lists them (default: the largest CT)");
+  ct->add_option("--series", a.series,
+                 "Number of the series, as osteon-import series lists them (default: the largest CT)");
   ct->add_option("--out", a.out, "Folder of the case, made by this command");
-  ct->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the scan's smallest spacing)")->check(within(0.02, 10.0));
-  ct->add_option("--threshold", a.threshold_hu, "Bone is at or above it, HU (default: 226, usual for adult skulls in slices of 1.5 mm)")->check(within(-1000.0, 4000.0));
-  ct->add_option("--keep", a.keep, "Islands of bone by their number in the printed list, such as 1,3, or all (default: 1, the largest)");
+  ct->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the scan's smallest spacing)")
+      ->check(within(0.02, 10.0));
+  ct->add_option("--threshold", a.threshold_hu,
+                 "Bone is at or above it, HU (default: 226, usual for adult skulls in slices of 1.5 mm)")
+      ->check(within(-1000.0, 4000.0));
+  ct->add_option("--keep", a.keep,
+                 "Islands of bone by their number in the printed list, such as 1,3, or all (default: 1, the largest)");
   ct->add_flag("--list", a.list, "List the islands and write nothing");
   ct->add_flag("--merge", a.merge, "Count the kept islands as one bone; otherwise each has a bone number of its own");
   ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone");
@@ -286,7 +297,9 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   CLI::App* phantom = app.add_subcommand("phantom", "Make a case whose true shape and density are known");
   phantom->add_option("KIND", a.kind, "block (layers from the top down) or tube (layers from the outside in)")->required()->check(CLI::IsMember({"block", "tube"}));
   phantom->add_option("--layers", a.layers, "THICKNESS_MM:DENSITY_G_CM3,... such as 5:1.9,20:0.3,5:1.9")->required();
-  phantom->add_option("--width", a.width_mm, "Edge of the block, or length of the tube, mm")->check(within(1.0, 1000.0))->capture_default_str();
+  phantom->add_option("--width", a.width_mm, "Edge of the block, or length of the tube, mm")
+      ->check(within(1.0, 1000.0))
+      ->capture_default_str();
   phantom->add_option("--pitch", a.pitch_mm, "Voxel edge, mm (default: 0.4)")->check(within(0.02, 10.0));
   phantom->add_option("--out", a.out, "Folder of the case, made by this command")->required();
   phantom->add_option("--dicom", a.dicom, "Also write what a CT scanner would see of it, as a DICOM series, to this folder");
@@ -297,7 +310,8 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   labels->add_option("DIR", a.input, "Folder with the slices, numbered at the end of their names")->required();
   labels->add_option("--out", a.out, "Folder of the case, made by this command")->required();
   labels->add_option("--spacing", a.spacing, "Size of a voxel, mm: X,Y,Z, or one number for all")->required();
-  labels->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the smallest spacing)")->check(within(0.02, 10.0));
+  labels->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the smallest spacing)")
+      ->check(within(0.02, 10.0));
   labels->add_option("--bone", a.bone_colours, "R,G,B or R,G,B:DENSITY_G_CM3 of a colour that is bone; may be repeated (default: 255,249,219:1.9)");
   labels->add_option("--legend", a.legend, "The same from a YAML file");
   labels->add_option("--title", a.title, "Name shown to people; do not use a patient's");
@@ -307,7 +321,9 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   stl->add_option("FILE", a.input, "STL file, binary or text")->required();
   stl->add_option("--out", a.out, "Folder of the case, made by this command")->required();
   stl->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: 0.5)")->check(within(0.02, 10.0));
-  stl->add_option("--density", a.density_g_cm3, "Of all its bone, g/cm3")->check(within(0.05, 3.0))->capture_default_str();
+  stl->add_option("--density", a.density_g_cm3, "Of all its bone, g/cm3")
+      ->check(within(0.05, 3.0))
+      ->capture_default_str();
   stl->add_option("--unit", a.unit, "Of the file's numbers: mm, cm, m or inch")->check(CLI::IsMember({"mm", "cm", "m", "inch"}))->capture_default_str();
   stl->add_option("--title", a.title, "Name shown to people; do not use a patient's");
   commands.push_back({stl, [shared](const StopSignal& stop) { return run_stl(*shared, stop); }});

@@ -60,8 +60,8 @@ Result<Region> dense_region(const imaging::HuVolume& volume, double threshold_hu
 }
 
 // The bone's voxels, the cell around each, and the band beyond.
-CoordBox lattice_box(const imaging::HuVolume& volume, const std::array<int, 3>& bone_first, const std::array<int, 3>& bone_last,
-                     double pitch_mm) {
+CoordBox lattice_box(const imaging::HuVolume& volume, const std::array<int, 3>& bone_first,
+                     const std::array<int, 3>& bone_last, double pitch_mm) {
   const Vec3 first(bone_first[0], bone_first[1], bone_first[2]), last(bone_last[0], bone_last[1], bone_last[2]);
   const Box cells = imaging::enclosing_box(volume, first - Vec3::Ones(), last + Vec3::Ones());
   return covering_samples(cells.grown(5.0 * pitch_mm), pitch_mm);
@@ -96,7 +96,8 @@ Result<std::vector<int>> islands_to_keep(const CtOptions& options, const std::ve
     if (number < 1 || number > static_cast<int>(islands.size()))
       return failure(ErrorCode::invalid_input, "--keep names island " + std::to_string(number) +
                                                    ", but at this threshold there are islands 1 to " +
-                                                   std::to_string(islands.size()) + "; give numbers of the list, or all");
+                                                   std::to_string(islands.size()) +
+                                                   "; give numbers of the list, or all");
     if (std::ranges::find(kept, number) == kept.end()) kept.push_back(number);
   }
   return kept;
@@ -110,14 +111,16 @@ class NearestLabel {
   // The index of the voxel that a sample in bone takes its labels from.
   [[nodiscard]] std::size_t voxel(const Vec3& position_mm) const {
     const Vec3 at = volume_.voxel(position_mm);
-    const auto clamped = [&](double c, std::size_t axis) { return std::clamp(static_cast<int>(c), 0, volume_.dims[axis] - 1); };
+    const auto clamped = [&](double c, std::size_t axis) {
+      return std::clamp(static_cast<int>(c), 0, volume_.dims[axis] - 1);
+    };
     const std::size_t nearest =
         bones_.index(clamped(std::round(at.x()), 0), clamped(std::round(at.y()), 1), clamped(std::round(at.z()), 2));
     if (bones_.values[nearest] != 0) return nearest;
     for (int corner = 0; corner < 8; ++corner) {
-      const std::size_t beside =
-          bones_.index(clamped(std::floor(at.x()) + (corner & 1), 0), clamped(std::floor(at.y()) + (corner >> 1 & 1), 1),
-                       clamped(std::floor(at.z()) + (corner >> 2), 2));
+      const std::size_t beside = bones_.index(clamped(std::floor(at.x()) + (corner & 1), 0),
+                                              clamped(std::floor(at.y()) + (corner >> 1 & 1), 1),
+                                              clamped(std::floor(at.z()) + (corner >> 2), 2));
       if (bones_.values[beside] != 0) return beside;
     }
     return nearest;
@@ -132,8 +135,8 @@ class NearestLabel {
 // leaf.
 class CaseSamples {
  public:
-  CaseSamples(const imaging::HuVolume& volume, const imaging::VoxelMask& bones, const imaging::VoxelMask& hard, bool several,
-              const DenseVolume<float>& surface_mm, const CtOptions& options, double pitch_mm)
+  CaseSamples(const imaging::HuVolume& volume, const imaging::VoxelMask& bones, const imaging::VoxelMask& hard,
+              bool several, const DenseVolume<float>& surface_mm, const CtOptions& options, double pitch_mm)
       : volume_(volume),
         bones_(bones),
         hard_(hard),
@@ -191,7 +194,8 @@ class CaseSamples {
     imaging::resample(volume_, box, pitch_mm_, hu_);
     std::size_t n = 0;
     each([&](Coord c, std::size_t i) {
-      to.density_g_cm3[i] = static_cast<float>(imaging::bone_density_g_cm3(calibration_, static_cast<double>(hu_[n++])));
+      to.density_g_cm3[i] =
+          static_cast<float>(imaging::bone_density_g_cm3(calibration_, static_cast<double>(hu_[n++])));
       if (to.surface_mm[i] >= 0.0f || (to.bone.empty() && to.tissue.empty())) return;
       const std::size_t voxel = label_.voxel(position_mm(c, pitch_mm_));
       if (!to.bone.empty()) to.bone[i] = bones_.values[voxel];
@@ -223,7 +227,8 @@ Result<std::vector<double>> pieces_without_marrow(const Segmented& s, const imag
                                                   const KeepGoing& keep_going) {
   imaging::VoxelMask firm(s.volume.dims);
   for (std::size_t i = 0; i < firm.values.size(); ++i)
-    firm.values[i] = s.bones.values[i] != 0 && bone.values[i] != static_cast<std::uint8_t>(imaging::BoneVoxel::marrow) ? 1 : 0;
+    firm.values[i] =
+        s.bones.values[i] != 0 && bone.values[i] != static_cast<std::uint8_t>(imaging::BoneVoxel::marrow) ? 1 : 0;
   std::bitset<256> one;
   one.set(1);
   const auto pieces = imaging::find_components(firm, one, imaging::Connectivity::corners, keep_going);
@@ -238,15 +243,15 @@ Result<std::vector<double>> pieces_without_marrow(const Segmented& s, const imag
 }
 
 // What was found and what became of it, into `s.found`. Error: cancelled.
-Result<void> summarise(const imaging::VoxelMask& bone, const imaging::Islands& islands, std::vector<int> kept, Segmented& s,
-                       const KeepGoing& keep_going) {
+Result<void> summarise(const imaging::VoxelMask& bone, const imaging::Islands& islands, std::vector<int> kept,
+                       Segmented& s, const KeepGoing& keep_going) {
   CtSegmentation& found = s.found;
   std::int64_t below = 0;
   for (std::size_t i = 0; i < bone.values.size(); ++i)
     below += s.bones.values[i] != 0 && bone.values[i] != static_cast<std::uint8_t>(imaging::BoneVoxel::dense) ? 1 : 0;
   found.marrow_cm3 = static_cast<double>(below) * s.volume.spacing_mm.prod() * 1e-3;
-  found.region =
-      imaging::enclosing_box(s.volume, Vec3::Zero(), Vec3(s.volume.dims[0] - 1, s.volume.dims[1] - 1, s.volume.dims[2] - 1));
+  found.region = imaging::enclosing_box(s.volume, Vec3::Zero(),
+                                        Vec3(s.volume.dims[0] - 1, s.volume.dims[1] - 1, s.volume.dims[2] - 1));
   found.islands = islands.list;
   for (const imaging::Island& island : islands.list) found.left_out_cm3 += island.volume_cm3;
   for (const int number : kept) found.left_out_cm3 -= islands.list[static_cast<std::size_t>(number - 1)].volume_cm3;
@@ -300,7 +305,8 @@ Result<DenseVolume<float>> measure_surface(const Segmented& s, const imaging::Hu
   auto samples = imaging::resample(*field, box, pitch_mm, part(keep_going, 0.1, 0.25));
   if (!samples) return tl::unexpected(samples.error());
   field->values = {};
-  auto surface_mm = signed_distance_mm(*samples, static_cast<float>(threshold_hu), pitch_mm, part(keep_going, 0.25, 0.9));
+  auto surface_mm =
+      signed_distance_mm(*samples, static_cast<float>(threshold_hu), pitch_mm, part(keep_going, 0.25, 0.9));
   if (!surface_mm) return surface_mm;
   if (auto capped = cap_at_scan(geometry, pitch_mm, *surface_mm, part(keep_going, 0.9, 1.0)); !capped)
     return tl::unexpected(capped.error());
@@ -314,7 +320,8 @@ Result<CtImport> make_case(CtScan scan, const CtOptions& options, const KeepGoin
   geometry.origin_mm = scan.volume.origin_mm;
   geometry.directions = scan.volume.directions;
   if (!(geometry.spacing_mm.minCoeff() >= kLeastSpacing_mm) || !(geometry.spacing_mm.maxCoeff() <= kMostSpacing_mm))
-    return failure(ErrorCode::invalid_input, "voxels of " + imaging::describe(geometry) + " are of no CT; export the scan again");
+    return failure(ErrorCode::invalid_input,
+                   "voxels of " + imaging::describe(geometry) + " are of no CT; export the scan again");
 
   const double pitch_mm = options.pitch_mm.value_or(std::max(kLeastPitch_mm, geometry.spacing_mm.minCoeff()));
   if (!(pitch_mm >= kLeastPitch_mm) || !(pitch_mm <= kMostPitch_mm))

@@ -133,8 +133,9 @@ std::string meta_text(const gdcm::File& file, const gdcm::Tag& tag) {
   const gdcm::FileMetaInformation& meta = file.GetHeader();
   if (!meta.FindDataElement(tag)) return {};
   const gdcm::ByteValue* bytes = meta.GetDataElement(tag).GetByteValue();
-  return bytes == nullptr || bytes->GetLength() > kLongestValue ? std::string()
-                                                                : trimmed(std::string(bytes->GetPointer(), bytes->GetLength()));
+  return bytes == nullptr || bytes->GetLength() > kLongestValue
+             ? std::string()
+             : trimmed(std::string(bytes->GetPointer(), bytes->GetLength()));
 }
 
 // Everything before the pixels, and their place where there are any. False where the file cannot be read so far.
@@ -215,20 +216,21 @@ void read_dicom(const fs::path& file, DicomHeader& h) {
 
 void DicomHeader::pack(ByteWriter& to) const {
   to.add(file), to.add(bytes), to.add(pixel_offset), to.add(kind), to.add(modality);
-  to.add(series), to.add(instance), to.add(transfer_syntax), to.add(photometric), to.add(image_type), to.add(description),
-      to.add(kernel);
+  to.add(series), to.add(instance), to.add(transfer_syntax), to.add(photometric), to.add(image_type),
+      to.add(description), to.add(kernel);
   to.add(series_number), to.add(acquisition), to.add(temporal_position), to.add(frames), to.add(columns), to.add(rows);
   to.add(bits_allocated), to.add(bits_stored), to.add(samples);
   to.add(position), to.add(orientation), to.add(spacing), to.add(slope), to.add(intercept), to.add(padding);
 }
 
 bool DicomHeader::unpack(ByteReader& from) {
-  return from.get(file) && from.get(bytes) && from.get(pixel_offset) && from.get(kind) && kind <= FileKind::too_deep && from.get(modality) &&
-         from.get(series) && from.get(instance) && from.get(transfer_syntax) && from.get(photometric) && from.get(image_type) &&
-         from.get(description) && from.get(kernel) && from.get(series_number) && from.get(acquisition) &&
-         from.get(temporal_position) && from.get(frames) && from.get(columns) && from.get(rows) && from.get(bits_allocated) &&
-         from.get(bits_stored) && from.get(samples) && from.get(position) && from.get(orientation) && from.get(spacing) &&
-         from.get(slope) && from.get(intercept) && from.get(padding);
+  return from.get(file) && from.get(bytes) && from.get(pixel_offset) && from.get(kind) && kind <= FileKind::too_deep &&
+         from.get(modality) && from.get(series) && from.get(instance) && from.get(transfer_syntax) &&
+         from.get(photometric) && from.get(image_type) && from.get(description) && from.get(kernel) &&
+         from.get(series_number) && from.get(acquisition) && from.get(temporal_position) && from.get(frames) &&
+         from.get(columns) && from.get(rows) && from.get(bits_allocated) && from.get(bits_stored) &&
+         from.get(samples) && from.get(position) && from.get(orientation) && from.get(spacing) && from.get(slope) &&
+         from.get(intercept) && from.get(padding);
 }
 
 FileKind kind_of(std::string_view sop_class, std::string_view modality, std::string_view image_type) {

@@ -31,7 +31,8 @@ std::uint32_t little_endian(const unsigned char* bytes, int count) {
 bool pixels_are_whole(const DicomHeader& h, const fs::path& file, std::uint64_t plain_bytes) {
   if (h.pixel_offset == 0) return true;  // deflated: the stream itself knows its end
   const bool is_plain = h.transfer_syntax.empty() || h.transfer_syntax == "1.2.840.10008.1.2" ||
-                        h.transfer_syntax.starts_with("1.2.840.10008.1.2.1") || h.transfer_syntax == "1.2.840.10008.1.2.2";
+                        h.transfer_syntax.starts_with("1.2.840.10008.1.2.1") ||
+                        h.transfer_syntax == "1.2.840.10008.1.2.2";
   if (is_plain) return h.pixel_offset + plain_bytes <= h.bytes;
   // Compressed pixels are items, each with its length; the last has none.
   std::ifstream in(file, std::ios::binary);
@@ -48,7 +49,8 @@ bool pixels_are_whole(const DicomHeader& h, const fs::path& file, std::uint64_t 
 
 }  // namespace
 
-Result<void> read_pixels(const DicomHeader& h, const fs::path& file, const std::string& name, std::span<std::int16_t> out) try {
+Result<void> read_pixels(const DicomHeader& h, const fs::path& file, const std::string& name,
+                         std::span<std::int16_t> out) try {
   const auto broken = [&](const std::string& why) {
     return failure(ErrorCode::invalid_input, name + " " + why + "; copy or export the series again");
   };
@@ -68,9 +70,9 @@ Result<void> read_pixels(const DicomHeader& h, const fs::path& file, const std::
   std::vector<char> buffer(image.GetBufferLength());
   const gdcm::TransferSyntax syntax = reader.GetFile().GetHeader().GetDataSetTransferSyntax();
   const gdcm::ByteValue* bytes = image.GetDataElement().GetByteValue();
-  const bool plain =
-      (syntax == gdcm::TransferSyntax::ImplicitVRLittleEndian || syntax == gdcm::TransferSyntax::ExplicitVRLittleEndian) &&
-      image.GetNumberOfOverlays() == 0 && bytes != nullptr && bytes->GetLength() >= buffer.size();
+  const bool plain = (syntax == gdcm::TransferSyntax::ImplicitVRLittleEndian ||
+                      syntax == gdcm::TransferSyntax::ExplicitVRLittleEndian) &&
+                     image.GetNumberOfOverlays() == 0 && bytes != nullptr && bytes->GetLength() >= buffer.size();
   if (plain)
     std::memcpy(buffer.data(), bytes->GetPointer(), buffer.size());
   else if (!image.GetBuffer(buffer.data()))
@@ -81,19 +83,23 @@ Result<void> read_pixels(const DicomHeader& h, const fs::path& file, const std::
   const int unused = is_signed ? 16 - static_cast<int>(image.GetPixelFormat().GetBitsStored()) : 0;
   // Padding counts as air, but only where it would be bright: some files name a value that their pixels have too.
   const bool has_padding = h.padding.size() == 1 && h.padding[0] * h.slope[0] + h.intercept[0] > kBrightPadding_hu;
-  const auto padding = has_padding ? static_cast<std::uint16_t>(static_cast<std::int64_t>(h.padding[0])) : std::uint16_t{0};
+  const auto padding =
+      has_padding ? static_cast<std::uint16_t>(static_cast<std::int64_t>(h.padding[0])) : std::uint16_t{0};
   for (std::size_t i = 0; i < pixels; ++i) {
     std::uint16_t raw = static_cast<std::uint8_t>(buffer[i]);
     if (width == 2) std::memcpy(&raw, buffer.data() + 2 * i, 2);
     const int stored = is_signed ? static_cast<std::int16_t>(static_cast<std::uint16_t>(raw << unused)) >> unused : raw;
     const double hu = stored * h.slope[0] + h.intercept[0];
-    out[i] = has_padding && raw == padding ? kPadding_hu : static_cast<std::int16_t>(std::lround(std::clamp(hu, -32768.0, 32767.0)));
+    out[i] = has_padding && raw == padding ? kPadding_hu
+                                           : static_cast<std::int16_t>(std::lround(std::clamp(hu, -32768.0, 32767.0)));
   }
   return {};
 } catch (const std::bad_alloc&) {
-  return failure(ErrorCode::invalid_input, name + " has pixel data that take too much memory; copy or export the series again");
+  return failure(ErrorCode::invalid_input,
+                 name + " has pixel data that take too much memory; copy or export the series again");
 } catch (const std::exception&) {
-  return failure(ErrorCode::invalid_input, name + " has pixel data that cannot be read; copy or export the series again");
+  return failure(ErrorCode::invalid_input,
+                 name + " has pixel data that cannot be read; copy or export the series again");
 }
 
 }  // namespace osteon::import

@@ -22,8 +22,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kMostDeaths = 100;                                  // of processes that read headers
-constexpr std::size_t kManyFiles = 500;                           // fewer, or a smaller archive, are searched in a moment:
-constexpr std::uint64_t kLargeArchive = std::uint64_t{64} << 20;  // what is wrong with them is said without progress before it
+constexpr std::size_t kManyFiles = 500;  // fewer, or a smaller archive, are searched in a moment:
+constexpr std::uint64_t kLargeArchive = std::uint64_t{64}
+                                        << 20;  // what is wrong with them is said without progress before it
 constexpr double kUnpackedEnd = 0.4;                              // of the progress of an archive
 constexpr double kHeadersEnd = 0.6;
 
@@ -98,7 +99,8 @@ Result<Input> unpacked(const fs::path& archive, const KeepGoing& keep_going) {
   };
   const IsolatedEnd end = run_isolated(work, keep_going);
   if (end.died)
-    return failure(ErrorCode::invalid_input, archive.string() + " is damaged so that it cannot be read; copy or export it again");
+    return failure(ErrorCode::invalid_input,
+                   archive.string() + " is damaged so that it cannot be read; copy or export it again");
   if (!end.result) return tl::unexpected(end.result.error());
   input.found.input = archive.string();
   input.found.archive = true;
@@ -140,7 +142,8 @@ Result<std::vector<DicomHeader>> read_headers(const FoundFiles& found, const Kee
                                        : end.result.error());
     if (deaths == kMostDeaths)
       return failure(ErrorCode::invalid_input, found.input + " holds more than " + std::to_string(kMostDeaths) +
-                                                   " damaged files, such as " + found.shown(next) + "; copy or export it again");
+                                                   " damaged files, such as " + found.shown(next) +
+                                                   "; copy or export it again");
     DicomHeader damaged;
     damaged.file = next++;
     headers.push_back(std::move(damaged));
@@ -162,22 +165,24 @@ Result<Input> find_input(const fs::path& path, const KeepGoing& keep_going) {
     case InputKind::dicom_file:
       break;
     case InputKind::absent:
-      return failure(ErrorCode::not_found,
-                     "there is no file or folder " + path.string() + "; give a folder, zip or ISO image with a CT series");
+      return failure(ErrorCode::not_found, "there is no file or folder " + path.string() +
+                                               "; give a folder, zip or ISO image with a CT series");
     default:
       return failure(ErrorCode::invalid_input,
                      path.string() + " is no folder, zip, ISO image or DICOM file; give one with a CT series");
   }
   // The files that a DICOMDIR lists lie below it; beside a slice lies its series.
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-  FoundFiles alone{.input = path.string(), .archive = false, .files = {{path, path.filename().string()}}, .skipped = {}};
+  FoundFiles alone{
+      .input = path.string(), .archive = false, .files = {{path, path.filename().string()}}, .skipped = {}};
   const auto header = read_headers(alone, keep_going);
   if (!header) return tl::unexpected(header.error());
   const bool is_index = header->front().kind == FileKind::index;
   auto input = searched(folder, is_index ? kMostLevels : -1);
   if (!input || is_index) return input;
   const auto named = std::ranges::find(input->found.files, path.filename().string(), &FoundFile::name);
-  if (named != input->found.files.end()) input->named_file = static_cast<std::size_t>(named - input->found.files.begin());
+  if (named != input->found.files.end())
+    input->named_file = static_cast<std::size_t>(named - input->found.files.begin());
   return input;
 }
 
@@ -200,8 +205,8 @@ Result<void> read_volume(CtSeries& series, const FoundFiles& found, const KeepGo
     std::vector<std::int16_t> slice(pixels);
     for (std::size_t i = 0; i < slices; ++i) {
       channel.at_file(series.slices[i].file);
-      if (auto read =
-              read_pixels(series.slices[i], found.files[series.slices[i].file].path, found.shown(series.slices[i].file), slice);
+      if (auto read = read_pixels(series.slices[i], found.files[series.slices[i].file].path,
+                                  found.shown(series.slices[i].file), slice);
           !read)
         return read;
       channel.send({reinterpret_cast<const char*>(slice.data()), pixels * sizeof(std::int16_t)});

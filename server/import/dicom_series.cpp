@@ -22,11 +22,13 @@ using Slices = std::vector<DicomHeader>;
 Vec3 vec(const std::vector<double>& v, std::size_t first = 0) { return {v[first], v[first + 1], v[first + 2]}; }
 
 bool has_spacing(const DicomHeader& h) {
-  return h.spacing.size() == 2 && std::ranges::all_of(h.spacing, [](double mm) { return mm >= kLeastSpacing_mm && mm <= kMostSpacing_mm; });
+  return h.spacing.size() == 2 &&
+         std::ranges::all_of(h.spacing, [](double mm) { return mm >= kLeastSpacing_mm && mm <= kMostSpacing_mm; });
 }
 // Two unit vectors; others would make positions along the normal that are no numbers.
 bool has_orientation(const DicomHeader& h) {
-  return h.orientation.size() == 6 && std::ranges::all_of(h.orientation, [](double part) { return std::abs(part) <= 1.1; });
+  return h.orientation.size() == 6 &&
+         std::ranges::all_of(h.orientation, [](double part) { return std::abs(part) <= 1.1; });
 }
 bool has_place(const DicomHeader& h) { return has_spacing(h) && has_orientation(h) && h.position.size() == 3; }
 
@@ -35,8 +37,8 @@ const char* difference(const DicomHeader& a, const DicomHeader& b) {
   if ((a.frames > 1) != (b.frames > 1)) return b.frames > 1 ? "several frames" : "a single frame";
   if (a.columns != b.columns || a.rows != b.rows) return "another size";
   if (a.samples != b.samples || a.photometric != b.photometric) return "other colours";
-  if (has_spacing(a) != has_spacing(b) ||
-      (has_spacing(a) && (std::abs(a.spacing[0] - b.spacing[0]) >= 1e-4 || std::abs(a.spacing[1] - b.spacing[1]) >= 1e-4)))
+  if (has_spacing(a) != has_spacing(b) || (has_spacing(a) && (std::abs(a.spacing[0] - b.spacing[0]) >= 1e-4 ||
+                                                              std::abs(a.spacing[1] - b.spacing[1]) >= 1e-4)))
     return "another pixel spacing";
   if (has_orientation(a) != has_orientation(b)) return "another orientation";
   if (has_orientation(a) && ((vec(a.orientation) - vec(b.orientation)).norm() >= 1e-3 ||
@@ -144,10 +146,12 @@ class Arranger {
     if (auto fault = axes()) return fault;
     if (series_.slices.size() < 2)
       return wrong("a single slice", subject_ + " holds a single slice; a volume needs at least two");
-    const double voxels = static_cast<double>(first().columns) * first().rows * static_cast<double>(series_.slices.size());
+    const double voxels =
+        static_cast<double>(first().columns) * first().rows * static_cast<double>(series_.slices.size());
     if (voxels > kMostVoxels)
-      return wrong("more than 4e9 voxels",
-                   subject_ + " has more than the 4e9 voxels that can be imported; export a part of it, or thicker slices");
+      return wrong(
+          "more than 4e9 voxels",
+          subject_ + " has more than the 4e9 voxels that can be imported; export a part of it, or thicker slices");
     return even_steps();
   }
 
@@ -156,7 +160,8 @@ class Arranger {
   [[nodiscard]] std::string name(std::size_t slice) const {
     return shown_text(found_.files[series_.slices[slice].file].name, 80);
   }
-  static SeriesFault wrong(const std::string& brief, const std::string& sentence, ErrorCode code = ErrorCode::invalid_input) {
+  static SeriesFault wrong(const std::string& brief, const std::string& sentence,
+                           ErrorCode code = ErrorCode::invalid_input) {
     return {brief, {code, sentence}};
   }
 
@@ -164,7 +169,8 @@ class Arranger {
   [[nodiscard]] std::optional<SeriesFault> check(const DicomHeader& h) const {
     const std::string file = found_.shown(h.file);
     const auto lacks = [&](const std::string& what) {
-      return wrong("no valid " + what, file + " has no valid " + what + "; export the series again as original CT slices");
+      return wrong("no valid " + what,
+                   file + " has no valid " + what + "; export the series again as original CT slices");
     };
     const auto cannot = [&](const std::string& brief, const std::string& what) {
       return wrong(brief, file + " " + what, ErrorCode::unsupported);
@@ -175,7 +181,9 @@ class Arranger {
     if (h.columns < 2 || h.rows < 2 || h.columns > kLargestAxis || h.rows > kLargestAxis)
       return lacks("Rows and Columns (0028,0010-0011)");
     if (h.samples != 1 || h.photometric != "MONOCHROME2")
-      return cannot("no Hounsfield units", "stores " + h.photometric + " pixels instead of Hounsfield units (MONOCHROME2); export original CT slices");
+      return cannot(
+          "no Hounsfield units",
+          "stores " + h.photometric + " pixels instead of Hounsfield units (MONOCHROME2); export original CT slices");
     if (h.bits_allocated != 8 && h.bits_allocated != 16)
       return cannot("neither 8 nor 16 bits",
                     "stores " + std::to_string(h.bits_allocated) + " bits for a pixel; only 8 and 16 can be read");
@@ -187,8 +195,8 @@ class Arranger {
       return lacks("RescaleSlope and RescaleIntercept (0028,1052-1053)");
     // Spectral selection and progression were retired from DICOM; decoders give noise without noticing.
     if (h.transfer_syntax == "1.2.840.10008.1.2.4.53" || h.transfer_syntax == "1.2.840.10008.1.2.4.55")
-      return cannot("a retired compression",
-                    "uses a retired JPEG compression (" + h.transfer_syntax + "); export the series uncompressed or lossless");
+      return cannot("a retired compression", "uses a retired JPEG compression (" + h.transfer_syntax +
+                                                 "); export the series uncompressed or lossless");
     return std::nullopt;
   }
 
@@ -197,9 +205,10 @@ class Arranger {
     Vec3 down = vec(first().orientation, 3).normalized();
     const Vec3 normal = across.cross(down);
     if (!across.allFinite() || !down.allFinite() || !(std::abs(across.dot(down)) <= 1e-3) || !(normal.norm() > 0.99))
-      return wrong("no valid ImageOrientationPatient (0020,0037)",
-                   found_.shown(first().file) +
-                       ": ImageOrientationPatient (0020,0037) is not two perpendicular directions; export the series again");
+      return wrong(
+          "no valid ImageOrientationPatient (0020,0037)",
+          found_.shown(first().file) +
+              ": ImageOrientationPatient (0020,0037) is not two perpendicular directions; export the series again");
     down = (down - across * across.dot(down)).normalized();
     series_.grid.directions << across, down, across.cross(down);
     return std::nullopt;
@@ -233,7 +242,8 @@ class Arranger {
   }
 
   // One missing slice opens a gap of two steps; a position written with one decimal must pass.
-  std::optional<SeriesFault> check_gaps(const std::vector<double>& places, const std::vector<double>& gaps, double step_mm) {
+  std::optional<SeriesFault> check_gaps(const std::vector<double>& places, const std::vector<double>& gaps,
+                                        double step_mm) {
     std::vector<double> sorted = gaps;
     std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
     const double usual_mm = sorted[sorted.size() / 2];
@@ -254,7 +264,8 @@ class Arranger {
     if (usual_mm < 1e-3) std::snprintf(text, sizeof text, " lie at the same place, as most do");
     else std::snprintf(text, sizeof text, " are %.3g mm apart where %.3g mm is usual", gaps[at], usual_mm);
     return wrong(brief, subject_ + ": the slices " + name(at) + " and " + name(at + 1) + text +
-                            (gaps[at] > usual_mm ? missing_() : "") + "; add the missing slices or remove the doubled ones");
+                            (gaps[at] > usual_mm ? missing_() : "") +
+                            "; add the missing slices or remove the doubled ones");
   }
 
   CtSeries& series_;
@@ -284,8 +295,8 @@ SeriesEntry entry_of(const Slices& slices) {
 
 // Files that belong to a series by its UID and are none of its slices: what may be missing in a gap. `groups` and
 // `no_pixels` lie together by UID.
-std::string possible_gap_causes(const std::vector<Slices>& groups, std::size_t at, const Slices& no_pixels, const FoundFiles& found,
-                      const SkippedFiles& skipped) {
+std::string possible_gap_causes(const std::vector<Slices>& groups, std::size_t at, const Slices& no_pixels,
+                                const FoundFiles& found, const SkippedFiles& skipped) {
   const DicomHeader& own = groups[at].front();
   std::string text;
   int named = 0;
@@ -303,7 +314,8 @@ std::string possible_gap_causes(const std::vector<Slices>& groups, std::size_t a
     const DicomHeader& h = groups[i].front();
     const char* what = i == at || groups[i].size() > groups[at].size() ? nullptr : difference(own, h);
     if (what == nullptr) continue;
-    const std::string told = h.frames > 1 ? "holds " + std::to_string(h.frames) + " frames" : std::string("has ") + what;
+    const std::string told =
+        h.frames > 1 ? "holds " + std::to_string(h.frames) + " frames" : std::string("has ") + what;
     if (!add(found.files[h.file].name, told)) return text;
   }
   for (const SkippedFiles::Count& c : skipped.counts())
@@ -357,21 +369,24 @@ std::vector<CtSeries> sort_series(std::vector<DicomHeader> headers, const FoundF
     s.slices = groups[i];
     s.entry = entry_of(s.slices);
     s.entry.number = static_cast<int>(i) + 1;
-    const std::string subject = groups.size() == 1 ? found.input : "series " + std::to_string(i + 1) + " of " + found.input;
-    s.fault = Arranger(s, found, subject, [&] { return possible_gap_causes(groups, i, no_pixels, found, skipped); }).run();
+    const std::string subject =
+        groups.size() == 1 ? found.input : "series " + std::to_string(i + 1) + " of " + found.input;
+    s.fault =
+        Arranger(s, found, subject, [&] { return possible_gap_causes(groups, i, no_pixels, found, skipped); }).run();
     if (s.fault) s.entry.problem = s.fault->brief;
   }
   return series;
 }
 
-Result<std::size_t> choose_series(const std::vector<CtSeries>& series, const FoundFiles& found, const SkippedFiles& skipped,
-                                  std::optional<int> number, std::optional<std::size_t> file) {
+Result<std::size_t> choose_series(const std::vector<CtSeries>& series, const FoundFiles& found,
+                                  const SkippedFiles& skipped, std::optional<int> number,
+                                  std::optional<std::size_t> file) {
   if (series.empty()) return tl::unexpected(no_series(found, skipped));
   if (number) {
     if (*number >= 1 && *number <= static_cast<int>(series.size())) return static_cast<std::size_t>(*number) - 1;
     const std::string range = series.size() == 1 ? "only series 1" : "the series 1 to " + std::to_string(series.size());
-    return failure(ErrorCode::invalid_input, "--series " + std::to_string(*number) + ": " + found.input + " has " + range +
-                                                 "; osteon-import series lists them");
+    return failure(ErrorCode::invalid_input, "--series " + std::to_string(*number) + ": " + found.input + " has " +
+                                                 range + "; osteon-import series lists them");
   }
   std::size_t largest = 0;
   std::optional<std::size_t> best;
@@ -383,7 +398,8 @@ Result<std::size_t> choose_series(const std::vector<CtSeries>& series, const Fou
   // A larger one with a missing or damaged slice is most likely the one that is meant: another bone without a question
   // would be wrong. One of a kind that nobody can import, as a tilted one, gives way.
   const CtSeries& most = series[largest];
-  const bool is_meant = most.fault && most.fault->error.code != ErrorCode::unsupported && most.entry.slices >= kFewSlices;
+  const bool is_meant =
+      most.fault && most.fault->error.code != ErrorCode::unsupported && most.entry.slices >= kFewSlices;
   const bool whole = best && !is_meant && (series[*best].entry.slices >= kFewSlices || most.entry.slices < kFewSlices);
   return whole ? *best : largest;
 }

@@ -28,7 +28,8 @@ struct CtSeries {
 // rest. Where places repeat, it is parted by what tells the passes of a scanner apart (acquisition, time, kernel, kind
 // of image). Numbered by SeriesNumber, then UID. `headers`: of all files that are DICOM; what is no slice of its own
 // (copies, other kinds) is counted in `skipped`.
-[[nodiscard]] std::vector<CtSeries> sort_series(std::vector<DicomHeader> headers, const FoundFiles& found, SkippedFiles& skipped);
+[[nodiscard]] std::vector<CtSeries> sort_series(std::vector<DicomHeader> headers, const FoundFiles& found,
+                                                SkippedFiles& skipped);
 
 // The index of the series to import: `number`, or else the one with `file` among its slices, or else the largest. One
 // that can be imported goes before a larger one of a kind that cannot (tilted, several frames), unless only a few

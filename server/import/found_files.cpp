@@ -22,7 +22,8 @@ constexpr std::uint64_t kIsoMark = 32769;  // behind sixteen sectors that belong
 // The elements with which headerless DICOM begins, as one of the three plain encodings has them.
 class Elements {
  public:
-  Elements(std::span<const unsigned char> head, bool big, bool explicit_vr) : head_(head), big_(big), explicit_vr_(explicit_vr) {}
+  Elements(std::span<const unsigned char> head, bool big, bool explicit_vr)
+      : head_(head), big_(big), explicit_vr_(explicit_vr) {}
 
   // Four sound ones in rising order, the first of them one that begins a data set.
   [[nodiscard]] bool sound() const {
@@ -31,7 +32,8 @@ class Elements {
     for (int i = 0; i < 4; ++i) {
       if (at + 12 > head_.size()) return false;
       const std::uint32_t group = u16(at), tag = group << 16 | u16(at + 2);
-      if (i == 0 ? (group != 0x0002 && group != 0x0008) || u16(at + 2) > 0x0100 : tag <= before || group > 0x0028) return false;
+      if (i == 0 ? (group != 0x0002 && group != 0x0008) || u16(at + 2) > 0x0100 : tag <= before || group > 0x0028)
+        return false;
       before = tag;
       std::uint64_t length = 0, header = 8;
       if (explicit_vr_) {
@@ -150,7 +152,8 @@ std::string FoundFiles::shown(std::size_t file) const {
 Result<FoundFiles> find_files(const fs::path& folder, int levels, const KeepGoing& keep_going) {
   FoundFiles found;
   found.input = folder.string();
-  if (auto walked = Walk(folder, found, keep_going).folder(folder, levels); !walked) return tl::unexpected(walked.error());
+  if (auto walked = Walk(folder, found, keep_going).folder(folder, levels); !walked)
+    return tl::unexpected(walked.error());
   std::ranges::sort(found.files, {}, &FoundFile::name);
   return found;
 }

@@ -32,7 +32,8 @@ inline constexpr int kMostLevels = 32;
 
 // Regular files of a folder and of those in it, `levels` deep. A link to a file is one; a link to a folder is not
 // followed. Errors: not_found, invalid_input (too many files), cancelled.
-[[nodiscard]] Result<FoundFiles> find_files(const std::filesystem::path& folder, int levels, const KeepGoing& keep_going);
+[[nodiscard]] Result<FoundFiles> find_files(const std::filesystem::path& folder, int levels,
+                                            const KeepGoing& keep_going);
 
 // What the first bytes of a file say it is.
 enum class Content { empty, dicom, archive, other };

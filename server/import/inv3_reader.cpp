@@ -26,9 +26,9 @@ struct CloseArchive {
 using Archive = std::unique_ptr<archive, CloseArchive>;
 
 Error no_project(const fs::path& file) {
-  return {
-      ErrorCode::invalid_input,
-      file.string() + " is not an InVesalius project (.inv3); give one, or a folder, zip or ISO image with a DICOM CT series"};
+  return {ErrorCode::invalid_input,
+          file.string() +
+              " is not an InVesalius project (.inv3); give one, or a folder, zip or ISO image with a DICOM CT series"};
 }
 
 Error damaged(const fs::path& file, archive* a) {
@@ -122,9 +122,10 @@ Result<Project> read_project(const fs::path& file) {
   const auto entry = find_entry(a->get(), file, "main.plist");
   if (!entry) return tl::unexpected(entry.error());
   if (*entry == nullptr)
-    return failure(ErrorCode::invalid_input, file.string() +
-                                                 " is not an InVesalius project: it has no main.plist; give one, or a folder, "
-                                                 "zip or ISO image with a DICOM CT series");
+    return failure(ErrorCode::invalid_input,
+                   file.string() +
+                       " is not an InVesalius project: it has no main.plist; give one, or a folder, "
+                       "zip or ISO image with a DICOM CT series");
   std::string text;
   std::string chunk(1 << 16, '\0');
   for (;;) {

@@ -26,7 +26,7 @@ namespace osteon::import {
 namespace {
 
 constexpr int kPollMilliseconds = 20;
-constexpr int kPatienceMilliseconds = 120'000;                 // of polls that bring nothing: a suspended process loses none
+constexpr int kPatienceMilliseconds = 120'000;  // of polls that bring nothing: a suspended process loses none
 constexpr std::size_t kLargestMessage = std::size_t{1} << 30;  // a slice of 16384 x 16384 is half of it
 
 // What the child tells: which file it opens, how far it is, a part of the result, and at last how it ended.
@@ -162,7 +162,8 @@ IsolatedEnd listen(Line& line, const IsolatedWork& work) {
     end.result = failure(ErrorCode::cancelled, "stopped while reading the scan");
   } else {
     end.died = true;
-    end.result = failure(ErrorCode::invalid_input, "the input is damaged so that it cannot be read; copy or export it again");
+    end.result =
+        failure(ErrorCode::invalid_input, "the input is damaged so that it cannot be read; copy or export it again");
   }
   return end;
 }

@@ -57,12 +57,13 @@ std::string segmentation_text(const CtSegmentation& found) {
       continue;
     }
     ++listed;
-    text += line("           %6zu  %7.2f  %6.2f  %8.1f %8.1f %8.1f  %-4s  %s\n", i + 1, island.volume_cm3, island.density_g_cm3,
-                 island.centre_mm.x(), island.centre_mm.y(), island.centre_mm.z(), kept ? "kept" : "",
-                 place_words(island.centre_mm, found.region).c_str());
+    text += line("           %6zu  %7.2f  %6.2f  %8.1f %8.1f %8.1f  %-4s  %s\n", i + 1, island.volume_cm3,
+                 island.density_g_cm3, island.centre_mm.x(), island.centre_mm.y(), island.centre_mm.z(),
+                 kept ? "kept" : "", place_words(island.centre_mm, found.region).c_str());
   }
   if (others > 0)
-    text += line("           and %zu more of at most %.2f cm3 each, %.2f cm3 together\n", others, largest_other_cm3, others_cm3);
+    text += line("           and %zu more of at most %.2f cm3 each, %.2f cm3 together\n", others, largest_other_cm3,
+                 others_cm3);
   if (found.kept.empty()) return text;
   const std::size_t left_out = found.islands.size() - found.kept.size();
   if (left_out == 0)
@@ -77,11 +78,13 @@ std::string segmentation_text(const CtSegmentation& found) {
     text += found.merged ? "bones      1 in the case, of all kept islands\n"
                          : line("bones      %zu in the case, one for each kept island\n", found.kept.size());
   if (found.marrow_cm3 > 0.0)
-    text += line("marrow     %.2f cm3 of that is below the threshold, enclosed by bone or between it; --hollow leaves it out\n",
-                 found.marrow_cm3);
+    text += line(
+        "marrow     %.2f cm3 of that is below the threshold, enclosed by bone or between it; --hollow leaves it out\n",
+        found.marrow_cm3);
   if (found.joined_cm3.size() > 1) {
     std::string pieces;
-    for (std::size_t i = 0; i < found.joined_cm3.size(); ++i) pieces += line(i == 0 ? "%.2f" : " and %.2f", found.joined_cm3[i]);
+    for (std::size_t i = 0; i < found.joined_cm3.size(); ++i)
+      pieces += line(i == 0 ? "%.2f" : " and %.2f", found.joined_cm3[i]);
     text += "joined     by marrow alone: pieces with " + pieces +
             " cm3 of denser bone, as at a narrow fracture; --hollow parts them\n";
   }

@@ -61,8 +61,8 @@ std::optional<std::pair<char32_t, std::size_t>> first_character(std::string_view
 
 // Controls of both sets, and marks that change the direction of what follows.
 bool is_control(char32_t code) {
-  return code < 0x20 || (code >= 0x7f && code < 0xa0) || (code >= 0x200b && code < 0x2010) || (code >= 0x2028 && code < 0x2030) ||
-         (code >= 0x2066 && code < 0x206a) || code == 0xfeff;
+  return code < 0x20 || (code >= 0x7f && code < 0xa0) || (code >= 0x200b && code < 0x2010) ||
+         (code >= 0x2028 && code < 0x2030) || (code >= 0x2066 && code < 0x206a) || code == 0xfeff;
 }
 
 }  // namespace

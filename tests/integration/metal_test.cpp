@@ -30,9 +30,9 @@ TEST(Metal, IsLeftByRigAndServer) {
   step["feed_mm_per_s"] = 4.0;
   const nlohmann::json plan{{"steps", nlohmann::json::array({step})}};
   std::ofstream(stage / "plan.json") << plan.dump(2);
-  Process haptic = stage.start("osteon-haptic",
-                               {"--server", stage.address(), "--plan", stage / "plan.json", "--session-log", stage / "rig.csv",
-                                "--summary", stage / "rig.json", "--cache", stage / "cache", "--status"});
+  Process haptic = stage.start(
+      "osteon-haptic", {"--server", stage.address(), "--plan", stage / "plan.json", "--session-log", stage / "rig.csv",
+                        "--summary", stage / "rig.json", "--cache", stage / "cache", "--status"});
   const auto code = haptic.wait(120s);
   ASSERT_TRUE(code);
   EXPECT_NE(*code, 0);

@@ -64,7 +64,8 @@ Stage::Stage(double width_mm, std::vector<std::string> server_arguments) {
   start_server(std::move(server_arguments));
 }
 
-Stage::Stage(const std::function<void(const std::filesystem::path&)>& make_case, std::vector<std::string> server_arguments) {
+Stage::Stage(const std::function<void(const std::filesystem::path&)>& make_case,
+             std::vector<std::string> server_arguments) {
   make_case(temp_ / "case");
   start_server(std::move(server_arguments));
 }

@@ -103,7 +103,8 @@ class Simulation {
       report.undone += std::holds_alternative<UndoRow>(row.what);
       report.decisions += std::holds_alternative<SuperviseRow>(row.what);
       const auto* rejection = std::get_if<RejectionRow>(&row.what);
-      report.forbidden += rejection != nullptr && rejection->reason >= Rejection::frozen && rejection->reason <= Rejection::zone;
+      report.forbidden +=
+          rejection != nullptr && rejection->reason >= Rejection::frozen && rejection->reason <= Rejection::zone;
       report.splits += std::holds_alternative<SplitRow>(row.what);
     }
   }

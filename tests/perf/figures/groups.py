@@ -240,7 +240,8 @@ def scan(run):
     """The feed rig through the same bone, but imported from a CT scan of it."""
     folder, numbers = run.session("scan", plans.drill("rig", feed_mm_per_s=1.0, beyond_mm=5), imports.scanned_slab(run))
     physics = rig_physics(folder, numbers)
-    return imports.slab_volume(run) | {f"scan_{name}": physics[f"rig_{name}"] for name in ("force_cortical_error", "force_medullary_error")}
+    forces = ("force_cortical_error", "force_medullary_error")
+    return imports.slab_volume(run) | {f"scan_{name}": physics[f"rig_{name}"] for name in forces}
 
 
 GROUPS = {**kernels.GROUPS, **devices.GROUPS, **doors.GROUPS, **feel.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, "expert": expert,

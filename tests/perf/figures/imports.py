@@ -32,8 +32,8 @@ print(os.waitstatus_to_exitcode(status), used.ru_utime + used.ru_stime, used.ru_
 
 def cost(program, scan, out):
     """CPU seconds and peak memory, MB, of one import and its child processes; none where it fails."""
-    measured = subprocess.run([sys.executable, "-S", "-c", MEASURE, program, "ct", scan, "--out", out], stdout=subprocess.PIPE, text=True,
-                              check=True)
+    measured = subprocess.run([sys.executable, "-S", "-c", MEASURE, program, "ct", scan, "--out", out],
+                              stdout=subprocess.PIPE, text=True, check=True)
     code, seconds, megabytes = measured.stdout.split()
     return (float(seconds), float(megabytes)) if code == "0" else None
 
@@ -58,7 +58,8 @@ def real_imports(run):
         for i, what in enumerate(("cpu", "memory")):
             now = [c[i] for c in costs["now"]]
             before = float(np.median([c[i] for c in costs["earlier"]])) if costs.get("earlier") else None
-            values[f"import_{name}_{what}"] = Measured(float(np.median(now)), before, min(now), max(now)) if now else Measured(None)
+            measured = Measured(float(np.median(now)), before, min(now), max(now)) if now else Measured(None)
+            values[f"import_{name}_{what}"] = measured
     return values
 
 
@@ -68,8 +69,8 @@ def scanned_slab(run):
     if not folder.exists():
         run.say("a phantom through DICOM")
         folder.mkdir()
-        run.output("osteon-import", "phantom", "block", "--layers", LAYERS_MM_DENSITY, "--width", 20, "--pitch", 0.5, "--out", folder / "direct",
-                   "--dicom", folder / "series")
+        run.output("osteon-import", "phantom", "block", "--layers", LAYERS_MM_DENSITY, "--width", 20, "--pitch", 0.5,
+                   "--out", folder / "direct", "--dicom", folder / "series")
         run.output("osteon-import", "ct", folder / "series", "--out", folder / "case")
     return folder / "case"
 

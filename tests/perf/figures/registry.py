@@ -477,15 +477,17 @@ FIGURES = [
     Figure("observers_memory", "ratio", "memory of the server with ten stalled ones over that without", "observers",
            ("<=", 1.1), full=True),
     # What an import makes of a scan, and what it takes.
-    Figure("scan_volume_error", "percent", "volume of the phantom scanned and imported at the default threshold, against its own",
-           "scan", ("<=", 2.0)),
-    Figure("scan_force_cortical_error", "percent", "thrust of the rig in its cortex, both layers, against the law's", "scan", ("<=", 5.0)),
+    Figure("scan_volume_error", "percent", "volume of the phantom scanned and imported at the default threshold, "
+           "against its own", "scan", ("<=", 2.0)),
+    Figure("scan_force_cortical_error", "percent", "thrust of the rig in its cortex, both layers, against the law's",
+           "scan", ("<=", 5.0)),
     Figure("scan_force_medullary_error", "percent", "the same in its cancellous bone", "scan", ("<=", 5.0)),
     *[figure for name, what in (("skull", "a skull of 108 slices"), ("tibia", "two lower legs of 46 slices"),
                                 ("body", "a trunk of 20 slices")) for figure in (
-        Figure(f"import_{name}_cpu", "s", f"CPU time of the import of {what}", "real_imports", baseline="the earlier program named by "
-               "OSTEON_EARLIER_IMPORT"),
-        Figure(f"import_{name}_memory", "mb", f"peak memory of the import of {what}", "real_imports", baseline="the earlier program"))],
+        Figure(f"import_{name}_cpu", "s", f"CPU time of the import of {what}", "real_imports",
+               baseline="the earlier program named by OSTEON_EARLIER_IMPORT"),
+        Figure(f"import_{name}_memory", "mb", f"peak memory of the import of {what}", "real_imports",
+               baseline="the earlier program"))],
     # Bones from real images, burred in frames of 33 cuts.
     *[figure for name, what in (("temporal", "a temporal bone at its own 0.096 mm"),
                                 ("skull", "a skull, cuts at a quarter of its pitch")) for figure in (

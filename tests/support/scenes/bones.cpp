@@ -9,7 +9,8 @@
 namespace osteon::test {
 
 Case make_bone(const Box& extent, double pitch_mm, const std::function<double(const Vec3&)>& distance_mm,
-               const std::function<double(const Vec3&)>& density_g_cm3, const std::function<Tissue(const Vec3&)>& tissue) {
+               const std::function<double(const Vec3&)>& density_g_cm3,
+               const std::function<Tissue(const Vec3&)>& tissue) {
   const CoordBox box = covering_samples(extent.grown((kBandVoxels + 1) * pitch_mm), pitch_mm);
   DenseVolume<float> surface(box, 0.0f), density(box, 0.0f);
   SampleLabels labels;
@@ -60,7 +61,8 @@ Case marked_block(double width_mm, double thickness_mm, double pitch_mm,
     return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0);
   };
   const auto density = [&](const Vec3& p) { return tissue(p) == Tissue::none ? 1.9 : 2.1; };
-  return make_bone({{-half.x(), -half.y(), -thickness_mm}, {half.x(), half.y(), 0.0}}, pitch_mm, distance, density, tissue);
+  return make_bone({{-half.x(), -half.y(), -thickness_mm}, {half.x(), half.y(), 0.0}}, pitch_mm, distance, density,
+                   tissue);
 }
 
 Case large_ball(double radius_mm, double pitch_mm, double density_g_cm3) {

@@ -13,13 +13,15 @@ namespace {
 double by_sampling(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c, int steps) {
   double least = 1e300;
   for (int i = 0; i <= steps; ++i)
-    for (int j = 0; i + j <= steps; ++j) least = std::min(least, (p - (a + (b - a) * i / steps + (c - a) * j / steps)).norm());
+    for (int j = 0; i + j <= steps; ++j)
+      least = std::min(least, (p - (a + (b - a) * i / steps + (c - a) * j / steps)).norm());
   return least;
 }
 
 template <class Scalar>
 double distance(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const auto s = distance_to_triangle<Scalar>(p.cast<Scalar>(), a.cast<Scalar>(), b.cast<Scalar>(), c.cast<Scalar>()).squared;
+  const auto s =
+      distance_to_triangle<Scalar>(p.cast<Scalar>(), a.cast<Scalar>(), b.cast<Scalar>(), c.cast<Scalar>()).squared;
   return std::sqrt(static_cast<double>(s));
 }
 

@@ -157,7 +157,8 @@ TEST(HandTools, NoneThatCutsTakesMetal) {
     const double pitch_mm = large ? 1.0 : 0.5, metal_mm = 2.0 * pitch_mm;
     // Metal from there on, and beside small tools a step of it that is higher.
     const Case bone = block(pitch_mm, large ? 70.0 : 40.0, large ? 24.0 : 12.0, [=](const Vec3& p) {
-      return p.z() >= metal_mm || (!large && p.x() > 4.0 && p.y() > 2.0 && p.z() >= pitch_mm) ? Tissue::metal : Tissue::none;
+      return p.z() >= metal_mm || (!large && p.x() > 4.0 && p.y() > 2.0 && p.z() >= pitch_mm) ? Tissue::metal
+                                                                                              : Tissue::none;
     });
     HandStage stage(bone, tool, held(tool));
     stage.input_.spindle_rpm = tool.spindle_rpm;
@@ -186,7 +187,8 @@ TEST(HandTools, NoneThatCutsTakesMetal) {
     const CutField fresh(bone, BodyId{});
     const CutField* const field = &fresh;
     int refused = 0;
-    for (const Cut& cut : stage.cuts_) refused += meets_metal(cut, fresh.tools()->find(cut.tool)->body, std::span(&field, 1));
+    for (const Cut& cut : stage.cuts_)
+      refused += meets_metal(cut, fresh.tools()->find(cut.tool)->body, std::span(&field, 1));
     double deepest_mm = 0;  // of any sample of metal below what is left
     const CutField& left = stage.replica_.predicted();
     for (const Coord leaf : bone.metal_leaves())

@@ -28,8 +28,8 @@ HuVolume draw(std::array<int, 3> dims, const Vec3& spacing_mm, const std::functi
 
 BoneVoxel kind_at(const HuVolume& volume, const VoxelMask& bone, const Vec3& position_mm) {
   const Vec3 v = volume.voxel(position_mm);
-  return static_cast<BoneVoxel>(
-      bone.at(static_cast<int>(std::lround(v.x())), static_cast<int>(std::lround(v.y())), static_cast<int>(std::lround(v.z()))));
+  return static_cast<BoneVoxel>(bone.at(static_cast<int>(std::lround(v.x())), static_cast<int>(std::lround(v.y())),
+                                        static_cast<int>(std::lround(v.z()))));
 }
 
 VoxelMask segment(const HuVolume& volume, const SegmentationParams& params = {}, const ScanEnds& ends = kAllScanEnds) {
@@ -70,7 +70,8 @@ TEST(Segmentation, WhereTheVolumeWasCutOutOfTheScanTheShaftIsOpen) {
 
 TEST(Segmentation, AShaftCutByTheSideOfTheScanIsClosedThere) {
   // The field of view ends at x = 4 mm, within the marrow: the tube is open on that side but for the scan's end.
-  const HuVolume volume = draw({48, 48, 12}, Vec3(0.8, 0.8, 3.0), [](const Vec3& p) { return shaft(p + Vec3(15.0, 0, 0)); });
+  const HuVolume volume =
+      draw({48, 48, 12}, Vec3(0.8, 0.8, 3.0), [](const Vec3& p) { return shaft(p + Vec3(15.0, 0, 0)); });
   const VoxelMask bone = segment(volume);
   EXPECT_EQ(kind_at(volume, bone, {-13.0, 0, 0}), BoneVoxel::marrow);
 }
@@ -139,8 +140,8 @@ TEST(Segmentation, NoiseDoesNotMakeHolesInMarrow) {
   // A sharp kernel: 150 HU of noise everywhere.
   std::mt19937 random(7);
   std::normal_distribution<double> noise(0.0, 150.0);
-  const HuVolume volume =
-      draw({48, 48, 16}, Vec3(0.8, 0.8, 2.0), [&](const Vec3& p) { return static_cast<std::int16_t>(shaft(p) + noise(random)); });
+  const HuVolume volume = draw({48, 48, 16}, Vec3(0.8, 0.8, 2.0),
+                               [&](const Vec3& p) { return static_cast<std::int16_t>(shaft(p) + noise(random)); });
   const VoxelMask bone = segment(volume);
   std::int64_t holes = 0, within = 0;
   for (int k = 0; k < 16; ++k)

@@ -23,7 +23,8 @@ bool is_near(const VoxelMask& mask, const Vec3& spacing_mm, double radius_mm, in
   for (int k = 0; k < mask.dims[2]; ++k)
     for (int j = 0; j < mask.dims[1]; ++j)
       for (int i = 0; i < mask.dims[0]; ++i)
-        if (mask.at(i, j, k) != 0 && spacing_mm.cwiseProduct(Vec3(i - x, j - y, k - z)).norm() <= radius_mm * (1.0 + 1e-7))
+        if (mask.at(i, j, k) != 0 &&
+            spacing_mm.cwiseProduct(Vec3(i - x, j - y, k - z)).norm() <= radius_mm * (1.0 + 1e-7))
           return true;
   return false;
 }
@@ -32,7 +33,9 @@ TEST(WithinMm, IsTheDefinitionOnAnisotropicVoxels) {
   for (std::uint32_t seed = 0; seed < 40; ++seed) {
     std::mt19937 random(seed);
     const auto size = [&] { return std::uniform_int_distribution<int>(1, 11)(random); };
-    const auto length = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+    const auto length = [&](double low, double high) {
+      return std::uniform_real_distribution<double>(low, high)(random);
+    };
     const VoxelMask mask = random_mask({size(), size(), size()}, length(0.0, 0.1), seed);
     const Vec3 spacing(length(0.3, 3.0), length(0.3, 3.0), length(0.3, 3.0));
     const double radius = length(0.1, 5.0);
@@ -40,7 +43,8 @@ TEST(WithinMm, IsTheDefinitionOnAnisotropicVoxels) {
     ASSERT_TRUE(near);
     for (int z = 0; z < mask.dims[2]; ++z)
       for (int y = 0; y < mask.dims[1]; ++y)
-        for (int x = 0; x < mask.dims[0]; ++x) ASSERT_EQ(near->at(x, y, z) != 0, is_near(mask, spacing, radius, x, y, z)) << seed;
+        for (int x = 0; x < mask.dims[0]; ++x)
+          ASSERT_EQ(near->at(x, y, z) != 0, is_near(mask, spacing, radius, x, y, z)) << seed;
   }
 }
 

@@ -46,7 +46,8 @@ TEST(Carving, ABurrsGrooveHasItsVolume) {
 // Down through bone into a plate of metal: the cuts that would take it are left out, and said.
 TEST(Carving, LeavesMetalWhereItIs) {
   const auto plate = [](const Vec3& p) { return p.z() < -4.0 ? Tissue::metal : Tissue::none; };
-  Carving carving(osteon::test::marked_block(12.0, 8.0, 0.5, plate), 0.5), bone(osteon::test::plain_block(12.0, 8.0, 0.5), 0.5);
+  Carving carving(osteon::test::marked_block(12.0, 8.0, 0.5, plate), 0.5),
+      bone(osteon::test::plain_block(12.0, 8.0, 0.5), 0.5);
   const CarveStep through = step("burr-round-5", {down(0, 0, 0), down(0, 0, -8)});
   const auto report = carving.run(through, keep_going), all = bone.run(through, keep_going);
   ASSERT_TRUE(report && all);

@@ -171,7 +171,8 @@ TEST_F(CdFolder, ALargerOneWithAMissingSliceIsToldAndNoOtherTaken) {
   const auto scan = read_dicom_series(cd_, keep_going);
   ASSERT_FALSE(scan);
   expect_one_sentence(scan.error(), "2.5 mm apart where 1.25 mm is usual");
-  EXPECT_NE(scan.error().message.find("or take another series by --series N"), std::string::npos) << scan.error().message;
+  EXPECT_NE(scan.error().message.find("or take another series by --series N"), std::string::npos)
+      << scan.error().message;
   const auto other = read_dicom_series(cd_, {.series = 1}, keep_going);
   ASSERT_TRUE(other) << other.error().message;
   expect_same(other->volume, small_);
@@ -201,7 +202,8 @@ TEST_F(CdFolder, TwoPassesOfOneSeriesAreParted) {
   for (const fs::path& file : files_of(series("SE1"))) {
     const fs::path second = series("SE1") / ("again-" + file.filename().string());
     fs::copy(file, second);
-    set_tag(second, 0x0008, 0x0018, "1.2.3." + std::to_string(100 + file.string().back()) + file.stem().string().substr(6));
+    set_tag(second, 0x0008, 0x0018,
+            "1.2.3." + std::to_string(100 + file.string().back()) + file.stem().string().substr(6));
     set_tag(second, 0x0020, 0x0012, "2");
   }
   const auto scan = read_dicom_series(cd_, keep_going);
@@ -241,7 +243,8 @@ TEST_F(CdFolder, AGapNamesTheDamagedSlice) {
   fs::resize_file(series("SE1") / "slice-0010.dcm", 700);
   const auto scan = read_dicom_series(cd_, keep_going);
   ASSERT_FALSE(scan);
-  expect_one_sentence(scan.error(), "2.5 mm apart where 1.25 mm is usual, and DICOM/ST0/SE1/slice-0010.dcm is damaged; ");
+  expect_one_sentence(scan.error(),
+                      "2.5 mm apart where 1.25 mm is usual, and DICOM/ST0/SE1/slice-0010.dcm is damaged; ");
 }
 
 TEST_F(CdFolder, MoreDamagedFilesThanAnyDiscHasAreRefused) {

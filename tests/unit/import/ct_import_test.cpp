@@ -153,7 +153,8 @@ TEST(CtImport, DensityEndsAtCompactBoneAndMetalIsLabelled) {
   const Case& bone = *made->bone;
   const CoordBox box = bone.bounds_samples();
   double most = 0.0;
-  std::vector<float> density(static_cast<std::size_t>(box.dims().x) * static_cast<std::size_t>(box.dims().y) * static_cast<std::size_t>(box.dims().z));
+  std::vector<float> density(static_cast<std::size_t>(box.dims().x) * static_cast<std::size_t>(box.dims().y) *
+                             static_cast<std::size_t>(box.dims().z));
   bone.gather_density(box, density);
   for (const float rho : density) most = std::max(most, static_cast<double>(rho));
   EXPECT_NEAR(most, 2.1, 1e-6);
@@ -263,7 +264,9 @@ TEST(CtImport, WhatIsLeftOutIsSaidWithItsVolume) {
   const auto made = import_ct(three_cubes(), {}, keep_going);
   ASSERT_TRUE(made);
   const std::string text = segmentation_text(made->found);
-  EXPECT_NE(text.find("kept       1.00 of 1.58 cm3; 2 islands with 0.58 cm3 (37 %) left out: --keep"), std::string::npos) << text;
+  EXPECT_NE(text.find("kept       1.00 of 1.58 cm3; 2 islands with 0.58 cm3 (37 %) left out: --keep"),
+            std::string::npos)
+      << text;
 }
 
 TEST(CtImport, AnIslandThatIsNotThereIsRefused) {

@@ -86,7 +86,8 @@ TEST(DicomSeries, WritingOverAFolderIsRefused) {
 TEST(DicomSeries, AStoppedWriteLeavesNothing) {
   const test::TempDir folder;
   int asked = 0;
-  const auto written = write_dicom_series(numbered_volume(7, 5, 4), folder / "series", [&](double) { return ++asked < 3; });
+  const auto written =
+      write_dicom_series(numbered_volume(7, 5, 4), folder / "series", [&](double) { return ++asked < 3; });
   ASSERT_FALSE(written);
   EXPECT_EQ(written.error().code, ErrorCode::cancelled);
   EXPECT_TRUE(files_of(folder.path()).empty());

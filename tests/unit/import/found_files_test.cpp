@@ -108,7 +108,8 @@ class Unpacking : public ::testing::Test {
   void SetUp() override {
     fs::create_directories(folder_ / "cd" / "DICOM");
     fs::create_directories(folder_ / "out" / "into");
-    for (const char* name : {"1", "2", "3"}) write_object(folder_ / "cd" / "DICOM" / name, "1.2.840.10008.5.1.4.1.1.4", "MR");
+    for (const char* name : {"1", "2", "3"})
+      write_object(folder_ / "cd" / "DICOM" / name, "1.2.840.10008.5.1.4.1.1.4", "MR");
     std::ofstream(folder_ / "cd" / "README.txt") << "Open with our viewer\n";
     ASSERT_NO_FATAL_FAILURE(write_archive(folder_ / "cd", folder_ / "cd.zip", "zip"));
   }
@@ -229,7 +230,8 @@ TEST(Isolated, AChildThatHangsIsStopped) {
   EXPECT_EQ(end.result.error().code, ErrorCode::cancelled);
 }
 
-// In builds with sanitizers, which reserve far more memory than they use, there is no limit: there it must come to its end.
+// In builds with sanitizers, which reserve far more memory than they use, there is no limit: there it must come to its
+// end.
 TEST(Isolated, AChildThatTakesMoreThanItsMemoryDies) {
   IsolatedWork work;
   work.memory_bytes = std::size_t{64} << 20;

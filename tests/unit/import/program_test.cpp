@@ -51,7 +51,8 @@ class Program : public ::testing::Test {
 TEST_F(Program, HelpNamesTheCommands) {
   const auto result = test::run(kProgram, {"--help"});
   EXPECT_EQ(result.exit_code, 0);
-  for (const char* command : {"ct", "phantom", "info", "series"}) EXPECT_NE(result.out.find(command), std::string::npos);
+  for (const char* command : {"ct", "phantom", "info", "series"})
+    EXPECT_NE(result.out.find(command), std::string::npos);
 }
 
 TEST_F(Program, MakesAPhantomAndReportsIt) {
@@ -110,7 +111,8 @@ TEST_F(Program, WrongSeriesAreOneSentence) {
 void write_disc(const fs::path& folder) {
   fs::create_directories(folder);
   ASSERT_NO_FATAL_FAILURE(write_small_series(folder / "A"));
-  const auto scan = scan_phantom({.kind = PhantomKind::block, .layers = {{9.0, 1.5}}, .width_mm = 6.0}, 1.0, keep_going);
+  const auto scan =
+      scan_phantom({.kind = PhantomKind::block, .layers = {{9.0, 1.5}}, .width_mm = 6.0}, 1.0, keep_going);
   ASSERT_TRUE(scan);
   ASSERT_TRUE(write_dicom_series(*scan, folder / "B", keep_going));
   for (const fs::path& file : files_of(folder / "B")) {
@@ -125,7 +127,8 @@ TEST_F(Program, ImportsTheLargestSeriesOfADiscAndSaysSo) {
   ASSERT_NO_FATAL_FAILURE(write_disc(folder_ / "disc"));
   ASSERT_NO_FATAL_FAILURE(write_archive(folder_ / "disc", folder_ / "disc.zip", "zip"));
   fs::create_directory(folder_ / "tmp");
-  const auto listed = test::run(kProgram, {"series", path("disc.zip")}, 60s, {.environment = {{"TMPDIR", path("tmp")}}});
+  const auto listed =
+      test::run(kProgram, {"series", path("disc.zip")}, 60s, {.environment = {{"TMPDIR", path("tmp")}}});
   ASSERT_EQ(listed.exit_code, 0) << listed.err;
   EXPECT_EQ(listed.err, "");
   EXPECT_NE(listed.out.find("2          \"Block 1.0 H60s\", "), std::string::npos) << listed.out;
@@ -133,8 +136,8 @@ TEST_F(Program, ImportsTheLargestSeriesOfADiscAndSaysSo) {
             std::string::npos)
       << listed.out;
 
-  const auto made =
-      test::run(kProgram, {"ct", path("disc.zip"), "--out", path("case")}, 60s, {.environment = {{"TMPDIR", path("tmp")}}});
+  const auto made = test::run(kProgram, {"ct", path("disc.zip"), "--out", path("case")}, 60s,
+                              {.environment = {{"TMPDIR", path("tmp")}}});
   ASSERT_EQ(made.exit_code, 0) << made.err;
   EXPECT_NE(made.out.find("series     2 of 2: \"Block 1.0 H60s\", "), std::string::npos) << made.out;
   EXPECT_NE(made.out.find("also       1: no description, "), std::string::npos) << made.out;
@@ -219,12 +222,16 @@ TEST_F(Program, WrongIslandsAreOneSentence) {
       expect_refused({"ct", path("series"), "--out", path("case"), std::string(option) + "=" + wrong}, option, folder_);
   const auto absent = test::run(kProgram, {"ct", path("series"), "--out", path("case"), "--keep", "1,3"});
   EXPECT_EQ(absent.exit_code, 1);
-  EXPECT_NE(absent.err.find("--keep names island 3, but at this threshold there are islands 1 to 2"), std::string::npos) << absent.err;
+  EXPECT_NE(absent.err.find("--keep names island 3, but at this threshold there are islands 1 to 2"), std::string::npos)
+      << absent.err;
   expect_refused({"ct", path("series")}, "--out", folder_);
 }
 
 TEST_F(Program, AStepThatRemovesNothingSaysWhy) {
-  ASSERT_EQ(test::run(kProgram, {"phantom", "block", "--layers", "6:1.9", "--width", "10", "--pitch", "0.5", "--out", path("case")}).exit_code, 0);
+  ASSERT_EQ(test::run(kProgram, {"phantom", "block", "--layers", "6:1.9", "--width", "10", "--pitch", "0.5", "--out",
+                                 path("case")})
+                .exit_code,
+            0);
   std::ofstream(folder_ / "script.yaml") << "steps:\n"
       "  - {tool: burr-round-5, axis: [0, 0, -1], from: [0, 0, -2], to: [1, 0, -2]}\n"
       "  - {tool: burr-round-5, axis: [0, 0, -1], from: [0, 0, -2], to: [1, 0, -2]}\n"
@@ -233,7 +240,8 @@ TEST_F(Program, AStepThatRemovesNothingSaysWhy) {
   const auto carved = test::run(kProgram, {"carve", path("case"), path("script.yaml"), "--out", path("cut.vdb")});
   ASSERT_EQ(carved.exit_code, 0) << carved.err;
   EXPECT_EQ(carved.out.find("step 1 removed nothing"), std::string::npos) << carved.out;
-  EXPECT_NE(carved.out.find("step 2 removed nothing: what its tip meets was removed before"), std::string::npos) << carved.out;
+  EXPECT_NE(carved.out.find("step 2 removed nothing: what its tip meets was removed before"), std::string::npos)
+      << carved.out;
   EXPECT_NE(carved.out.find("step 3 removed nothing: its tip stays at least"), std::string::npos) << carved.out;
   EXPECT_NE(carved.out.find("step 4 removed nothing: its tip stays at least"), std::string::npos) << carved.out;
 }

@@ -30,7 +30,9 @@ struct Drawn {
 Drawn draw(std::uint32_t seed) {
   std::mt19937 random(seed);
   const auto integer = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
-  const auto length = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+  const auto length = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
   Drawn d;
   imaging::HuVolume& v = d.volume;
   const bool is_long = seed % 50 == 0;  // several slabs of the distance's threads
@@ -86,8 +88,9 @@ TEST(RandomSeries, EveryImportEndsWithAClosedSurfaceOrASentence) {
     SCOPED_TRACE(d.what);
     int questions = 0;
     const auto count = [&](double) { return ++questions < kMostQuestions; };
-    const auto made = import_ct({d.volume, "test"},
-                                {.threshold_hu = d.threshold_hu, .keep_all = seed % 5 == 0, .hollow = seed % 7 == 0}, count);
+    const auto made =
+        import_ct({d.volume, "test"},
+                  {.threshold_hu = d.threshold_hu, .keep_all = seed % 5 == 0, .hollow = seed % 7 == 0}, count);
     ASSERT_LT(questions, kMostQuestions) << "it does not end";
     const bool any = std::ranges::any_of(d.volume.values, [&](std::int16_t hu) { return hu >= d.threshold_hu; });
     if (!any) {

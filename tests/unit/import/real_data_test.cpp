@@ -259,11 +259,13 @@ TEST_F(SharedScans, ATroubledFolderIsListedAndCounted) {
   EXPECT_EQ(report->taken, 0);
   EXPECT_EQ(report->series.size(), 5u);
   EXPECT_EQ(report->skipped.text(),
-            "1 localizer, 1 structured report, 2 segmentations, 4 MR images, 1 US image, 7 copies of other files, 1 file that is "
+            "1 localizer, 1 structured report, 2 segmentations, 4 MR images, 1 US image, 7 copies of other files, 1 "
+            "file that is "
             "not DICOM");
-  EXPECT_NE(list_text(*report).find("\"STEREOTAXIS\", 3 slices, 512x512, 0.482x0.482x2.37 mm, oblique, kernel UB (cannot be "
-                                    "imported: sheared by 18.5 degrees"),
-            std::string::npos)
+  EXPECT_NE(
+      list_text(*report).find("\"STEREOTAXIS\", 3 slices, 512x512, 0.482x0.482x2.37 mm, oblique, kernel UB (cannot be "
+                              "imported: sheared by 18.5 degrees"),
+      std::string::npos)
       << list_text(*report);
 }
 

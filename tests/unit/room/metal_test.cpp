@@ -63,7 +63,8 @@ TEST(RoomMetal, ReplaysFromItsRows) {
 // Every reason has a sentence of its own.
 TEST(Rejections, EachHasASentence) {
   for (int i = 0; i < kRejections; ++i)
-    for (int k = 0; k < i; ++k) EXPECT_NE(sentence(static_cast<Rejection>(i)), sentence(static_cast<Rejection>(k))) << i;
+    for (int k = 0; k < i; ++k)
+      EXPECT_NE(sentence(static_cast<Rejection>(i)), sentence(static_cast<Rejection>(k))) << i;
   EXPECT_EQ(sentence(static_cast<Rejection>(kRejections)), "the reason is unknown");
 }
 

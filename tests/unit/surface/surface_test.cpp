@@ -279,7 +279,8 @@ TEST(SurfaceBlocks, MetalAndEnamelAreMarked) {
     const auto without = decode_block(key, before.at(key), pitch_mm);
     EXPECT_EQ(without->positions_mm, mesh->positions_mm);
     EXPECT_EQ(without->cut_face, mesh->cut_face);
-    EXPECT_EQ(payload.bytes.size(), before.at(key).bytes.size() + (mesh->positions_mm.size() + 3) / 4) << "two bits a vertex";
+    EXPECT_EQ(payload.bytes.size(), before.at(key).bytes.size() + (mesh->positions_mm.size() + 3) / 4)
+        << "two bits a vertex";
     ASSERT_EQ(mesh->tissue.size(), mesh->positions_mm.size());
     levels.insert(key.level);
     for (std::size_t v = 0; v < mesh->tissue.size(); ++v) {

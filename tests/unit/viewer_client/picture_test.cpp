@@ -104,7 +104,8 @@ TEST_F(Picture, MetalAndEnamelHaveColoursOfTheirOwn) {
   view.eye_mm = Vec3(0, -90, -6);
   window_->look(view);
   const Image image = drawn();
-  if (const char* folder = std::getenv("OSTEON_PICTURES")) ASSERT_TRUE(window_->save_png(std::string(folder) + "/metal.png"));
+  if (const char* folder = std::getenv("OSTEON_PICTURES"))
+    ASSERT_TRUE(window_->save_png(std::string(folder) + "/metal.png"));
   const double px_per_mm = focal_px(view) / 76.0;
   const auto seen = [&](double x_mm, double z_mm) {
     return colour(image, kWidth / 2 + static_cast<int>(std::lround(px_per_mm * x_mm)),

@@ -59,7 +59,9 @@ TEST(CaseFromParts, IsTheCaseFromTheWholeVolume) {
         density.at({x, y, z}) = static_cast<float>(ball.density(p));
       }
   const auto whole = Case::build(info_of(ball.pitch_mm), surface, density);
-  const FillPart fill = [&](const CoordBox& part, std::span<float> surface, std::span<float> rho) { return ball.fill(part, surface, rho); };
+  const FillPart fill = [&](const CoordBox& part, std::span<float> surface, std::span<float> rho) {
+    return ball.fill(part, surface, rho);
+  };
   const auto parts = Case::build(info_of(ball.pitch_mm), box, fill);
   ASSERT_TRUE(whole && parts);
   EXPECT_EQ(parts->hash(), whole->hash());
@@ -77,7 +79,9 @@ TEST(CaseFromParts, MemoryFollowsTheSurfaceNotTheVolume) {
   // Twice the size has eight times the volume and four times the surface.
   Ball small{.radius_mm = 20.0}, large{.radius_mm = 40.0};
   const auto build = [](Ball& ball) {
-    const FillPart fill = [&](const CoordBox& part, std::span<float> surface, std::span<float> rho) { return ball.fill(part, surface, rho); };
+    const FillPart fill = [&](const CoordBox& part, std::span<float> surface, std::span<float> rho) {
+      return ball.fill(part, surface, rho);
+    };
     const auto built = Case::build(info_of(ball.pitch_mm), ball.box(), fill);
     EXPECT_TRUE(built);
     EXPECT_NEAR(built->volume_mm3(), 4.0 / 3.0 * std::numbers::pi * std::pow(ball.radius_mm, 3), 0.002 * built->volume_mm3());
@@ -88,7 +92,9 @@ TEST(CaseFromParts, MemoryFollowsTheSurfaceNotTheVolume) {
 
 TEST(CaseFromParts, StopsWhenAskedAndRefusesWhatIsNoNumber) {
   Ball ball;
-  const FillPart fill = [&](const CoordBox& part, std::span<float> surface, std::span<float> rho) { return ball.fill(part, surface, rho); };
+  const FillPart fill = [&](const CoordBox& part, std::span<float> surface, std::span<float> rho) {
+    return ball.fill(part, surface, rho);
+  };
   const auto stopped = Case::build(info_of(ball.pitch_mm), ball.box(), fill, [](double done) { return done < 0.3; });
   ASSERT_FALSE(stopped);
   EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);

@@ -21,7 +21,9 @@ Tissue plate(const Vec3& p) {
   return p.x() > 8.0 && p.z() > -2.0 ? Tissue::enamel : Tissue::none;
 }
 // A rod of one sample's width along y.
-Tissue rod(const Vec3& p) { return std::abs(p.x()) < 0.1 && std::abs(p.z() + 5.0) < 0.1 ? Tissue::metal : Tissue::none; }
+Tissue rod(const Vec3& p) {
+  return std::abs(p.x()) < 0.1 && std::abs(p.z() + 5.0) < 0.1 ? Tissue::metal : Tissue::none;
+}
 
 Case plate_block() { return test::marked_block(24.0, 12.0, kPitch_mm, plate); }
 
@@ -59,7 +61,8 @@ TEST(Metal, IsKnownOnEveryLevel) {
     const double pitch_mm = level_pitch_mm(kPitch_mm, level);
     const CoordBox box = covering_samples({{-3, -3, -9}, {11, 3, 1}}, pitch_mm);
     const Coord n = box.dims();
-    std::vector<Tissue> found(static_cast<std::size_t>(n.x) * static_cast<std::size_t>(n.y) * static_cast<std::size_t>(n.z));
+    std::vector<Tissue> found(static_cast<std::size_t>(n.x) * static_cast<std::size_t>(n.y) *
+                              static_cast<std::size_t>(n.z));
     bone.gather_hard(level, box, found);
     std::size_t i = 0;
     for (std::int32_t x = box.min.x; x <= box.max.x; ++x)
@@ -67,7 +70,8 @@ TEST(Metal, IsKnownOnEveryLevel) {
         for (std::int32_t z = box.min.z; z <= box.max.z; ++z, ++i) {
           // Half-way between samples either may be the nearest.
           const Vec3 p = position_mm({x, y, z}, pitch_mm);
-          const Tissue above = plate(p + Vec3::Constant(0.5 * kPitch_mm)), below = plate(p - Vec3::Constant(0.5 * kPitch_mm));
+          const Tissue above = plate(p + Vec3::Constant(0.5 * kPitch_mm)),
+                       below = plate(p - Vec3::Constant(0.5 * kPitch_mm));
           if (above == below && p.z() < 0.0 && p.head<2>().cwiseAbs().maxCoeff() < 11.5) {
             ASSERT_EQ(found[i], above) << level << ": " << p.transpose();
           }
