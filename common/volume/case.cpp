@@ -40,17 +40,10 @@ constexpr int kClearanceLeaves = 12;
 
 float to_quantum(float mm) { return std::round(mm * 1024.0f) / 1024.0f + 0.0f; }
 
-// Samples of a part; the labels are empty where the importer has none.
-struct PartSamples {
-  CoordBox box;
-  std::span<const float> surface_mm, density_g_cm3;
-  std::span<const std::uint8_t> bone;
-  std::span<const Tissue> tissue;
-};
-
 // The leaf's samples out of a part, with `outside` where the part ends.
 template <class T>
-void read_leaf(const CoordBox& part, std::span<const T> from, Coord origin, T outside, std::span<T, kLeafVoxels> out) {
+void read_leaf(const CoordBox& part, const std::vector<T>& from, Coord origin, T outside,
+               std::array<T, kLeafVoxels>& out) {
   const Coord dims = part.dims();
   const std::int32_t first = std::max(origin.z, part.min.z), last = std::min(origin.z + kLeafSize - 1, part.max.z);
   std::ranges::fill(out, outside);
@@ -74,21 +67,21 @@ void store_leaf(SparseVolume& volume, Coord origin, std::span<const float, kLeaf
 }
 
 // One leaf of bone from the samples of a part. False: the density is not a number.
-bool add_leaf(Case::Grids& grids, const PartSamples& part, Coord origin) {
+bool add_leaf(Case::Grids& grids, const CoordBox& box, const PartSamples& part, Coord origin) {
   const float band = grids.surface.background();
   std::array<float, kLeafVoxels> s, rho, tissue, bone;
   std::array<std::uint8_t, kLeafVoxels> number;
   std::array<Tissue, kLeafVoxels> known;
   number.fill(1);
   known.fill(Tissue::none);
-  read_leaf<float>(part.box, part.surface_mm, origin, band, s);
+  read_leaf(box, part.surface_mm, origin, band, s);
   for (float& value : s) {
     if (std::isnan(value)) return false;
     value = std::clamp(to_quantum(std::clamp(value, -2.0f * band, 2.0f * band)), -band, band);
   }
   if (std::ranges::all_of(s, [&](float v) { return v == band; })) return true;
-  if (!part.bone.empty()) read_leaf<std::uint8_t>(part.box, part.bone, origin, 0, number);
-  if (!part.tissue.empty()) read_leaf<Tissue>(part.box, part.tissue, origin, Tissue::none, known);
+  if (!part.bone.empty()) read_leaf(box, part.bone, origin, std::uint8_t{0}, number);
+  if (!part.tissue.empty()) read_leaf(box, part.tissue, origin, Tissue::none, known);
   // A sample inside the surface without a number lies between the voxels of the scan: it counts as bone 1.
   for (std::size_t i = 0; i < kLeafVoxels; ++i)
     bone[i] = s[i] < 0.0f ? std::max(1.0f, static_cast<float>(number[i])) : 0.0f;
@@ -100,7 +93,7 @@ bool add_leaf(Case::Grids& grids, const PartSamples& part, Coord origin) {
     std::ranges::copy(s, grids.surface.edit_leaf(origin));
     std::ranges::copy(bone, grids.bone.edit_leaf(origin));
   }
-  read_leaf<float>(part.box, part.density_g_cm3, origin, 0.0f, rho);
+  read_leaf(box, part.density_g_cm3, origin, 0.0f, rho);
   for (std::size_t i = 0; i < kLeafVoxels; ++i) {
     if (!std::isfinite(rho[i])) return false;
     rho[i] = std::max(0.0f, rho[i]) + 0.0f;
@@ -291,10 +284,6 @@ json to_json(const Case::Grids& grids) {
           {"content_hash", to_hex(grids.hash)}};
 }
 
-}  // namespace
-
-namespace {
-
 // A box of samples out of a volume over more; empty out of an empty one.
 template <class T>
 void copy_part(const DenseVolume<T>& from, const CoordBox& part, std::vector<T>& out) {
@@ -310,13 +299,12 @@ void copy_part(const DenseVolume<T>& from, const CoordBox& part, std::vector<T>&
 
 }  // namespace
 
-Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillLabelledPart& fill,
-                         const KeepGoing& keep_going) {
+Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillPart& fill, const KeepGoing& keep_going) {
   if (!(info.pitch_mm > 0.0)) return failure(ErrorCode::invalid_input, "a case needs a pitch above zero");
   const float band = band_mm(info.pitch_mm);
   auto grids = std::make_shared<Grids>(Grids{std::move(info), {}, SparseVolume(band), SparseVolume(0.0f), SparseVolume(0.0f),
                                              SparseVolume(0.0f), SparseVolume(0.0f), {}, 0.0, {}, {}});
-  PartBuffers buffers;
+  PartSamples samples;
   constexpr std::int32_t kPart = kPartSamples;
   const Coord first = floor_to(box.min, kPart), last = box.max;
   for (std::int32_t px = first.x; px <= last.x; px += kPart) {
@@ -327,15 +315,21 @@ Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillLabelledP
         const CoordBox part{{std::max(px, box.min.x), std::max(py, box.min.y), std::max(pz, box.min.z)},
                             {std::min(px + kPart - 1, box.max.x), std::min(py + kPart - 1, box.max.y),
                              std::min(pz + kPart - 1, box.max.z)}};
-        const PartKind kind = fill(part, buffers);
+        const Coord dims = part.dims();
+        const std::size_t count =
+            static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z);
+        samples.surface_mm.resize(count);
+        samples.density_g_cm3.resize(count);
+        samples.bone.clear();
+        samples.tissue.clear();
+        const PartKind kind = fill(part, samples);
         if (kind == PartKind::outside) continue;
-        if (kind == PartKind::inside) std::ranges::fill(buffers.surface_mm, -band);
-        const PartSamples samples{part, buffers.surface_mm, buffers.density_g_cm3, buffers.bone, buffers.tissue};
+        if (kind == PartKind::inside) std::ranges::fill(samples.surface_mm, -band);
         const Coord leaf = floor_to(part.min, kLeafSize);
         for (std::int32_t x = leaf.x; x <= part.max.x; x += kLeafSize)
           for (std::int32_t y = leaf.y; y <= part.max.y; y += kLeafSize)
             for (std::int32_t z = leaf.z; z <= part.max.z; z += kLeafSize)
-              if (!add_leaf(*grids, samples, {x, y, z}))
+              if (!add_leaf(*grids, part, samples, {x, y, z}))
                 return failure(ErrorCode::invalid_input, "the bone's distance or density has values that are not numbers");
       }
   }
@@ -357,7 +351,7 @@ Result<Case> Case::build(CaseInfo info, const DenseVolume<float>& surface_mm, co
   OSTEON_CHECK(surface_mm.box == density_g_cm3.box);
   OSTEON_CHECK(labels.bone.values.empty() || labels.bone.box == surface_mm.box);
   OSTEON_CHECK(labels.tissue.values.empty() || labels.tissue.box == surface_mm.box);
-  const FillLabelledPart fill = [&](const CoordBox& part, PartBuffers& to) {
+  const FillPart fill = [&](const CoordBox& part, PartSamples& to) {
     copy_part(surface_mm, part, to.surface_mm);
     copy_part(density_g_cm3, part, to.density_g_cm3);
     copy_part(labels.bone, part, to.bone);
@@ -365,18 +359,6 @@ Result<Case> Case::build(CaseInfo info, const DenseVolume<float>& surface_mm, co
     return PartKind::samples;
   };
   return build(std::move(info), surface_mm.box, fill, keep_going);
-}
-
-Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillPart& fill, const KeepGoing& keep_going) {
-  const FillLabelledPart fill_buffers = [&](const CoordBox& part, PartBuffers& to) {
-    const Coord dims = part.dims();
-    const std::size_t samples =
-        static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z);
-    to.surface_mm.resize(samples);
-    to.density_g_cm3.resize(samples);
-    return fill(part, to.surface_mm, to.density_g_cm3);
-  };
-  return build(std::move(info), box, fill_buffers, keep_going);
 }
 
 Result<Case> Case::load(const std::filesystem::path& folder) {

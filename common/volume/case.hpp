@@ -37,29 +37,26 @@ struct CaseInfo {
 // What an importer knows about the samples beyond their distance and density. Each volume has the box of the distance,
 // or is empty.
 struct SampleLabels {
-  DenseVolume<std::uint8_t>
-      bone;                    // number of the bone, from 1; read inside the surface. Empty: all samples are bone 1.
-  DenseVolume<Tissue> tissue;  // metal, enamel, or none: the density decides. Empty: the density decides everywhere.
+  DenseVolume<std::uint8_t> bone;  // number of the bone, from 1; read inside the surface. Empty: all are bone 1.
+  DenseVolume<Tissue> tissue;      // metal, enamel, or none: the density decides. Empty: it decides everywhere.
 };
 
 // What a part of a bone holds, so that a builder need not look at every sample of what is all one.
 enum class PartKind {
-  samples,  // both spans are filled
-  outside,  // no sample within the band of 4 voxels round the bone: neither span is read
-  inside,   // every sample is bone and deeper than the band: only the density is read
+  samples,  // distance and density are filled
+  outside,  // no sample within the band of 4 voxels round the bone: nothing is read
+  inside,   // every sample is bone and deeper than the band: the distance is not read
 };
-// Fills the signed distance (mm; beyond the band only the sign matters) and the density (g/cm³) of a box of samples, z
-// fastest. Asked once for each part, always in the same order, by one thread.
-using FillPart = std::function<PartKind(const CoordBox& box, std::span<float> surface_mm, std::span<float> density_g_cm3)>;
-
-// What a part holds, with labels: as FillPart's, each of as many samples as the box has, or empty where there are no
-// labels.
-struct PartBuffers {
-  std::vector<float> surface_mm, density_g_cm3;
-  std::vector<std::uint8_t> bone;  // as SampleLabels
-  std::vector<Tissue> tissue;
+// Samples of a part, z fastest.
+struct PartSamples {
+  std::vector<float> surface_mm;     // signed distance; beyond the band only the sign matters
+  std::vector<float> density_g_cm3;
+  std::vector<std::uint8_t> bone;    // as SampleLabels; empty unless it is filled
+  std::vector<Tissue> tissue;        // the same
 };
-using FillLabelledPart = std::function<PartKind(const CoordBox& box, PartBuffers& buffers)>;
+// Fills the samples of a box. Distance and density have its size, the labels are empty. Asked once for each part,
+// always in the same order, by one thread.
+using FillPart = std::function<PartKind(const CoordBox& box, PartSamples& samples)>;
 
 // Read-only after construction, so any thread may read it at any time.
 class Case {
@@ -74,8 +71,6 @@ class Case {
   static constexpr std::int32_t kPartSamples = 64;
   [[nodiscard]] static Result<Case> build(CaseInfo info, const CoordBox& box, const FillPart& fill,
                                           const KeepGoing& keep_going = {});
-  [[nodiscard]] static Result<Case> build(CaseInfo info, const CoordBox& box, const FillLabelledPart& fill,
-                                          const KeepGoing& keep_going);
   // Errors: not_found (no such folder), invalid_input (no or broken case.json / bone.vdb, or content that does not
   // match its hash), unsupported (schema version).
   [[nodiscard]] static Result<Case> load(const std::filesystem::path& folder);

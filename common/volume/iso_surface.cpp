@@ -305,8 +305,8 @@ class Slab {
   std::vector<std::int32_t> cells_;    // that have a point, in the order of the points
   std::vector<Vec3f> points_;
   std::vector<std::array<std::int32_t, 3>> triangles_;
-  std::vector<std::int32_t>
-      nearest_point_;                  // of each sample; before, while the surface is meshed, the point of each cell
+  // Of each sample; before, while the surface is meshed, the point of each cell.
+  std::vector<std::int32_t> nearest_point_;
   std::vector<std::int32_t> nearest_;  // triangle of each sample
   std::vector<float> squared_;         // and the distance to it, voxels²; nothing where there is none
   std::vector<std::int32_t> layer_, next_layer_;

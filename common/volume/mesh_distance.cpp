@@ -238,11 +238,11 @@ Result<Case> build_of_mesh(CaseInfo info, const TriangleMesh& mesh, double densi
   if (!bone.stopped() && !shells.cavities.triangles.empty()) cavities.emplace(shells.cavities, pitch, kWidth, waiting);
   if (bone.stopped() || (cavities && cavities->stopped())) return failure(ErrorCode::cancelled, "stopped while measuring the mesh");
 
-  const auto fill = [&](const CoordBox& part, std::span<float> surface_mm, std::span<float> density) {
-    std::ranges::fill(density, static_cast<float>(density_g_cm3));
+  const auto fill = [&](const CoordBox& part, PartSamples& samples) {
+    std::ranges::fill(samples.density_g_cm3, static_cast<float>(density_g_cm3));
     if (!bone.near(part.min) && !(cavities && cavities->near(part.min)))
       return bone.inside(part.min) && !(cavities && cavities->inside(part.min)) ? PartKind::inside : PartKind::outside;
-    float* out = surface_mm.data();
+    float* out = samples.surface_mm.data();
     for (std::int32_t x = part.min.x; x <= part.max.x; ++x)
       for (std::int32_t y = part.min.y; y <= part.max.y; ++y)
         for (std::int32_t z = part.min.z; z <= part.max.z; ++z) {

@@ -147,21 +147,17 @@ class CaseSamples {
         band_(static_cast<float>(4.0 * pitch_mm)),
         label_(volume, bones) {}
 
-  PartKind fill(const CoordBox& part, PartBuffers& to) {
-    const Coord dims = part.dims();
-    const std::size_t count =
-        static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z);
-    to.surface_mm.resize(count);
-    const auto row = static_cast<std::size_t>(dims.z);
+  PartKind fill(const CoordBox& part, PartSamples& to) {
+    const auto row = static_cast<std::size_t>(part.dims().z);
     std::size_t n = 0;
     for (int x = part.min.x; x <= part.max.x; ++x)
       for (int y = part.min.y; y <= part.max.y; ++y, n += row)
         std::copy_n(&surface_mm_.values[surface_mm_.index({x, y, part.min.z})], row, &to.surface_mm[n]);
     if (std::ranges::all_of(to.surface_mm, [&](float s) { return s >= band_; })) return PartKind::outside;
 
-    to.density_g_cm3.assign(count, 0.0f);
-    to.bone.assign(several_ ? count : 0, 0);
-    to.tissue.assign(hard_.values.empty() ? 0 : count, Tissue::none);
+    std::ranges::fill(to.density_g_cm3, 0.0f);
+    if (several_) to.bone.assign(to.surface_mm.size(), 0);
+    if (!hard_.values.empty()) to.tissue.assign(to.surface_mm.size(), Tissue::none);
     const Coord first = floor_to(part.min, kLeafSize);
     for (int x = first.x; x <= part.max.x; x += kLeafSize)
       for (int y = first.y; y <= part.max.y; y += kLeafSize)
@@ -170,7 +166,7 @@ class CaseSamples {
   }
 
  private:
-  void fill_leaf(Coord origin, const CoordBox& part, PartBuffers& to) {
+  void fill_leaf(Coord origin, const CoordBox& part, PartSamples& to) {
     const CoordBox box{{std::max(origin.x, part.min.x), std::max(origin.y, part.min.y), std::max(origin.z, part.min.z)},
                        {std::min(origin.x + kLeafSize - 1, part.max.x), std::min(origin.y + kLeafSize - 1, part.max.y),
                         std::min(origin.z + kLeafSize - 1, part.max.z)}};
@@ -349,7 +345,7 @@ Result<CtImport> make_case(CtScan scan, const CtOptions& options, const KeepGoin
   info.threshold_hu = options.threshold_hu;
   const bool several = s->found.kept.size() > 1 && !options.merge;
   CaseSamples content(s->volume, s->bones, hard->tissue, several, *surface_mm, options, pitch_mm);
-  const FillLabelledPart fill = [&](const CoordBox& part_box, PartBuffers& to) { return content.fill(part_box, to); };
+  const FillPart fill = [&](const CoordBox& part_box, PartSamples& to) { return content.fill(part_box, to); };
   auto built = Case::build(std::move(info), surface_mm->box, fill, part(building, 0.2, 1.0));
   if (!built) return tl::unexpected(built.error());
   s->found.case_cm3 = built->volume_mm3() * 1e-3;

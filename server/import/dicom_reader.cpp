@@ -21,10 +21,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMostDeaths = 100;                                  // of processes that read headers
-constexpr std::size_t kManyFiles = 500;  // fewer, or a smaller archive, are searched in a moment:
-constexpr std::uint64_t kLargeArchive = std::uint64_t{64}
-                                        << 20;  // what is wrong with them is said without progress before it
+constexpr int kMostDeaths = 100;  // of processes that read headers
+// Fewer files, or a smaller archive, are searched in a moment: no progress is shown before what is wrong with them.
+constexpr std::size_t kManyFiles = 500;
+constexpr std::uint64_t kLargeArchive = std::uint64_t{64} << 20;  // bytes
 constexpr double kUnpackedEnd = 0.4;                              // of the progress of an archive
 constexpr double kHeadersEnd = 0.6;
 
@@ -64,6 +64,8 @@ bool unpack(ByteReader& from, FoundFiles& found) {
     int count = 0;
     std::size_t names = 0;
     if (!from.get(kind) || !from.get(count) || !from.get(names)) return false;
+    if (kind > FileKind::too_deep || count < 0 || count > kMostFiles || names > static_cast<std::size_t>(count))
+      return false;
     SkippedFiles skipped;
     for (std::size_t j = 0; j < names; ++j) {
       std::string name;

@@ -71,15 +71,16 @@ Case cube_of_bone(int samples) {
   const auto distance = [=](Coord c) {
     return std::max({std::abs(c.x), std::abs(c.y), std::abs(c.z)}) * kPitch_mm - reach;
   };
-  const FillPart fill = [=](const CoordBox& box, std::span<float> surface, std::span<float> density) {
-    std::ranges::fill(density, 1.9f);
+  const auto fill = [=](const CoordBox& box, PartSamples& samples) {
+    std::ranges::fill(samples.density_g_cm3, 1.9f);
     const auto deepest = [](std::int32_t low, std::int32_t high) { return std::max(std::abs(low), std::abs(high)); };
     const Coord far{deepest(box.min.x, box.max.x), deepest(box.min.y, box.max.y), deepest(box.min.z, box.max.z)};
     if (distance(far) < -band) return PartKind::inside;
     std::size_t i = 0;
     for (std::int32_t x = box.min.x; x <= box.max.x; ++x)
       for (std::int32_t y = box.min.y; y <= box.max.y; ++y)
-        for (std::int32_t z = box.min.z; z <= box.max.z; ++z) surface[i++] = static_cast<float>(distance({x, y, z}));
+        for (std::int32_t z = box.min.z; z <= box.max.z; ++z)
+          samples.surface_mm[i++] = static_cast<float>(distance({x, y, z}));
     return PartKind::samples;
   };
   const std::int32_t end = half + kBandVoxels + 1;

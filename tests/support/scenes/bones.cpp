@@ -66,17 +66,17 @@ Case marked_block(double width_mm, double thickness_mm, double pitch_mm,
 }
 
 Case large_ball(double radius_mm, double pitch_mm, double density_g_cm3) {
-  const auto fill = [&](const CoordBox& part, std::span<float> surface, std::span<float> density) {
+  const auto fill = [&](const CoordBox& part, PartSamples& samples) {
     const Vec3 low = position_mm(part.min, pitch_mm), high = position_mm(part.max, pitch_mm);
     const double middle = (0.5 * (low + high)).norm() - radius_mm, reach = 0.5 * (high - low).norm() + (kBandVoxels + 1) * pitch_mm;
     if (middle > reach) return PartKind::outside;
-    std::ranges::fill(density, static_cast<float>(density_g_cm3));
+    std::ranges::fill(samples.density_g_cm3, static_cast<float>(density_g_cm3));
     if (middle < -reach) return PartKind::inside;
     std::size_t i = 0;
     for (std::int32_t x = part.min.x; x <= part.max.x; ++x)
       for (std::int32_t y = part.min.y; y <= part.max.y; ++y)
         for (std::int32_t z = part.min.z; z <= part.max.z; ++z, ++i)
-          surface[i] = static_cast<float>(position_mm({x, y, z}, pitch_mm).norm() - radius_mm);
+          samples.surface_mm[i] = static_cast<float>(position_mm({x, y, z}, pitch_mm).norm() - radius_mm);
     return PartKind::samples;
   };
   const Vec3 half = Vec3::Constant(radius_mm + (kBandVoxels + 1) * pitch_mm);

@@ -29,7 +29,7 @@ struct Ball {
     return covering_samples({centre_mm - half, centre_mm + half}, pitch_mm);
   }
   // Parts that are all one are named so.
-  PartKind fill(const CoordBox& part, std::span<float> surface, std::span<float> rho) {
+  PartKind fill(const CoordBox& part, PartSamples& to) {
     const Vec3 low = position_mm(part.min, pitch_mm), high = position_mm(part.max, pitch_mm);
     const double middle = distance_mm(0.5 * (low + high)), reach = 0.5 * (high - low).norm() + (kBandVoxels + 1) * pitch_mm;
     if (middle > reach) return PartKind::outside;
@@ -39,8 +39,9 @@ struct Ball {
       for (std::int32_t y = part.min.y; y <= part.max.y; ++y)
         for (std::int32_t z = part.min.z; z <= part.max.z; ++z, ++i) {
           const Vec3 p = position_mm({x, y, z}, pitch_mm);
-          surface[i] = kind == PartKind::inside ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(distance_mm(p));
-          rho[i] = static_cast<float>(density(p));
+          constexpr float kUnread = std::numeric_limits<float>::quiet_NaN();
+          to.surface_mm[i] = kind == PartKind::inside ? kUnread : static_cast<float>(distance_mm(p));
+          to.density_g_cm3[i] = static_cast<float>(density(p));
         }
     samples_asked += static_cast<std::int64_t>(i);
     return kind;
@@ -59,9 +60,7 @@ TEST(CaseFromParts, IsTheCaseFromTheWholeVolume) {
         density.at({x, y, z}) = static_cast<float>(ball.density(p));
       }
   const auto whole = Case::build(info_of(ball.pitch_mm), surface, density);
-  const FillPart fill = [&](const CoordBox& part, std::span<float> surface, std::span<float> rho) {
-    return ball.fill(part, surface, rho);
-  };
+  const auto fill = [&](const CoordBox& part, PartSamples& to) { return ball.fill(part, to); };
   const auto parts = Case::build(info_of(ball.pitch_mm), box, fill);
   ASSERT_TRUE(whole && parts);
   EXPECT_EQ(parts->hash(), whole->hash());
@@ -79,9 +78,7 @@ TEST(CaseFromParts, MemoryFollowsTheSurfaceNotTheVolume) {
   // Twice the size has eight times the volume and four times the surface.
   Ball small{.radius_mm = 20.0}, large{.radius_mm = 40.0};
   const auto build = [](Ball& ball) {
-    const FillPart fill = [&](const CoordBox& part, std::span<float> surface, std::span<float> rho) {
-      return ball.fill(part, surface, rho);
-    };
+    const auto fill = [&](const CoordBox& part, PartSamples& to) { return ball.fill(part, to); };
     const auto built = Case::build(info_of(ball.pitch_mm), ball.box(), fill);
     EXPECT_TRUE(built);
     EXPECT_NEAR(built->volume_mm3(), 4.0 / 3.0 * std::numbers::pi * std::pow(ball.radius_mm, 3), 0.002 * built->volume_mm3());
@@ -92,16 +89,15 @@ TEST(CaseFromParts, MemoryFollowsTheSurfaceNotTheVolume) {
 
 TEST(CaseFromParts, StopsWhenAskedAndRefusesWhatIsNoNumber) {
   Ball ball;
-  const FillPart fill = [&](const CoordBox& part, std::span<float> surface, std::span<float> rho) {
-    return ball.fill(part, surface, rho);
-  };
+  const auto fill = [&](const CoordBox& part, PartSamples& to) { return ball.fill(part, to); };
   const auto stopped = Case::build(info_of(ball.pitch_mm), ball.box(), fill, [](double done) { return done < 0.3; });
   ASSERT_FALSE(stopped);
   EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
   for (const bool in_density : {false, true}) {
-    const auto broken = Case::build(info_of(ball.pitch_mm), ball.box(), [&](const CoordBox& part, std::span<float> s, std::span<float> rho) {
-      const PartKind kind = ball.fill(part, s, rho);
-      if (kind == PartKind::samples) std::ranges::fill(in_density ? rho : s, std::numeric_limits<float>::quiet_NaN());
+    const auto broken = Case::build(info_of(ball.pitch_mm), ball.box(), [&](const CoordBox& part, PartSamples& to) {
+      const PartKind kind = ball.fill(part, to);
+      auto& values = in_density ? to.density_g_cm3 : to.surface_mm;
+      if (kind == PartKind::samples) std::ranges::fill(values, std::numeric_limits<float>::quiet_NaN());
       return kind;
     });
     ASSERT_FALSE(broken);
