@@ -340,7 +340,7 @@ Result<Supervision> from_wire(const v1::Supervision& supervision) {
     out.tools.push_back(*tool);
   }
   std::ranges::sort(out.tools);
-  out.tools.erase(std::ranges::unique(out.tools).begin(), out.tools.end());
+  out.tools.erase(std::unique(out.tools.begin(), out.tools.end()), out.tools.end());
   out.words = supervision.words();
   if (const Result<void> sound = check(out); !sound) return tl::unexpected(sound.error());
   return out;

@@ -163,7 +163,7 @@ void Carving::mesh_changes(int level, const std::vector<Coord>& leaves, bool las
   if (++unmeshed_cuts_ < kCutsPerFrame && !last) return;
   unmeshed_cuts_ = 0;
   std::ranges::sort(stale_);
-  stale_.erase(std::ranges::unique(stale_).begin(), stale_.end());
+  stale_.erase(std::unique(stale_.begin(), stale_.end()), stale_.end());
   const CutField& field = bodies_.front();
   const auto begin = Clock::now();
   BlockSamples gathered;

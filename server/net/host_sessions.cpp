@@ -113,13 +113,13 @@ void RoomHost::Impl::decide(QueuedEvent& queued) {
         const std::uint32_t number = number_of(event->tool->hash);
         sessions.each([&](SessionSink& sink) { sink.know_tool(number, event->tool->hash); });
       }
-      for (const auto& [place, rows, personal] : said)
-        for (const Bytes& row : rows)
+      for (const Said& one : said)
+        for (const Bytes& row : one.rows)
           sessions.each([&](SessionSink& sink) {
-            if (personal.is_for(sink.author()))
-              sink.offer(place, personal.row, personal.fast);
+            if (one.personal.is_for(sink.author()))
+              sink.offer(one.place, one.personal.row, one.personal.fast);
             else
-              sink.offer(place, row, {.room_seq = place, .kind = wire::SessionRowKind::streamed});
+              sink.offer(one.place, row, {.room_seq = one.place, .kind = wire::SessionRowKind::streamed});
           });
     }
     answer(event);

@@ -388,7 +388,7 @@ Console::Answer Console::limit(const Words& words) {
       allowed.push_back(tool->second);
     }
     std::ranges::sort(allowed);
-    allowed.erase(std::ranges::unique(allowed).begin(), allowed.end());
+    allowed.erase(std::unique(allowed.begin(), allowed.end()), allowed.end());
   }
   return supervise(name, [&](Supervision& word) { word.tools = allowed; });
 }
