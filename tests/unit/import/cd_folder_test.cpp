@@ -1,12 +1,12 @@
 // What hospitals hand out: CT series among indexes, reports, pictures and programs; in folders, zips and CD images.
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <cstdlib>
 #include <fstream>
 
 #include "server/import/dicom_reader.hpp"
 #include "server/import/dicom_writer.hpp"
+#include "tests/support/privileges.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/import/fixtures.hpp"
 
@@ -260,14 +260,10 @@ TEST_F(CdFolder, PipesLoopsAndLockedFilesDoNotStopIt) {
   fs::create_directory_symlink(cd_, cd_ / "DICOM" / "loop");
   std::ofstream(cd_ / "locked") << "x";
   fs::permissions(cd_ / "locked", fs::perms::none);
-  const bool is_root = ::geteuid() == 0;
-  if (is_root) {  // nothing is locked to root
-    for (fs::path path = cd_; path != cd_.root_path() && path != fs::temp_directory_path(); path = path.parent_path())
-      fs::permissions(path, fs::perms(0755));
-    ASSERT_EQ(::seteuid(65534), 0);
-  }
-  const auto scan = read_dicom_series(cd_, keep_going);
-  if (is_root) ASSERT_EQ(::seteuid(0), 0);
+  const auto scan = [&] {
+    const test::WithoutPrivileges nothing_is_locked_to_root;
+    return read_dicom_series(cd_, keep_going);
+  }();
   ASSERT_NO_FATAL_FAILURE(expect_large(scan));
   EXPECT_EQ(scan->report.skipped.text(), "1 file that cannot be opened (locked), 1 link, 1 pipe or device");
 }

@@ -2,10 +2,7 @@
 #include "server/journal/journal.hpp"
 
 #include <gmock/gmock.h>
-#include <linux/capability.h>
 #include <sqlite3.h>
-#include <sys/syscall.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
@@ -15,6 +12,7 @@
 #include "server/journal/upkeep.hpp"
 #include "tests/support/disk/journal_trials.hpp"
 #include "tests/support/disk/memory_disk.hpp"
+#include "tests/support/privileges.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/journal/rows.hpp"
 
@@ -499,24 +497,6 @@ TEST(JournalOnDisk, NamesTheJournalThatIsInTheWay) {
   }
 }
 
-// For as long as it lives, this thread is bound by permissions as anybody is.
-class WithoutPrivileges {
- public:
-  WithoutPrivileges() {
-    EXPECT_EQ(::syscall(SYS_capget, &header_, before_), 0);
-    __user_cap_data_struct none[2] = {before_[0], before_[1]};
-    none[0].effective = none[1].effective = 0;
-    EXPECT_EQ(::syscall(SYS_capset, &header_, none), 0);
-  }
-  ~WithoutPrivileges() { EXPECT_EQ(::syscall(SYS_capset, &header_, before_), 0); }
-  WithoutPrivileges(const WithoutPrivileges&) = delete;
-  WithoutPrivileges& operator=(const WithoutPrivileges&) = delete;
-
- private:
-  __user_cap_header_struct header_{_LINUX_CAPABILITY_VERSION_3, 0};
-  __user_cap_data_struct before_[2]{};
-};
-
 TEST(JournalOnDisk, SaysWhatItMayNotDoAndWhatToDoAboutIt) {
   using std::filesystem::perms;
   const test::TempDir folder;
@@ -535,7 +515,7 @@ TEST(JournalOnDisk, SaysWhatItMayNotDoAndWhatToDoAboutIt) {
                 "; make it first");
   EXPECT_THAT(why(Journal::open(file / "journal")), HasSubstr("name a file in a folder"));
 
-  const WithoutPrivileges anybody;
+  const test::WithoutPrivileges anybody;
   std::filesystem::permissions(file, perms::none);
   EXPECT_THAT(why(Journal::open(file)), AllOf(HasSubstr(file.string()), HasSubstr("see to the permissions")));
   EXPECT_NE(code(Journal::open(file)), ErrorCode::not_found) << "and so nobody makes a new one there";
