@@ -32,6 +32,7 @@ namespace fs = std::filesystem;
 
 struct Arguments {
   fs::path file, to, case_folder, fields;
+  std::string name;
   std::uint64_t at = 0;
   std::uint32_t person = 0;
   int days = 0;
@@ -42,9 +43,17 @@ void say(const std::string& what, const std::string& value) { std::printf("%-12s
 
 std::string text_of(const JournalHead& head) { return std::to_string(head.place.value) + ", chain " + to_hex(head.chain).substr(0, 16); }
 
-// Opens a journal, does something with it and closes it, also after an error: so that it still vouches for its end.
+// Reads a journal and writes nothing, neither to it nor beside it.
 template <class Do>
 auto with_journal(const fs::path& file, const Do& what) -> decltype(what(std::declval<Journal&>())) {
+  Result<Journal> journal = Journal::open_to_read(file);
+  if (!journal) return tl::unexpected(journal.error());
+  return what(*journal);
+}
+
+// Opens a journal, changes it and closes it, also after an error: so that it still vouches for its end.
+template <class Do>
+auto change_journal(const fs::path& file, const Do& what) -> decltype(what(std::declval<Journal&>())) {
   Result<Journal> journal = Journal::open(file);
   if (!journal) return tl::unexpected(journal.error());
   auto done = what(*journal);
@@ -167,6 +176,7 @@ Result<void> verify(const Arguments& given) {
   say("events", text_of(report->head));
   say("witnessed", std::to_string(report->witnessed.value));
   say("closed", report->closed_cleanly ? "cleanly" : "not cleanly: the server was ended otherwise, or runs");
+  for (const std::string& repair : report->repairs) say("note", repair + "; nothing is lost");
   for (const std::string& fault : report->faults) say("fault", fault);
   if (!report->sound())
     return failure(ErrorCode::invalid_input, given.file.string() + " is damaged; osteon-server recover " + given.file.string() +
@@ -318,7 +328,7 @@ Result<void> forget(const Arguments& given) {
   if ((given.person == 0) == (given.days == 0))
     return failure(ErrorCode::invalid_input, "forget needs either --person NUMBER, as \"people\" lists it, or --older-than DAYS");
   const auto today = std::chrono::duration_cast<std::chrono::days>(std::chrono::system_clock::now().time_since_epoch());
-  return with_journal(given.file, [&](Journal& journal) -> Result<void> {
+  return change_journal(given.file, [&](Journal& journal) -> Result<void> {
     // Also where nobody was to be forgotten: a name may be in what cannot be read.
     if (const Error* closed = journal.closed_because()) return tl::unexpected(*closed);
     const Result<std::size_t> forgotten =
@@ -329,6 +339,18 @@ Result<void> forget(const Arguments& given) {
       return failure(ErrorCode::not_found, "nobody in " + given.file.string() + " has the number " +
                                                std::to_string(given.person) + "; \"people\" lists those it knows");
     say("forgotten", std::to_string(*forgotten) + " (what they did stays, under a number; backups made before have the names)");
+    return {};
+  });
+}
+
+// What a file is named decides as what room it is served; so a new name is given on purpose.
+Result<void> rename_room(const Arguments& given) {
+  return change_journal(given.file, [&](Journal& journal) -> Result<void> {
+    if (const Error* closed = journal.closed_because()) return tl::unexpected(*closed);
+    const Result<std::string> before = room_name(journal);
+    if (!before) return tl::unexpected(before.error());
+    if (const Result<void> named = journal.set_register(kNameRegister, given.name); !named) return named;
+    say("renamed", *before + " to " + given.name);
     return {};
   });
 }
@@ -367,6 +389,9 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
   CLI::App* gone = command("forget", "Forgets who people were; what they did stays", forget);
   gone->add_option("--person", given->person, "Number of one, as \"people\" lists it");
   gone->add_option("--older-than", given->days, "All who came more than so many days ago");
+  command("rename-room", "Gives a room another name, which its file must have to be served", rename_room)
+      ->add_option("name", given->name, "The new name: that of the file, without .journal")
+      ->required();
   CLI::App* end = command("delete", "Removes a room: its journal and all files beside it", remove);
   CLI::Option* too = end->add_flag("--branches", given->branches, "And its branches in the same folder, and theirs");
   end->add_flag("--alone", given->alone, "Its branches stay")->excludes(too);

@@ -33,7 +33,8 @@ Error error_of(sqlite3* connection, const std::string& file) {
   }
 }
 
-// A path as SQLite takes it with parameters behind it.
+// A path as SQLite takes it with parameters behind it. A torn write to SQLite's log may spoil what it has committed
+// before: the journal's own log still has that.
 std::string uri_of(const std::filesystem::path& file) {
   static constexpr char kDigits[] = "0123456789ABCDEF";
   std::string uri = "file:";
@@ -47,8 +48,7 @@ std::string uri_of(const std::filesystem::path& file) {
     uri += kDigits[byte >> 4];
     uri += kDigits[byte & 15];
   }
-  // A write that a power failure tears may spoil the sector's other bytes: the log is filled up to a sector at each commit.
-  return uri + "?psow=0";
+  return uri;
 }
 
 }  // namespace
@@ -99,8 +99,6 @@ void Statement::Finalize::operator()(sqlite3_stmt* statement) const { sqlite3_fi
 struct Database::Connection {
   sqlite3* handle = nullptr;
   std::string file;
-  std::uint64_t page_bytes = 0;
-  std::uint64_t log_pages = 0;  // in the log, the last time that something was committed
 };
 
 void Database::Close::operator()(Connection* connection) const {
@@ -113,9 +111,9 @@ Result<Database> Database::open(const std::filesystem::path& file, const Disk& d
   Database made;
   made.connection_.reset(new Connection);
   Connection& connection = *made.connection_;
-  connection.file = file.string();
+  connection.file = (options.shown_as.empty() ? file : options.shown_as).string();
   const std::string vfs = disk.vfs();
-  const std::string uri = uri_of(file) + (options.peek ? "&immutable=1" : "");
+  const std::string uri = uri_of(file) + (options.peek ? "?immutable=1" : "");
   const int flags = (options.peek ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE) | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX |
                     SQLITE_OPEN_EXRESCODE | (options.create ? SQLITE_OPEN_CREATE : 0);
   const int code = sqlite3_open_v2(uri.c_str(), &connection.handle, flags, vfs.empty() ? nullptr : vfs.c_str());
@@ -126,24 +124,14 @@ Result<Database> Database::open(const std::filesystem::path& file, const Disk& d
                    connection.file + " cannot be written to; see to its permissions, or copy it to another place");
   sqlite3_db_config(connection.handle, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   sqlite3_db_config(connection.handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
-  sqlite3_wal_hook(
-      connection.handle,
-      [](void* to, sqlite3*, const char*, int pages) {
-        static_cast<Connection*>(to)->log_pages = static_cast<std::uint64_t>(pages);
-        return SQLITE_OK;
-      },
-      &connection);
-
   // EXCLUSIVE keeps the index of the log in memory: no file of it that another process could have damaged, and nobody beside us.
   std::string settings =
       "PRAGMA locking_mode=EXCLUSIVE; PRAGMA temp_store=MEMORY; PRAGMA mmap_size=0; PRAGMA secure_delete=ON;"
-      "PRAGMA cell_size_check=ON; PRAGMA trusted_schema=OFF; PRAGMA fullfsync=ON; PRAGMA checkpoint_fullfsync=ON;";
+      "PRAGMA cell_size_check=ON; PRAGMA cache_spill=OFF; PRAGMA trusted_schema=OFF; PRAGMA fullfsync=ON; PRAGMA "
+      "checkpoint_fullfsync=ON;";
   if (options.create) settings += "PRAGMA page_size=" + std::to_string(options.page_bytes) + "; PRAGMA journal_mode=WAL;";
   settings += options.durable ? "PRAGMA synchronous=FULL;" : "PRAGMA synchronous=OFF;";
   if (Result<void> set = made.run(settings); !set) return tl::unexpected(set.error());
-  const Result<std::int64_t> page = made.integer("PRAGMA page_size");
-  if (!page) return tl::unexpected(page.error());
-  connection.page_bytes = static_cast<std::uint64_t>(*page);
   return made;
 }
 
@@ -176,28 +164,18 @@ Result<std::string> Database::text(std::string_view sql) {
   });
 }
 
-Result<void> Database::transact(const std::function<Result<void>()>& work) {
-  if (Result<void> begun = run("BEGIN IMMEDIATE"); !begun) return begun;
-  Result<void> done = work();
-  if (done) done = run("COMMIT");
-  if (done || sqlite3_get_autocommit(connection_->handle) != 0) return done;
-  static_cast<void>(run("ROLLBACK"));  // what was wrong before is what is told
-  return done;
-}
+Result<void> Database::begin() { return run("BEGIN IMMEDIATE"); }
+Result<void> Database::commit() { return run("COMMIT"); }
 
-Result<void> Database::carry_log(bool emptied) {
-  int in_log = 0, carried = 0;
-  const int code = sqlite3_wal_checkpoint_v2(connection_->handle, nullptr,
-                                             emptied ? SQLITE_CHECKPOINT_TRUNCATE : SQLITE_CHECKPOINT_PASSIVE, &in_log, &carried);
+Result<void> Database::carry_log() {
+  const int code =
+      sqlite3_wal_checkpoint_v2(connection_->handle, nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
   if (code != SQLITE_OK) return tl::unexpected(error_of(connection_->handle, connection_->file));
-  connection_->log_pages = static_cast<std::uint64_t>(in_log - carried);
   return {};
 }
 
 void Database::forget_pages() { sqlite3_db_release_memory(connection_->handle); }
 
 bool Database::read_only() const { return sqlite3_db_readonly(connection_->handle, "main") != 0; }
-
-std::uint64_t Database::log_bytes() const { return connection_->log_pages * connection_->page_bytes; }
 
 }  // namespace osteon

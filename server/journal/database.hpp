@@ -1,5 +1,6 @@
-// SQLite as the journal uses it: one connection that has the file to itself, a write-ahead log synced at every commit, and
-// the log carried into the file only when asked. Errors are sentences; what SQLite returns stops here.
+// SQLite as the journal uses it: one connection that has the file to itself. A transaction is open most of the time and
+// holds what the journal's own log has made durable. SQLite's write-ahead log has something only while it is committed.
+// Errors are sentences; what SQLite returns stops here.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -44,6 +45,7 @@ struct DatabaseOptions {
   bool durable = true;  // false: SQLite waits for no write; for tests that must see rows lost
   int page_bytes = 4096;
   bool peek = false;    // reads the file as it lies there, without its log and beside whoever has it open
+  std::filesystem::path shown_as = {};  // what errors name, where the file is a copy; empty: the file
 };
 
 // Not synchronised; one thread at a time.
@@ -58,15 +60,14 @@ class Database {
   [[nodiscard]] Result<void> run(const std::string& sql);  // statements without rows that matter
   [[nodiscard]] Result<std::int64_t> integer(std::string_view sql);  // of the first row; 0 without one
   [[nodiscard]] Result<std::string> text(std::string_view sql);
-  // All of it, or after a failure nothing: an error means that it is not committed for sure.
-  [[nodiscard]] Result<void> transact(const std::function<Result<void>()>& work);
-
-  // Copies the log into the file, both synced; `emptied`: and cuts the log to nothing.
-  [[nodiscard]] Result<void> carry_log(bool emptied);
+  // What is changed between the two is in memory until the second, which returns when SQLite's log has it durably.
+  [[nodiscard]] Result<void> begin();
+  [[nodiscard]] Result<void> commit();
+  // Copies SQLite's log into the file, both synced, and cuts it to nothing. Outside of a transaction.
+  [[nodiscard]] Result<void> carry_log();
   // What is read next comes from the disk, not from the pages that SQLite still has in memory.
   void forget_pages();
   [[nodiscard]] bool read_only() const;  // known once something was read
-  [[nodiscard]] std::uint64_t log_bytes() const;  // not yet carried into the file
 
  private:
   Database() = default;

@@ -3,9 +3,14 @@
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/uio.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
+#include <mutex>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -59,8 +64,34 @@ class SystemFile final : public DiskFile {
     return {};
   }
 
+  Result<void> write_at(std::uint64_t from, std::string_view piece) override {
+    while (!piece.empty()) {
+      const ssize_t put = ::pwrite(fd_.get(), piece.data(), piece.size(), static_cast<off_t>(from));
+      if (put < 0 && errno == EINTR) continue;
+      if (put < 0) return cannot("write", file_, errno);
+      piece.remove_prefix(static_cast<std::size_t>(put));
+      from += static_cast<std::uint64_t>(put);
+    }
+    return {};
+  }
+
+  // In one call, which some disks do without emptying their whole cache.
+  Result<void> write_durably(std::uint64_t from, std::string_view piece) override {
+    while (!piece.empty()) {
+      const iovec bytes{const_cast<char*>(piece.data()), piece.size()};
+      const ssize_t put = ::pwritev2(fd_.get(), &bytes, 1, static_cast<off_t>(from), RWF_DSYNC);
+      if (put < 0 && errno == EINTR) continue;
+      if (put < 0 && errno == EOPNOTSUPP) return DiskFile::write_durably(from, piece);
+      if (put < 0) return cannot("write", file_, errno);
+      piece.remove_prefix(static_cast<std::size_t>(put));
+      from += static_cast<std::uint64_t>(put);
+    }
+    return {};
+  }
+
+  // Data and size, not times: so a file that is only written over needs no change of the file system's own records.
   Result<void> sync() override {
-    if (::fsync(fd_.get()) != 0) return cannot("sync", file_, errno);
+    if (::fdatasync(fd_.get()) != 0) return cannot("sync", file_, errno);
     return {};
   }
 
@@ -77,11 +108,47 @@ class SystemLock final : public DiskLock {
   Descriptor fd_;  // flock() holds as long as it is open
 };
 
+class SystemScratch final : public ScratchFolder {
+ public:
+  explicit SystemScratch(fs::path path) : path_(std::move(path)) {}
+  ~SystemScratch() override {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  SystemScratch(const SystemScratch&) = delete;
+  SystemScratch& operator=(const SystemScratch&) = delete;
+  [[nodiscard]] const fs::path& path() const override { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+// Whether a second process is refused the lock that this one holds. Some file systems grant it to everybody.
+Result<bool> keeps_others_out(const fs::path& file) {
+  const char* name = file.c_str();
+  const pid_t child = ::fork();
+  if (child < 0) return cannot("start a process that tries the lock of", file, errno);
+  if (child == 0) {  // only calls that are safe after a fork of one of many threads
+    const int fd = ::open(name, O_RDONLY | O_CLOEXEC);
+    ::_exit(fd >= 0 && ::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK ? 0 : 1);
+  }
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0)
+    if (errno != EINTR) return cannot("wait for the process that tries the lock of", file, errno);
+  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
 class SystemDisk final : public Disk {
  public:
   Result<std::unique_ptr<DiskFile>> create(const fs::path& file) override {
     const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
     if (fd < 0) return cannot_make("create", file, errno);
+    return std::make_unique<SystemFile>(file, fd);
+  }
+
+  Result<std::unique_ptr<DiskFile>> open(const fs::path& file) override {
+    const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
+    if (fd < 0) return cannot_make("open", file, errno);
     return std::make_unique<SystemFile>(file, fd);
   }
 
@@ -101,9 +168,13 @@ class SystemDisk final : public Disk {
     return bytes;
   }
 
-  Result<std::optional<std::uint64_t>> size(const fs::path& file) override {
-    struct stat about {};
-    if (::stat(file.c_str(), &about) == 0) return static_cast<std::uint64_t>(about.st_size);
+  // Asks for no times. Whoever asks for them makes the next write note them anew, and the next sync takes twice as
+  // long.
+  Result<std::optional<FileIdentity>> identity(const fs::path& file) override {
+    struct statx about {};
+    if (::statx(AT_FDCWD, file.c_str(), 0, STATX_INO | STATX_SIZE, &about) == 0)
+      return FileIdentity{std::uint64_t{about.stx_dev_major} << 32 | about.stx_dev_minor, about.stx_ino,
+                          about.stx_size};
     if (errno == ENOENT) return std::nullopt;
     return cannot("look at", file, errno);
   }
@@ -136,22 +207,54 @@ class SystemDisk final : public Disk {
     return names;
   }
 
-  // flock() rather than a file that merely exists: it ends with its holder, even one that was killed. The file stays, but
-  // its holder may remove it: who has just opened the old one would then hold a lock of no name, and opens it anew.
-  Result<std::unique_ptr<DiskLock>> lock(const fs::path& file) override {
+  // flock() rather than a file that merely exists: it ends with its holder, even one that was killed. It does not end
+  // when this process closes the file elsewhere, as the locks of fcntl() do that SQLite takes.
+  Result<std::unique_ptr<DiskLock>> lock(const fs::path& file, LockKind kind) override {
     for (;;) {
-      const int fd = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-      if (fd < 0) return cannot_make("open", file, errno);
+      int fd = ::open(file.c_str(), O_RDWR | O_CLOEXEC);
+      if (fd < 0 && (errno == EACCES || errno == EROFS)) fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+      if (fd < 0) return cannot("open", file, errno);
       auto held = std::make_unique<SystemLock>(fd);
-      if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
+      if (::flock(fd, (kind == LockKind::exclusive ? LOCK_EX : LOCK_SH) | LOCK_NB) != 0) {
         if (errno != EWOULDBLOCK) return cannot("lock", file, errno);
         return failure(ErrorCode::exists, file.string() + " is held by another process");
       }
+      // Its holder may have removed or renamed it before it let go: then the name stands for another file.
       struct stat mine {}, named {};
       if (::fstat(fd, &mine) != 0) return cannot("look at", file, errno);
-      if (::stat(file.c_str(), &named) == 0 && mine.st_dev == named.st_dev && mine.st_ino == named.st_ino) return held;
+      if (::stat(file.c_str(), &named) != 0 || mine.st_dev != named.st_dev || mine.st_ino != named.st_ino) continue;
+      if (kind == LockKind::shared) return held;
+      if (const Result<void> proved = prove_lock(file, mine.st_dev); !proved) return tl::unexpected(proved.error());
+      return held;
     }
   }
+
+  Result<std::unique_ptr<ScratchFolder>> scratch_folder() override {
+    std::error_code error;
+    std::string name = (fs::temp_directory_path(error) / "osteon-journal.XXXXXX").string();
+    if (error || ::mkdtemp(name.data()) == nullptr)
+      return failure(ErrorCode::internal, "cannot make a folder for a copy of the journal in " + name + ": " +
+                                              (error ? error.message() : std::generic_category().message(errno)) +
+                                              "; name a folder that can be written to in TMPDIR");
+    return std::make_unique<SystemScratch>(name);
+  }
+
+ private:
+  // Once for each file system in the life of the process.
+  Result<void> prove_lock(const fs::path& file, dev_t device) {
+    const std::lock_guard one_at_a_time(proving_);
+    if (proved_.contains(device)) return {};
+    const Result<bool> held = keeps_others_out(file);
+    if (!held) return tl::unexpected(held.error());
+    if (!*held)
+      return failure(ErrorCode::unsupported, file.string() +
+                                                 " lies on a file system that does not lock files, so two "
+                                                 "servers could write to it; choose a place on a local disk");
+    proved_.insert(device);
+    return {};
+  }
+  std::mutex proving_;
+  std::set<dev_t> proved_;
 };
 
 fs::path partial_of(const fs::path& file) {
@@ -161,6 +264,10 @@ fs::path partial_of(const fs::path& file) {
 }
 
 }  // namespace
+
+Result<std::optional<std::uint64_t>> Disk::size(const fs::path& file) {
+  return identity(file).map([](const auto& it) { return it ? std::optional(it->size) : std::nullopt; });
+}
 
 Disk& system_disk() {
   static SystemDisk disk;

@@ -14,18 +14,41 @@
 
 namespace osteon {
 
-// A file being written, piece by piece.
+// A file that is open for writing.
 class DiskFile {
  public:
   virtual ~DiskFile() = default;
   [[nodiscard]] virtual Result<void> write(std::string_view piece) = 0;  // at its end
-  [[nodiscard]] virtual Result<void> sync() = 0;                         // what was written stays, whatever happens
+  // Writes over the bytes from an offset on. The file grows where they go beyond its end.
+  [[nodiscard]] virtual Result<void> write_at(std::uint64_t from, std::string_view piece) = 0;
+  [[nodiscard]] virtual Result<void> sync() = 0;  // what was written stays, whatever happens
+  // The same as write_at() and sync(), of these bytes alone.
+  [[nodiscard]] virtual Result<void> write_durably(std::uint64_t from, std::string_view piece) {
+    return write_at(from, piece).and_then([&] { return sync(); });
+  }
 };
 
 // Held until it is destroyed, or its process has ended in whatever way.
 class DiskLock {
  public:
   virtual ~DiskLock() = default;
+};
+enum class LockKind { exclusive, shared };
+
+// A folder for files that only this process needs. It is removed with all that is in it.
+class ScratchFolder {
+ public:
+  virtual ~ScratchFolder() = default;
+  [[nodiscard]] virtual const std::filesystem::path& path() const = 0;
+};
+
+// Which file a name stands for: two names of the same file have the same device and inode.
+struct FileIdentity {
+  std::uint64_t device = 0, inode = 0;
+  std::uint64_t size = 0;  // bytes
+  [[nodiscard]] bool same_file(const FileIdentity& other) const {
+    return device == other.device && inode == other.inode;
+  }
 };
 
 // What is written stays after a power failure only once the file was synced; what is made, renamed or removed, once its
@@ -36,20 +59,26 @@ class Disk {
   virtual ~Disk() = default;
   // An empty file, in place of one that is there.
   [[nodiscard]] virtual Result<std::unique_ptr<DiskFile>> create(const std::filesystem::path& file) = 0;
+  // A file as it is, or an empty one where there is none.
+  [[nodiscard]] virtual Result<std::unique_ptr<DiskFile>> open(const std::filesystem::path& file) = 0;
   [[nodiscard]] virtual Result<std::string> read(const std::filesystem::path& file, std::uint64_t from, std::size_t most) = 0;
   // Nothing: no such file.
-  [[nodiscard]] virtual Result<std::optional<std::uint64_t>> size(const std::filesystem::path& file) = 0;
+  [[nodiscard]] virtual Result<std::optional<FileIdentity>> identity(const std::filesystem::path& file) = 0;
+  [[nodiscard]] Result<std::optional<std::uint64_t>> size(const std::filesystem::path& file);
   [[nodiscard]] virtual Result<void> rename(const std::filesystem::path& from, const std::filesystem::path& to) = 0;
   [[nodiscard]] virtual Result<void> remove(const std::filesystem::path& file) = 0;  // one that is not there is well
   [[nodiscard]] virtual Result<void> sync_folder(const std::filesystem::path& folder) = 0;
   // The names of the files in a folder.
   [[nodiscard]] virtual Result<std::vector<std::string>> list(const std::filesystem::path& folder) = 0;
-  [[nodiscard]] virtual Result<std::unique_ptr<DiskLock>> lock(const std::filesystem::path& file) = 0;
+  // Locks the file itself, whatever its name is or becomes. Errors: not_found; exists (another process holds it);
+  // unsupported (a second process was not kept out: this file system does not lock).
+  [[nodiscard]] virtual Result<std::unique_ptr<DiskLock>> lock(const std::filesystem::path& file, LockKind kind) = 0;
+  [[nodiscard]] virtual Result<std::unique_ptr<ScratchFolder>> scratch_folder() = 0;
   // The name of SQLite's virtual file system that keeps its files on this disk; empty: the system's.
   [[nodiscard]] virtual std::string vfs() const { return {}; }
 };
 
-// The computer's. It has no state.
+// The computer's.
 [[nodiscard]] Disk& system_disk();
 
 // The folder that a file is in, as sync_folder() wants it.

@@ -13,22 +13,22 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kCheckpointsKept = 2;
 constexpr std::size_t kSliceBytes = std::size_t{1} << 20;
-constexpr std::uint64_t kTidyBytes = std::uint64_t{1} << 20;
+constexpr std::uint64_t kTidyBytes = std::uint64_t{64} << 10;
 
 fs::path with(const fs::path& file, std::string_view end) { return file.string() + std::string(end); }
 
 // After a failed sync the system may show bytes that are not on the disk, and never write them: not even a later sync
-// does. What a process that died has left in the log is therefore written anew before anything is put behind it.
-Result<void> renew_log(Disk& disk, const fs::path& log) {
-  const auto size = disk.size(log);
+// does. What a process that died has left in SQLite's log is therefore written anew before it counts, into a file of
+// its own: a torn write over it could spoil what the database has only half copied.
+Result<void> renew_wal(Disk& disk, const fs::path& wal) {
+  const auto size = disk.size(wal);
   if (!size) return tl::unexpected(size.error());
-  if (!*size || **size == 0) return {};
-  auto renewed = DurableFile::begin(disk, log);
+  if (size->value_or(0) == 0) return {};
+  auto renewed = DurableFile::begin(disk, wal);
   if (!renewed) return tl::unexpected(renewed.error());
-  const auto copied = read_in_pieces(disk, log, [&](std::string_view piece) { return renewed->write(piece); });
+  const auto copied = read_in_pieces(disk, wal, [&](std::string_view piece) { return renewed->write(piece); });
   if (!copied) return tl::unexpected(copied.error());
-  if (const auto finished = renewed->finish(); !finished) return tl::unexpected(finished.error());
-  return {};
+  return renewed->finish().map([](const WrittenFile&) {});
 }
 
 // Whatever a process that died was about to write: half a checkpoint, one that was never noted, one that was given up.
@@ -48,8 +48,8 @@ Result<void> clear_leftovers(Disk& disk, const fs::path& file, const std::vector
 
 Disk& disk_of(const JournalOptions& options) { return options.disk != nullptr ? *options.disk : system_disk(); }
 
-Result<std::unique_ptr<DiskLock>> take_lock(Disk& disk, const fs::path& file) {
-  return disk.lock(with(file, ".lock")).map_error([&](Error error) {
+Result<std::unique_ptr<DiskLock>> take_lock(Disk& disk, const fs::path& file, LockKind kind) {
+  return disk.lock(file, kind).map_error([&](Error error) {
     if (error.code == ErrorCode::exists)
       error.message = file.string() + " is in use by another process; close the room there first";
     return error;
@@ -63,7 +63,8 @@ Result<void> check_nothing_left(Disk& disk, const fs::path& file) {
     return failure(ErrorCode::exists, "there is " + file.string() + " already; give the new journal another name");
   for (const std::string& name : *names) {
     const fs::path other = folder_of(file) / name;
-    if (name == log_of(file).filename() || name == failed_of(file).filename() || parse_checkpoint_file(file, name))
+    if (name == log_of(file).filename() || name == mirror_of(file).filename() || name == wal_of(file).filename() ||
+        name == failed_of(file).filename() || parse_checkpoint_file(file, name))
       return failure(ErrorCode::exists, other.string() + " belonged to an earlier journal " + file.string() +
                                             "; move it away, or give the new one another name");
   }
@@ -84,18 +85,24 @@ Journal::Journal(Journal&&) noexcept = default;
 Journal& Journal::operator=(Journal&&) noexcept = default;
 Journal::~Journal() = default;
 
+// Made beside its place, so that a journal is there whole or not at all. The lock is the file's own and stays when it
+// is renamed.
 Result<Journal> Journal::create(const fs::path& file, std::string_view genesis, JournalOptions options) {
   Disk& disk = disk_of(options);
-  auto lock = take_lock(disk, file);
-  if (!lock) return tl::unexpected(lock.error());
   if (Result<void> clear = check_nothing_left(disk, file); !clear) return tl::unexpected(clear.error());
-
-  // Made beside its place, so that a journal is there whole or not at all.
   const fs::path partial = with(file, kPartial);
-  const auto remove_partial = [&] { return disk.remove(partial).and_then([&] { return disk.remove(log_of(partial)); }); };
+  if (const auto there = disk.open(partial); !there) return tl::unexpected(there.error());
+  auto lock = take_lock(disk, partial, LockKind::exclusive);
+  if (!lock) return tl::unexpected(lock.error());
+  const auto remove_partial = [&] {
+    return disk.remove(partial).and_then([&] { return disk.remove(wal_of(partial)); });
+  };
   const DatabaseOptions as_made{.create = true, .durable = options.durable, .page_bytes = options.page_bytes};
-  const Result<void> made = remove_partial()
+  const Result<void> made = check_nothing_left(disk, file)  // again: another process may have made one meanwhile
+                                .and_then([&] { return disk.create(partial).map([](const auto&) {}); })
+                                .and_then([&] { return disk.remove(wal_of(partial)); })
                                 .and_then([&] { return JournalFile::make(partial, genesis, disk, as_made); })
+                                .and_then([&] { return disk.remove(wal_of(partial)); })
                                 .and_then([&] { return disk.rename(partial, file); })
                                 .and_then([&] { return disk.sync_folder(folder_of(file)); });
   if (!made) {
@@ -107,32 +114,51 @@ Result<Journal> Journal::create(const fs::path& file, std::string_view genesis, 
 
 Result<Journal> Journal::open(const fs::path& file, JournalOptions options) {
   Disk& disk = disk_of(options);
-  // First, so that no lock file is made for a journal that is not there, or beside another program's file.
   if (Result<void> may_be = check_is_journal(file, disk); !may_be) return tl::unexpected(may_be.error());
-  auto lock = take_lock(disk, file);
+  auto lock = take_lock(disk, file, LockKind::exclusive);
   if (!lock) return tl::unexpected(lock.error());
   return open_locked(file, options, std::move(*lock));
 }
 
+Result<Journal> Journal::open_to_read(const fs::path& file, Disk* given) {
+  const JournalOptions options{.disk = given};
+  Disk& disk = disk_of(options);
+  if (Result<void> may_be = check_is_journal(file, disk); !may_be) return tl::unexpected(may_be.error());
+  auto lock = take_lock(disk, file, LockKind::shared);
+  if (!lock) return tl::unexpected(lock.error());
+  auto opened = JournalFile::open_to_read(file, disk);
+  if (!opened) return tl::unexpected(opened.error());
+  Journal journal(std::unique_ptr<State>(
+      new State{file, options, &disk, std::move(*lock), std::move(*opened), {}, {}, {}, 0, {}, {}, {}, true}));
+  State& state = *journal.state_;
+  Inspection found = state.file.inspect(false);
+  state.head = found.head;
+  state.repairs = std::move(found.repairs);
+  if (!found.faults.empty()) state.closed = Error{ErrorCode::unavailable, found.faults.front()};
+  return journal;
+}
+
 Result<Journal> Journal::open_locked(const fs::path& file, const JournalOptions& options, std::unique_ptr<DiskLock> lock) {
   Disk& disk = disk_of(options);
-  if (Result<void> renewed = renew_log(disk, log_of(file)); !renewed) return tl::unexpected(renewed.error());
+  if (Result<void> renewed = renew_wal(disk, wal_of(file)); !renewed) return tl::unexpected(renewed.error());
   auto opened = JournalFile::open(file, disk, {.durable = options.durable});
   if (!opened) return tl::unexpected(opened.error());
-  if (opened->version() != kJournalVersion)
+  if (opened->version() < kVersionWithTimes)
     return failure(ErrorCode::unsupported, file.string() + " is a journal of version " + std::to_string(opened->version()) +
                                                "; migrate it into a copy of version " + std::to_string(kJournalVersion));
-  Journal journal(std::unique_ptr<State>(new State{file, options, &disk, std::move(lock), std::move(*opened), {}, {}, {}, {}}));
+  const auto identity = disk.identity(file);
+  if (!identity) return tl::unexpected(identity.error());
+  if (!*identity) return failure(ErrorCode::not_found, file.string() + " was removed while it was opened");
+  Journal journal(std::unique_ptr<State>(
+      new State{file, options, &disk, std::move(lock), std::move(*opened), **identity, {}, {}, 0, {}, {}, {}, false}));
   State& state = *journal.state_;
-  const Inspection found = state.file.inspect(false);
+  Inspection found = state.file.inspect(false);
   state.head = found.head;
+  state.repairs = std::move(found.repairs);
   if (!found.faults.empty()) {
     state.closed = Error{ErrorCode::unavailable, found.faults.front()};
     return journal;
   }
-  // The log's end is filled up to a sector at each commit, so that a torn write cannot spoil rows that are safe; but a log
-  // found after a power failure may end within one. So nothing is put behind it: it is carried into the file, and begun anew.
-  if (Result<void> carried = state.file.database().carry_log(true); !carried) return tl::unexpected(carried.error());
   const auto recovered = state.file.find_register(kRecoveredRegister);
   if (!recovered) return tl::unexpected(recovered.error());
   if (*recovered) state.recovered_to = RoomSeq{decode_number(**recovered).value_or(0)};
@@ -140,16 +166,42 @@ Result<Journal> Journal::open_locked(const fs::path& file, const JournalOptions&
   const auto kept = state.file.checkpoints();
   if (!kept) return tl::unexpected(kept.error());
   if (Result<void> cleared = clear_leftovers(disk, file, *kept); !cleared) return tl::unexpected(cleared.error());
-  auto insert = state.file.database().prepare("INSERT INTO rows(place, at_ns, bytes, chain) VALUES(?, ?, ?, ?)");
-  if (!insert) return tl::unexpected(insert.error());
-  state.insert = std::move(*insert);
-  // From here on the end of the file is no longer its footer.
-  if (found.closed_cleanly) {
-    const Result<void> noted = state.file.database().transact(
-        [&] { return state.file.set_register(kFooterRegister, encode_footer({state.head, false})); });
-    if (!noted) return tl::unexpected(noted.error());
-  }
+  if (Result<void> begun = journal.begin_log(); !begun) return tl::unexpected(begun.error());
   return journal;
+}
+
+// First the database gets all that the old log files have, and keeps it whatever happens: a process that died may have
+// seen a sync of theirs fail. Then a generation begins.
+Result<void> Journal::begin_log() {
+  State& state = *state_;
+  if (Result<void> kept = state.file.keep_log(); !kept) return kept;
+  state.identity.size = 0;  // SQLite may have cut off what did not belong to it
+  auto log = MirroredLog::open(state.path, state.options.log_bytes, *state.disk, state.options.durable);
+  if (!log) return tl::unexpected(log.error());
+  state.log = std::move(*log);
+  state.generation = state.file.generation();
+  return carry();
+}
+
+// At every moment either the database or one of the log files has each row: see MirroredLog::begin_mirror().
+Result<void> Journal::carry() {
+  State& state = *state_;
+  Database& database = state.file.database();
+  const LogStart start{state.file.identity(), state.generation + 1, state.head};
+  return database.commit()
+      .and_then([&] { return state.log->begin_mirror(start); })
+      .and_then([&] { return database.begin(); })
+      .and_then([&] { return state.file.note_generation(start); })
+      .and_then([&] { return database.commit(); })
+      .and_then([&] { return database.carry_log(); })
+      .and_then([&] { return state.log->begin_log(start); })
+      .and_then([&] { return database.begin(); })
+      .and_then([&] { return state.disk->identity(state.path); })
+      .and_then([&](const std::optional<FileIdentity>& now) -> Result<void> {
+        if (now && now->same_file(state.identity)) state.identity = *now;  // as long as it is now, at least
+        state.generation = start.generation;
+        return {};
+      });
 }
 
 const Error* Journal::closed_because() const { return state_->closed ? &*state_->closed : nullptr; }
@@ -167,12 +219,30 @@ std::optional<RoomSeq> Journal::recovered_to() const { return state_->recovered_
 Result<void> Journal::write(const std::function<Result<void>()>& work) {
   State& state = *state_;
   if (state.closed) return tl::unexpected(*state.closed);
-  Result<void> done = work();
+  if (state.only_read) return failure(ErrorCode::unavailable, state.path.string() + " was opened only to be read");
+  Result<void> done = check_named();
+  if (done) done = work();
   if (done) return done;
   close_for_good({ErrorCode::unavailable, state.path.string() + " takes no more rows, since a write to it failed: " +
                                               done.error().message + "; recover it into a new journal"});
   return tl::unexpected(*state.closed);
 }
+
+// Whoever replaces or removes the file while it is open would have the rows written to one that nobody finds.
+Result<void> Journal::check_named() {
+  State& state = *state_;
+  const auto now = state.disk->identity(state.path);
+  if (!now) return tl::unexpected(now.error());
+  if (*now && (*now)->same_file(state.identity) && (*now)->size >= state.identity.size) return {};
+  return failure(ErrorCode::internal, std::string("the file was ") + (*now ? "replaced or cut" : "removed") +
+                                          " while its room was open");
+}
+
+Result<void> Journal::write_through(const std::function<Result<void>()>& work) {
+  return write([&] { return work().and_then([&] { return carry(); }); });
+}
+
+const std::vector<std::string>& Journal::repairs() const { return state_->repairs; }
 
 void Journal::close_for_good(Error reason) {
   State& state = *state_;
@@ -189,24 +259,15 @@ Result<void> Journal::append(std::span<const JournalRow> rows) {
       return failure(ErrorCode::invalid_input, state.path.string() + ": row " + std::to_string(row.place.value) + " has " +
                                                    std::to_string(row.bytes.size()) + " bytes, more than the " +
                                                    std::to_string(state.options.most_row_bytes) + " that a row may have");
+  if (rows.empty()) return {};
   JournalHead head = state.head;
-  const Result<void> done = write([&] {
-    return state.file.database().transact([&]() -> Result<void> {
-      for (const JournalRow& row : rows) {
-        OSTEON_CHECK(row.place.value == head.place.value + 1);
-        head = next_head(head, row);
-        Statement& insert = *state.insert;
-        insert.integer(0, static_cast<std::int64_t>(row.place.value)).integer(1, row.at_ns).blob(2, row.bytes);
-        if (Result<void> put = insert.blob(3, as_text(head.chain)).run(); !put) return put;
-      }
-      return {};
-    });
-  });
+  // Into the transaction, which is in memory, and into the log, which makes them safe.
+  const Result<void> done =
+      write([&] { return state.file.add_rows(rows, head).and_then([&] { return state.log->append(rows, head); }); });
   if (!done) return done;
   state.head = head;
   // The rows are safe whatever becomes of this.
-  if (state.file.database().log_bytes() > state.options.most_log_bytes)
-    static_cast<void>(write([&] { return state.file.database().carry_log(false); }));
+  if (state.log->is_full()) static_cast<void>(write([&] { return carry(); }));
   return {};
 }
 
@@ -293,14 +354,13 @@ Result<void> Journal::add_checkpoint(CheckpointFile file) {
   std::sort(all->begin(), all->end(), [](const Checkpoint& a, const Checkpoint& b) { return a.at.place > b.at.place; });
   const auto kept = static_cast<std::ptrdiff_t>(std::min(kCheckpointsKept, all->size()));
   const std::vector<Checkpoint> old(all->begin() + kept, all->end());
-  const Result<void> noted = write([&] {
-    return state.file.database().transact([&]() -> Result<void> {
-      Result<void> done = state.file.add_checkpoint(file.about_);
-      for (const Checkpoint& checkpoint : old)
-        if (done)
-          done = state.file.database().run("DELETE FROM checkpoints WHERE place = " + std::to_string(checkpoint.at.place.value));
-      return done;
-    });
+  const Result<void> noted = write_through([&] {
+    Result<void> done = state.file.add_checkpoint(file.about_);
+    for (const Checkpoint& checkpoint : old)
+      if (done)
+        done = state.file.database().run("DELETE FROM checkpoints WHERE place = " +
+                                         std::to_string(checkpoint.at.place.value));
+    return done;
   });
   if (!noted) return noted;
   // A file that cannot be removed now is removed when the journal is opened next.
@@ -324,8 +384,21 @@ Result<std::string> Journal::read_checkpoint(const Checkpoint& checkpoint) {
 }
 
 Result<void> Journal::set_register(std::string_view name, std::string_view value) {
-  OSTEON_CHECK(name != kGenesisRegister && name != kFooterRegister);
-  return write([&] { return state_->file.database().transact([&] { return state_->file.set_register(name, value); }); });
+  return set_beside({{std::string(name), std::string(value)}}, {});
+}
+
+Result<void> Journal::set_beside(const Registers& registers, const std::vector<Person>& people) {
+  return write_through([&] {
+    Result<void> done;
+    for (const auto& [name, value] : registers) {
+      OSTEON_CHECK(name != kGenesisRegister && name != kFooterRegister && name != kGenerationRegister &&
+                   name != kIdRegister);
+      if (done) done = state_->file.set_register(name, value);
+    }
+    for (const Person& person : people)
+      if (done) done = state_->file.add_person(person);
+    return done;
+  });
 }
 
 Result<std::optional<std::string>> Journal::find_register(std::string_view name) { return state_->file.find_register(name); }
@@ -337,31 +410,25 @@ Result<std::uint64_t> Journal::next_server_epoch() {
   return set_register(kEpochRegister, encode_number(next)).map([&] { return next; });
 }
 
-Result<void> Journal::set_person(const Person& person) {
-  return write([&] { return state_->file.database().transact([&] { return state_->file.add_person(person); }); });
-}
+Result<void> Journal::set_person(const Person& person) { return set_beside({}, {person}); }
 
 Result<std::vector<Person>> Journal::people() { return state_->file.people(); }
 
-// A row that is deleted is overwritten, but a copy of it may be left where the tree once moved it to another page. So the
-// whole table is emptied, which overwrites every page that it ever had, and those who stay are written anew; then the log,
-// which has the pages as they were, is cut to nothing.
+// A row that is deleted is overwritten, but a copy of it may be left where the tree once moved it to another page. So
+// the whole table is emptied, which overwrites every page that it ever had, and those who stay are written anew.
+// SQLite's log, which has the pages as they were, is cut to nothing whenever the journal's is carried.
 Result<std::size_t> Journal::keep_people(const std::function<bool(const Person&)>& kept) {
   const auto all = people();
   if (!all) return tl::unexpected(all.error());
   const auto staying = static_cast<std::size_t>(std::count_if(all->begin(), all->end(), kept));
   if (staying == all->size()) return 0;
   Database& database = state_->file.database();
-  const Result<void> done = write([&] {
-    return database
-        .transact([&]() -> Result<void> {
-          if (Result<void> emptied = database.run("DELETE FROM people"); !emptied) return emptied;
-          for (const Person& person : *all)
-            if (kept(person))
-              if (Result<void> put = state_->file.add_person(person); !put) return put;
-          return {};
-        })
-        .and_then([&] { return database.carry_log(true); });
+  const Result<void> done = write_through([&]() -> Result<void> {
+    if (Result<void> emptied = database.run("DELETE FROM people"); !emptied) return emptied;
+    for (const Person& person : *all)
+      if (kept(person))
+        if (Result<void> put = state_->file.add_person(person); !put) return put;
+    return {};
   });
   if (!done) return tl::unexpected(done.error());
   return all->size() - staying;
@@ -376,26 +443,31 @@ Result<std::size_t> Journal::forget_people_before(std::int32_t day) {
 }
 
 Result<void> Journal::tidy() {
-  if (state_->file.database().log_bytes() < std::min(kTidyBytes, state_->options.most_log_bytes)) return {};
-  return write([&] { return state_->file.database().carry_log(true); });
+  if (state_->closed || !state_->log || state_->log->used_bytes() < std::min(kTidyBytes, state_->options.log_bytes))
+    return {};
+  return write([&] { return carry(); });
 }
 
 Result<void> Journal::close() {
   State& state = *state_;
   const auto lock = std::move(state.lock);  // held to the end
   Disk& disk = *state.disk;
-  const fs::path log = log_of(state.path);
+  const fs::path path = state.path;
   Result<void> done;
-  const bool vouched = !state.closed;
+  const bool vouched = !state.closed && !state.only_read;
   if (vouched) {
     Database& database = state.file.database();
     done = write([&] {
-      return database.transact([&] { return state.file.set_register(kFooterRegister, encode_footer({state.head, true})); })
-          .and_then([&] { return database.carry_log(true); });
+      return state.file.set_register(kFooterRegister, encode_footer({state.head, true}))
+          .and_then([&] { return database.commit(); })
+          .and_then([&] { return database.carry_log(); });
     });
   }
   state_.reset();
-  if (vouched && done) static_cast<void>(disk.remove(log));  // which is empty
+  if (vouched && done) {
+    static_cast<void>(disk.remove(wal_of(path)));  // which is empty
+    static_cast<void>(remove_log(path, disk));     // which the footer says is needed no more
+  }
   return done;
 }
 

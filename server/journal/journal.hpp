@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "server/journal/chain.hpp"
@@ -40,8 +41,9 @@ struct JournalSlice {
   std::optional<Error> stopped;  // why the row after it does not fit
 };
 
-// One file, NAME, with SQLite's log NAME-wal, a lock NAME.lock and checkpoints beside it. Not synchronised: one thread at a
-// time, the room's journal thread. What takes rows no more (closed_because) can still be read, backed up and recovered.
+// A database, NAME, and checkpoints beside it; while it is open also its log, NAME-log and NAME-mirror, which hold the
+// newest rows, and SQLite's own, NAME-wal. Not synchronised: one thread at a time, the room's journal thread. What
+// takes rows no more (closed_because) can still be read, backed up and recovered.
 class Journal {
  public:
   // Error exists: a journal, or what belonged to one, is there.
@@ -51,6 +53,9 @@ class Journal {
   // by another process); unsupported (an older version: migrate_journal; a newer one); invalid_input (damaged so that no row
   // can be read). Where rows are damaged, or the journal is behind a witness, it opens and is closed to rows.
   [[nodiscard]] static Result<Journal> open(const std::filesystem::path& file, JournalOptions options = {});
+  // Only to be read: nothing is written to it or beside it, and others may read it too. What takes rows fails. Errors:
+  // those of open(); where rows are damaged, closed_because() says so.
+  [[nodiscard]] static Result<Journal> open_to_read(const std::filesystem::path& file, Disk* disk = nullptr);
   Journal(Journal&&) noexcept;
   Journal& operator=(Journal&&) noexcept;
   ~Journal();  // without close(): as if the process had been killed
@@ -89,8 +94,10 @@ class Journal {
   // Its bytes, held against its digest.
   [[nodiscard]] Result<std::string> read_checkpoint(const Checkpoint& checkpoint);
 
-  // Small values by name, each safe on the disk when set.
+  // Small values by name, each safe on the disk when set. It takes a few syncs, for all of them together.
+  using Registers = std::vector<std::pair<std::string, std::string>>;
   [[nodiscard]] Result<void> set_register(std::string_view name, std::string_view value);
+  [[nodiscard]] Result<void> set_beside(const Registers& registers, const std::vector<Person>& people);
   [[nodiscard]] Result<std::optional<std::string>> find_register(std::string_view name);
   // Counts the openings of the room; never the same again.
   [[nodiscard]] Result<std::uint64_t> next_server_epoch();
@@ -101,11 +108,13 @@ class Journal {
   [[nodiscard]] Result<std::size_t> forget_person(std::string_view pseudonym);
   [[nodiscard]] Result<std::size_t> forget_people_before(std::int32_t day);  // who joined before it
 
-  // Carries the log into the file and cuts it to nothing, if it has grown beyond 1 MiB: for when the room is idle, since it
-  // takes as long as writing the log did, and a few syncs. An error closes the journal to rows.
+  // Carries the rows of the log into the database, if there are some hundred: for when the room is idle, since it takes
+  // a few syncs. An error closes the journal to rows.
   [[nodiscard]] Result<void> tidy();
-  // Vouches for the head in a footer and carries the log into the file; of a journal that is closed to rows, nothing. The
-  // journal must not be used afterwards.
+  // What one of the two log files lacked when the journal was opened, and the other had: a sentence each.
+  [[nodiscard]] const std::vector<std::string>& repairs() const;
+  // Vouches for the head in a footer, with which the log is needed no more and goes; of a journal that is closed to
+  // rows, nothing. The journal must not be used afterwards.
   [[nodiscard]] Result<void> close();
 
  private:
@@ -115,6 +124,11 @@ class Journal {
   [[nodiscard]] static Result<Journal> open_locked(const std::filesystem::path& file, const JournalOptions& options,
                                                    std::unique_ptr<DiskLock> lock);
   [[nodiscard]] Result<void> write(const std::function<Result<void>()>& work);
+  // Does something in the transaction and commits it: safe on the disk when it returns, but for rows not the fast way.
+  [[nodiscard]] Result<void> write_through(const std::function<Result<void>()>& work);
+  [[nodiscard]] Result<void> carry();  // the log into the database
+  [[nodiscard]] Result<void> check_named();
+  [[nodiscard]] Result<void> begin_log();
   void close_for_good(Error reason);  // with a note beside the file for the next process
   [[nodiscard]] Result<std::size_t> keep_people(const std::function<bool(const Person&)>& kept);
   std::unique_ptr<State> state_;

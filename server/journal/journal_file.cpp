@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/core/check.hpp"
+#include "server/journal/log_bytes.hpp"
 
 namespace osteon {
 namespace {
@@ -31,14 +32,17 @@ struct Version {
   "CREATE TABLE people(pseudonym TEXT PRIMARY KEY, label TEXT NOT NULL, joined_day INTEGER NOT NULL,"                  \
   " seal BLOB NOT NULL) STRICT, WITHOUT ROWID;"
 
+constexpr const char* kTimedTables =
+    "CREATE TABLE rows(place INTEGER PRIMARY KEY, at_ns INTEGER NOT NULL, bytes BLOB NOT NULL,"
+    " chain BLOB NOT NULL) STRICT;" OSTEON_OTHER_TABLES;
+constexpr const char* kTimedRows =
+    "SELECT place, at_ns, bytes, chain FROM rows WHERE place > ? AND place <= ? ORDER BY place";
+
 constexpr std::array kVersions{
     Version{1,
             "CREATE TABLE rows(place INTEGER PRIMARY KEY, bytes BLOB NOT NULL, chain BLOB NOT NULL) STRICT;" OSTEON_OTHER_TABLES,
             "SELECT place, 0, bytes, chain FROM rows WHERE place > ? AND place <= ? ORDER BY place"},
-    Version{kJournalVersion,
-            "CREATE TABLE rows(place INTEGER PRIMARY KEY, at_ns INTEGER NOT NULL, bytes BLOB NOT NULL,"
-            " chain BLOB NOT NULL) STRICT;" OSTEON_OTHER_TABLES,
-            "SELECT place, at_ns, bytes, chain FROM rows WHERE place > ? AND place <= ? ORDER BY place"}};
+    Version{2, kTimedTables, kTimedRows}, Version{kJournalVersion, kTimedTables, kTimedRows}};
 
 const Version& version_of(int number) {
   return *std::find_if(kVersions.begin(), kVersions.end(), [&](const Version& v) { return v.number == number; });
@@ -49,6 +53,22 @@ std::optional<Digest> digest_of(std::string_view bytes) {
   if (bytes.size() != digest.bytes.size()) return std::nullopt;
   std::memcpy(digest.bytes.data(), bytes.data(), bytes.size());
   return digest;
+}
+
+constexpr const char* kInsertRow = "INSERT INTO rows(place, at_ns, bytes, chain) VALUES(?, ?, ?, ?)";
+
+Result<void> copy_file(Disk& disk, const fs::path& from, const fs::path& to) {
+  std::unique_ptr<DiskFile> copy;
+  return read_in_pieces(disk, from,
+                        [&](std::string_view piece) -> Result<void> {
+                          if (copy == nullptr) {
+                            auto made = disk.create(to);
+                            if (!made) return tl::unexpected(made.error());
+                            copy = std::move(*made);
+                          }
+                          return copy->write(piece);
+                        })
+      .map([](const WrittenFile&) {});
 }
 
 // What stands beside the chain is confirmed row by row.
@@ -82,7 +102,7 @@ Digest seal_of(std::string_view name, std::string_view value) {
 
 }  // namespace
 
-fs::path log_of(const fs::path& journal) { return journal.string() + "-wal"; }
+fs::path wal_of(const fs::path& journal) { return journal.string() + "-wal"; }
 fs::path failed_of(const fs::path& journal) { return journal.string() + ".failed"; }
 
 fs::path checkpoint_file(const fs::path& journal, const JournalHead& at) {
@@ -104,10 +124,10 @@ std::optional<JournalHead> parse_checkpoint_file(const fs::path& journal, std::s
 }
 
 bool is_partial_of(const fs::path& journal, std::string_view name) {
-  if (name == log_of(journal.string() + std::string(kPartial)).filename()) return true;
+  if (name == wal_of(journal.string() + std::string(kPartial)).filename()) return true;
   if (!name.ends_with(kPartial)) return false;
   name.remove_suffix(kPartial.size());
-  return name == journal.filename() || name == log_of(journal).filename() || name == failed_of(journal).filename() ||
+  return name == journal.filename() || name == wal_of(journal).filename() || name == failed_of(journal).filename() ||
          parse_checkpoint_file(journal, name);
 }
 
@@ -130,17 +150,17 @@ Result<void> check_is_journal(const fs::path& file, Disk& disk) {
     return is_not(" has been cut to " + std::to_string(page.size()) + " bytes, less than a page; go on from a backup");
   if (page.find(kRows) != page.npos || (of_sqlite && page.substr(kApplicationAt, kOwn.size()) == kOwn)) return {};
   if (of_sqlite) return is_not(" is a database of another program, no journal; name a journal");
-  const auto log = disk.size(log_of(file));
-  if (!log) return tl::unexpected(log.error());
-  if (*log && **log > 0 && page.size() >= kSmallestPage) return {};
+  const auto wal = disk.size(wal_of(file));
+  if (!wal) return tl::unexpected(wal.error());
+  if (*wal && **wal > 0 && page.size() >= kSmallestPage) return {};
   return is_not(" is no journal; name a file that osteon-server keeps a room in, or, where it was one, go on from a backup");
 }
 
 bool belongs_to(const fs::path& journal, std::string_view name) {
   const std::string own = journal.filename().string();
   if (!name.starts_with(own)) return false;
-  // The last two: of SQLite's, where somebody else looked into it.
-  for (const std::string_view end : {"", "-wal", ".failed", ".lock", "-shm", "-journal"})
+  // A lock of earlier versions; the last two are SQLite's, where somebody else looked into it.
+  for (const std::string_view end : {"", "-log", "-mirror", "-wal", ".failed", ".lock", "-shm", "-journal"})
     if (name == own + std::string(end)) return true;
   return is_partial_of(journal, name) || parse_checkpoint_file(journal, name);
 }
@@ -151,15 +171,13 @@ std::string_view as_text(const Digest& digest) {
 
 std::string encode_number(std::uint64_t number) {
   std::string bytes;
-  for (int i = 0; i < 8; ++i) bytes += static_cast<char>(number >> (8 * i));
+  put_integer(bytes, number);
   return bytes;
 }
 
 std::optional<std::uint64_t> decode_number(std::string_view bytes) {
   if (bytes.size() != 8) return std::nullopt;
-  std::uint64_t number = 0;
-  for (int i = 0; i < 8; ++i) number |= std::uint64_t{static_cast<unsigned char>(bytes[static_cast<std::size_t>(i)])} << (8 * i);
-  return number;
+  return integer_at(bytes, 0);
 }
 
 std::string encode_footer(const Footer& footer) {
@@ -178,28 +196,125 @@ Result<void> JournalFile::make(const fs::path& file, std::string_view genesis, D
   if (!mode) return tl::unexpected(mode.error());
   if (*mode != "wal") return failure(ErrorCode::internal, file.string() + ": SQLite cannot keep a write-ahead log here");
   JournalFile made(file, disk, std::move(*database));
-  const Result<void> done = made.database_.transact([&]() -> Result<void> {
-    return made.database_
-        .run(std::string(version_of(kJournalVersion).tables) + "PRAGMA application_id=" + std::to_string(kApplication) +
-             "; PRAGMA user_version=" + std::to_string(kJournalVersion) + ";")
-        .and_then([&] { return made.set_register(kGenesisRegister, genesis); });
-  });
-  if (!done) return done;
-  return made.database_.carry_log(true);
+  Database& own = made.database_;
+  return own.begin()
+      .and_then([&] {
+        return own.run(std::string(version_of(kJournalVersion).tables) +
+                       "PRAGMA application_id=" + std::to_string(kApplication) +
+                       "; PRAGMA user_version=" + std::to_string(kJournalVersion) + ";");
+      })
+      .and_then([&] { return made.set_register(kGenesisRegister, genesis); })
+      .and_then([&] { return own.commit(); })
+      .and_then([&] { return own.carry_log(); });
 }
 
 Result<JournalFile> JournalFile::open(const fs::path& file, Disk& disk, const DatabaseOptions& options) {
   if (Result<void> may_be = check_is_journal(file, disk); !may_be) return tl::unexpected(may_be.error());
   auto database = Database::open(file, disk, options);
   if (!database) return tl::unexpected(database.error());
-  JournalFile opened(file, disk, std::move(*database));
-  if (Result<void> known = opened.check_tables(); !known) return tl::unexpected(known.error());
+  return of_database(file, disk, std::move(*database), false);
+}
+
+// A database whose own file has everything is read where it lies. Any other would have to be written to.
+Result<JournalFile> JournalFile::open_to_read(const fs::path& file, Disk& disk) {
+  if (Result<void> may_be = check_is_journal(file, disk); !may_be) return tl::unexpected(may_be.error());
+  // Read where it lies, SQLite does not look at what says that it keeps a log.
+  constexpr std::string_view kKeepsLog = "\2\2";
+  constexpr std::uint64_t kKeepsLogAt = 18;
+  const auto versions = disk.read(file, kKeepsLogAt, kKeepsLog.size());
+  if (!versions) return tl::unexpected(versions.error());
+  bool whole = *versions == kKeepsLog;
+  for (const fs::path& beside : {wal_of(file), log_of(file), mirror_of(file)}) {
+    const auto size = disk.size(beside);
+    if (!size) return tl::unexpected(size.error());
+    whole = whole && size->value_or(0) == 0;
+  }
+  if (whole) {
+    auto database = Database::open(file, disk, {.peek = true});
+    if (!database) return tl::unexpected(database.error());
+    return of_database(file, disk, std::move(*database), true);
+  }
+  auto scratch = disk.scratch_folder();
+  if (!scratch) return tl::unexpected(scratch.error());
+  const fs::path copy = (*scratch)->path() / "journal";
+  for (const auto& [from, to] : {std::pair{file, copy}, std::pair{wal_of(file), wal_of(copy)}})
+    if (Result<void> copied = copy_file(disk, from, to); !copied && copied.error().code != ErrorCode::not_found)
+      return tl::unexpected(copied.error());
+  auto database = Database::open(copy, disk, {.durable = false, .shown_as = file});
+  if (!database) return tl::unexpected(database.error());
+  auto opened = of_database(file, disk, std::move(*database), false);
+  if (opened) opened->scratch_ = std::move(*scratch);
+  return opened;
+}
+
+Result<JournalFile> JournalFile::of_database(const fs::path& file, Disk& disk, Database database, bool peek) {
+  JournalFile opened(file, disk, std::move(database));
+  if (Result<void> known = opened.check_tables(peek); !known) return tl::unexpected(known.error());
   const auto genesis = opened.find_register(kGenesisRegister);
   if (!genesis) return tl::unexpected(genesis.error());
   if (!*genesis)
     return failure(ErrorCode::invalid_input, file.string() + " has lost its register genesis, so no row of it can be confirmed");
   opened.genesis_ = **genesis;
+  const auto generation = opened.find_register(kGenerationRegister), footer = opened.find_register(kFooterRegister);
+  const auto id = opened.find_register(kIdRegister);
+  if (id && *id) opened.id_ = **id;
+  if (generation && *generation) opened.generation_ = decode_number(**generation).value_or(0);
+  const auto closed = footer && *footer ? decode_footer(**footer) : std::nullopt;
+  opened.needs_log_ = opened.generation_ != 0 && !(closed && closed->clean);
+  if (peek) return opened;
+  if (Result<void> taken = opened.database_.begin().and_then([&] { return opened.take_log(); }); !taken)
+    return tl::unexpected(taken.error());
   return opened;
+}
+
+Digest JournalFile::identity() const {
+  Hasher hasher;
+  hasher.text(as_text(first_head(genesis_).chain));
+  hasher.text(id_);
+  return hasher.finish();
+}
+
+Result<void> JournalFile::make_id() {
+  if (!id_.empty()) return {};
+  id_ = random_bytes(16);
+  return set_register(kIdRegister, id_);
+}
+
+Result<JournalHead> JournalFile::stored_head() {
+  auto statement = database_.prepare("SELECT place, chain FROM rows ORDER BY place DESC LIMIT 1");
+  if (!statement) return tl::unexpected(statement.error());
+  const Result<bool> row = statement->step();
+  if (!row) return tl::unexpected(row.error());
+  if (!*row) return first_head(genesis_);
+  return JournalHead{RoomSeq{static_cast<std::uint64_t>(statement->integer(0))},
+                     digest_of(statement->bytes(1)).value_or(Digest{})};
+}
+
+Result<void> JournalFile::take_log() {
+  const auto stored = stored_head();
+  if (!stored) {  // inspect() says what is wrong with the rows
+    log_.faults.push_back(stored.error().message);
+    return {};
+  }
+  stored_head_ = *stored;
+  auto read = read_log(file_, identity(), *stored, *disk_);
+  if (!read) return tl::unexpected(read.error());
+  log_ = std::move(*read);
+  for (const auto& [path, base] : log_.bases) {
+    if (base.place > stored->place) continue;  // what is missing between is counted by inspect()
+    const auto chain = chain_at(base.place);
+    if (chain && *chain == base.chain) continue;
+    log_.faults.push_back(path.string() + " goes on from another history than " + file_.string() + " has");
+    needs_log_ = true;
+  }
+  if (log_.rows.empty() || version_ == 1) return {};
+  JournalHead head = *stored;
+  const Result<void> added = add_rows(log_.rows, head);
+  if (added) return {};
+  // The tables are damaged. What can be read of them is all that there is.
+  log_.faults.push_back(added.error().message);
+  needs_log_ = true;
+  return database_.run("ROLLBACK").and_then([&] { return database_.begin(); });
 }
 
 Result<JournalFile> JournalFile::peek(const fs::path& file, Disk& disk) {
@@ -233,15 +348,15 @@ Result<void> JournalFile::read_version() {
   return {};
 }
 
-Result<void> JournalFile::check_tables() {
+Result<void> JournalFile::check_tables(bool peek) {
   const Result<std::int64_t> application = database_.integer("PRAGMA application_id");
   if (!application) return tl::unexpected(application.error());
-  const Result<std::string> mode = database_.text("PRAGMA journal_mode");
+  const Result<std::string> mode = peek ? Result<std::string>("wal") : database_.text("PRAGMA journal_mode");
   if (!mode) return tl::unexpected(mode.error());
   if (*application != kApplication || *mode != "wal")
     return failure(ErrorCode::invalid_input, file_.string() + " is no journal, or its first page is damaged; go on from a backup");
   if (Result<void> known = read_version(); !known) return known;
-  if (database_.read_only())  // of no permission to write, or of a first page that claims a file of the future
+  if (!peek && database_.read_only())  // of no permission to write, or of a first page that claims a file of the future
     return failure(ErrorCode::invalid_input, file_.string() + " cannot be written to; see to its permissions, or recover it");
 
   // A damaged definition could make SQLite read the right bytes wrongly.
@@ -359,8 +474,10 @@ Result<std::optional<std::string>> JournalFile::find_register(std::string_view n
 void JournalFile::check_witness(const JournalHead& witness, const std::string& what, Inspection& found) {
   found.witnessed = std::max(found.witnessed, witness.place);
   if (witness.place > found.head.place) {
-    found.faults.push_back(file_.string() + " goes to place " + std::to_string(found.head.place.value) + ", but " + what +
-                           " vouches for place " + std::to_string(witness.place.value) + ": rows were lost" +
+    const std::uint64_t missing = witness.place.value - found.head.place.value;
+    found.faults.push_back(file_.string() + " goes to place " + std::to_string(found.head.place.value) + ", but " +
+                           what + " vouches for place " + std::to_string(witness.place.value) + ": " +
+                           std::to_string(missing) + (missing == 1 ? " row is missing" : " rows are missing") +
                            std::string(kRemedy));
     return;
   }
@@ -398,8 +515,29 @@ Inspection JournalFile::inspect(bool files) {
   return found;
 }
 
+void JournalFile::inspect_log(Inspection& found) {
+  found.repairs = log_.repairs;
+  if (log_.witnessed > found.head.place) check_witness({log_.witnessed, {}}, "its log", found);
+  found.witnessed = std::max(found.witnessed, log_.witnessed);
+  for (const std::string& foreign : log_.foreign)
+    found.faults.push_back(foreign + "; put the files of one moment together again, or recover it into a new journal");
+  if (!needs_log_) return;
+  for (const std::string& fault : log_.faults) found.faults.push_back(fault + std::string(kRemedy));
+  if (log_.doubtful)
+    found.faults.push_back(file_.string() +
+                           ": a write to one file of its log was cut short, and the other is damaged: how many " +
+                           "rows are missing after place " + std::to_string(found.head.place.value) +
+                           " cannot be told" + std::string(kRemedy));
+  if (log_.generation < generation_ && log_.faults.empty())
+    found.faults.push_back(file_.string() + " was not closed, and its log " +
+                           (log_.generation == 0 ? "is missing" : "is an older copy") +
+                           ": how many rows are missing after place " + std::to_string(found.head.place.value) +
+                           " cannot be told" + std::string(kRemedy));
+}
+
 void JournalFile::inspect_beside(bool files, Inspection& found) {
   const auto note = [&](const Error& error) { found.faults.push_back(error.message); };
+  inspect_log(found);
   if (const auto bytes = find_register(kFooterRegister); !bytes) {
     note(bytes.error());
   } else if (*bytes) {
@@ -457,11 +595,52 @@ void JournalFile::inspect_beside(bool files, Inspection& found) {
   }
 }
 
+Result<void> JournalFile::add_rows(std::span<const JournalRow> rows, JournalHead& head) {
+  if (!insert_) {
+    auto prepared = database_.prepare(kInsertRow);
+    if (!prepared) return tl::unexpected(prepared.error());
+    insert_ = std::move(*prepared);
+  }
+  for (const JournalRow& row : rows) {
+    OSTEON_CHECK(row.place.value == head.place.value + 1);
+    head = next_head(head, row);
+    const Result<void> put = insert_->integer(0, static_cast<std::int64_t>(row.place.value))
+                                 .integer(1, row.at_ns)
+                                 .blob(2, row.bytes)
+                                 .blob(3, as_text(head.chain))
+                                 .run();
+    if (!put) return put;
+  }
+  return {};
+}
+
+// SQLite's log may have what a process that died had committed and only begun to copy into the file. Nothing is put
+// behind that: a torn write would spoil its end, and leave the file half copied.
+Result<void> JournalFile::keep_log() {
+  JournalHead head = stored_head_;
+  return database_.run("ROLLBACK")
+      .and_then([&] { return database_.carry_log(); })
+      .and_then([&] { return database_.begin(); })
+      .and_then([&] { return add_rows(std::exchange(log_.rows, {}), head); })
+      // Until the next generation begins it needs no log.
+      .and_then([&] { return set_register(kFooterRegister, encode_footer({head, true})); })
+      .and_then([&] { return make_id(); })
+      .and_then([&] { return database_.commit(); })
+      .and_then([&] { return database_.carry_log(); })
+      .and_then([&] { return database_.begin(); });
+}
+
 Result<void> JournalFile::set_register(std::string_view name, std::string_view value) {
   auto statement = database_.prepare("INSERT OR REPLACE INTO registers(name, value, seal) VALUES(?, ?, ?)");
   if (!statement) return tl::unexpected(statement.error());
   const Digest seal = seal_of(name, value);
   return statement->text(0, name).blob(1, value).blob(2, as_text(seal)).run();
+}
+
+Result<void> JournalFile::note_generation(const LogStart& start) {
+  return set_register(kGenerationRegister, encode_number(start.generation))
+      .and_then([&] { return set_register(kFooterRegister, encode_footer({start.base, false})); })
+      .and_then([&] { return database_.run("PRAGMA user_version=" + std::to_string(kJournalVersion)); });
 }
 
 Result<void> JournalFile::add_checkpoint(const Checkpoint& checkpoint) {

@@ -1,11 +1,13 @@
 // A journal's tables, as this and every older version of them is read: for the journal itself and for what checks, copies
 // and recovers one. Reading writes nothing.
 #pragma once
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,18 +16,19 @@
 #include "server/journal/database.hpp"
 #include "server/journal/disk.hpp"
 #include "server/journal/journal_parts.hpp"
+#include "server/journal/mirrored_log.hpp"
 
 namespace osteon {
 
-// Files beside the journal's own.
-[[nodiscard]] std::filesystem::path log_of(const std::filesystem::path& journal);     // SQLite's write-ahead log
+// Files beside the journal's own, besides log_of() and mirror_of().
+[[nodiscard]] std::filesystem::path wal_of(const std::filesystem::path& journal);     // SQLite's write-ahead log
 [[nodiscard]] std::filesystem::path failed_of(const std::filesystem::path& journal);  // says why it takes no more rows
 // Its name is a witness: of the place and the chain there.
 [[nodiscard]] std::filesystem::path checkpoint_file(const std::filesystem::path& journal, const JournalHead& at);
 [[nodiscard]] std::optional<JournalHead> parse_checkpoint_file(const std::filesystem::path& journal, std::string_view name);
 // Whether a name in the journal's folder is of something that is still being written: the journal, its log, a checkpoint.
 [[nodiscard]] bool is_partial_of(const std::filesystem::path& journal, std::string_view name);
-// Whether it is the journal itself or anything that was made beside it, its lock too.
+// Whether it is the journal itself or anything that was made beside it, also by earlier versions.
 [[nodiscard]] bool belongs_to(const std::filesystem::path& journal, std::string_view name);
 
 // Tells a file that cannot be a journal before anything is made beside it: one of another program, a folder, one that is cut
@@ -39,7 +42,8 @@ struct Inspection {
   std::vector<std::string> faults;   // one sentence each; none: sound
   std::optional<RoomSeq> first_bad;  // row
   bool closed_cleanly = false;
-  RoomSeq witnessed;                 // the furthest place that a footer or checkpoint vouches for
+  RoomSeq witnessed;                 // the furthest place that its log, a footer or a checkpoint vouches for
+  std::vector<std::string> repairs;  // what one of its two log files lacks and the other has: nothing is lost
 };
 
 struct Walk {
@@ -52,8 +56,12 @@ class JournalFile {
   // Makes the tables in a file of that name. Nothing else may be there.
   [[nodiscard]] static Result<void> make(const std::filesystem::path& file, std::string_view genesis, Disk& disk,
                                          const DatabaseOptions& options);
-  // Any version that this program reads. Error invalid_input: no journal, or damaged beyond reading.
+  // Any version that this program reads. The rows of its log are taken into a transaction, which stays open. Error
+  // invalid_input: no journal, or damaged beyond reading.
   [[nodiscard]] static Result<JournalFile> open(const std::filesystem::path& file, Disk& disk, const DatabaseOptions& options);
+  // Only to be read. Nothing is written beside it: what is not in its file yet is put together in a copy elsewhere.
+  // Nobody may have it open for writing. Errors as of open().
+  [[nodiscard]] static Result<JournalFile> open_to_read(const std::filesystem::path& file, Disk& disk);
 
   // One that may be in use, as far as its log has been carried into the file: only to look for single things in it, since it
   // may be written to at the same time. What it began as is always there, and held against its seal. Errors as of open().
@@ -62,6 +70,13 @@ class JournalFile {
   [[nodiscard]] int version() const { return version_; }
   [[nodiscard]] const std::string& genesis() const { return genesis_; }
   [[nodiscard]] Database& database() { return database_; }
+  // What its log names as its journal: a hash of its genesis and, since version 3, of random bytes of its own. So a log
+  // of a room that began alike is not taken for its own.
+  [[nodiscard]] Digest identity() const;
+  // For one that has no random bytes yet. Within a transaction.
+  [[nodiscard]] Result<void> make_id();
+  // The newest generation of its log that is known; 0: it never had a log.
+  [[nodiscard]] std::uint64_t generation() const { return std::max(generation_, log_.generation); }
 
   // Rows after `before` up to `last`, each held against the chain, as long as `take` returns true.
   [[nodiscard]] Walk walk(const JournalHead& before, RoomSeq last,
@@ -76,28 +91,48 @@ class JournalFile {
   // All but pages and rows, of which `found` has the head: what vouches for them, and what is kept beside them.
   void inspect_beside(bool files, Inspection& found);
 
-  // Of the current version, within a transaction.
+  // Commits the rows of the log, so that the log is needed no more. Of one that was opened to be written to.
+  [[nodiscard]] Result<void> keep_log();
+
+  // Within a transaction. Rows go on from `head`, which goes on with them.
+  [[nodiscard]] Result<void> add_rows(std::span<const JournalRow> rows, JournalHead& head);
   [[nodiscard]] Result<void> set_register(std::string_view name, std::string_view value);
+  [[nodiscard]] Result<void> note_generation(const LogStart& start);  // which ends what a footer said
   [[nodiscard]] Result<void> add_checkpoint(const Checkpoint& checkpoint);
   [[nodiscard]] Result<void> add_person(const Person& person);
 
  private:
   JournalFile(std::filesystem::path file, Disk& disk, Database database)
       : file_(std::move(file)), disk_(&disk), database_(std::move(database)) {}
+  // `database` may be a copy of `file`, or the file as it lies there (`peek`).
+  [[nodiscard]] static Result<JournalFile> of_database(const std::filesystem::path& file, Disk& disk, Database database,
+                                                       bool peek);
   [[nodiscard]] Result<void> read_version();
-  [[nodiscard]] Result<void> check_tables();
+  [[nodiscard]] Result<void> check_tables(bool peek);
+  [[nodiscard]] Result<JournalHead> stored_head();
+  // Inserts the rows that its log has beyond its last one.
+  [[nodiscard]] Result<void> take_log();
+  void inspect_log(Inspection& found);
   [[nodiscard]] tl::unexpected<Error> damaged(const std::string& what) const;
   void check_witness(const JournalHead& witness, const std::string& what, Inspection& found);
 
   std::filesystem::path file_;
   Disk* disk_;
+  std::unique_ptr<ScratchFolder> scratch_;  // where the database is a copy; outlives it
   Database database_;
+  std::optional<Statement> insert_;  // of a row
   int version_ = 0;
   std::string genesis_;
+  std::string id_;
+  std::uint64_t generation_ = 0;
+  bool needs_log_ = false;  // it was not closed cleanly since the generation began
+  LogContents log_;
+  JournalHead stored_head_;  // of the rows without those of the log
 };
 
-inline constexpr std::string_view kGenesisRegister = "genesis", kFooterRegister = "footer", kEpochRegister = "server_epoch",
-                                  kRecoveredRegister = "recovered";
+inline constexpr std::string_view kGenesisRegister = "genesis", kFooterRegister = "footer",
+                                  kEpochRegister = "server_epoch", kRecoveredRegister = "recovered",
+                                  kGenerationRegister = "log generation", kIdRegister = "journal id";
 
 // A head that is kept as a register, with a mark.
 struct Footer {
@@ -111,6 +146,8 @@ struct Footer {
 
 [[nodiscard]] std::string_view as_text(const Digest& digest);
 
-inline constexpr int kJournalVersion = 2;
+inline constexpr int kVersionWithTimes = 2;
+// Version 3 has the tables of version 2, and a log of its own beside the file.
+inline constexpr int kJournalVersion = 3;
 
 }  // namespace osteon

@@ -12,7 +12,7 @@ namespace osteon {
 struct JournalOptions {
   Disk* disk = nullptr;                                 // null: the computer's; must outlive the journal
   std::size_t most_row_bytes = std::size_t{64} << 20;
-  std::uint64_t most_log_bytes = std::uint64_t{64} << 20;  // beyond it an append also carries the log into the file
+  std::uint64_t log_bytes = std::uint64_t{1} << 20;  // of each log file; what is beyond it goes into the database
   int page_bytes = 4096;                                // of a new journal; not below the disk's sectors
   bool durable = true;                                  // false, for tests only: no row is waited for
 };

@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "server/journal/journal.hpp"
 #include "server/journal/journal_file.hpp"
@@ -15,20 +17,28 @@ struct Journal::State {
   Disk* disk;
   std::unique_ptr<DiskLock> lock;  // let go last
   JournalFile file;
+  FileIdentity identity;           // of the file
   JournalHead head;
+  std::optional<MirroredLog> log;  // nothing: closed to rows since it was opened
+  std::uint64_t generation = 0;    // of the log
   std::optional<RoomSeq> recovered_to;
   std::optional<Error> closed;
-  std::optional<Statement> insert;
+  std::vector<std::string> repairs;  // of the log, when it was opened
+  bool only_read = false;
 };
 
 struct JournalInside {
   static Journal::State& of(Journal& journal) { return *journal.state_; }
+  // So that all of it can be read from the disk. Error: of one that takes no rows, why.
+  static Result<void> carry(Journal& journal) {
+    return journal.write([&] { return journal.carry(); });
+  }
 };
 
 // What an earlier journal of this name left behind would be taken for a new one's. Error exists, naming it.
 [[nodiscard]] Result<void> check_nothing_left(Disk& disk, const std::filesystem::path& file);
 [[nodiscard]] Disk& disk_of(const JournalOptions& options);
-// Error exists: another process has the journal.
-[[nodiscard]] Result<std::unique_ptr<DiskLock>> take_lock(Disk& disk, const std::filesystem::path& file);
+// Of the file itself, not of one beside it that anybody could remove. Error exists: another process has the journal.
+[[nodiscard]] Result<std::unique_ptr<DiskLock>> take_lock(Disk& disk, const std::filesystem::path& file, LockKind kind);
 
 }  // namespace osteon

@@ -15,51 +15,39 @@ constexpr std::size_t kSliceBytes = std::size_t{1} << 20;
 // More openings than any lost part of a journal can have counted.
 constexpr std::uint64_t kEpochsSkipped = 1'000'000;
 
-constexpr std::string_view kLock = ".lock";
+constexpr std::string_view kLock = ".lock";  // of earlier versions
 
 // The name of a copy that is not yet whole.
 fs::path growing_copy(const fs::path& to) { return to.string() + ".copying"; }
 
-// A journal that is only read. SQLite makes an empty log even for that: then it goes again.
+// A journal that is only read, while nobody writes to it.
 class Source {
  public:
   static Result<Source> open(const fs::path& file, Disk& disk) {
     if (Result<void> may_be = check_is_journal(file, disk); !may_be) return tl::unexpected(may_be.error());
-    auto lock = take_lock(disk, file);
+    auto lock = take_lock(disk, file, LockKind::shared);
     if (!lock) return tl::unexpected(lock.error());
-    const auto log = disk.size(log_of(file));
-    if (!log) return tl::unexpected(log.error());
-    Source source(file, disk, std::move(*lock), !*log);
-    auto opened = JournalFile::open(file, disk, {});
+    auto opened = JournalFile::open_to_read(file, disk);
     if (!opened) return tl::unexpected(opened.error());
-    source.journal_ = std::make_unique<JournalFile>(std::move(*opened));
-    return source;
+    return Source(std::move(*lock), std::move(*opened));
   }
-  Source(Source&&) noexcept = default;
-  Source& operator=(Source&&) = delete;
-  ~Source() {
-    if (!lock_) return;
-    journal_.reset();
-    if (clear_log_) static_cast<void>(disk_->remove(log_of(file_)));
-  }
-  JournalFile& operator*() { return *journal_; }
-  JournalFile* operator->() { return journal_.get(); }
+  JournalFile& operator*() { return journal_; }
+  JournalFile* operator->() { return &journal_; }
 
  private:
-  Source(fs::path file, Disk& disk, std::unique_ptr<DiskLock> lock, bool clear_log)
-      : file_(std::move(file)), disk_(&disk), lock_(std::move(lock)), clear_log_(clear_log) {}
-  fs::path file_;
-  Disk* disk_;
+  Source(std::unique_ptr<DiskLock> lock, JournalFile journal) : lock_(std::move(lock)), journal_(std::move(journal)) {}
   std::unique_ptr<DiskLock> lock_;
-  std::unique_ptr<JournalFile> journal_;
-  bool clear_log_;
+  JournalFile journal_;
 };
 
 Disk& or_system(Disk* disk) { return disk != nullptr ? *disk : system_disk(); }
 
 VerifyReport report_of(JournalFile& file) {
   Inspection found = file.inspect(true);
-  return {file.version(), found.head, found.first_bad, found.witnessed, found.closed_cleanly, std::move(found.faults)};
+  return {file.version(),       found.head,
+          found.first_bad,      found.witnessed,
+          found.closed_cleanly, std::move(found.faults),
+          std::move(found.repairs)};
 }
 
 }  // namespace
@@ -72,6 +60,7 @@ Result<VerifyReport> verify_journal(const fs::path& file, Disk* disk) {
 
 std::vector<std::string> verify_beside(Journal& journal) {
   auto& state = JournalInside::of(journal);
+  static_cast<void>(JournalInside::carry(journal));  // a failure is among the faults
   state.file.database().forget_pages();
   Inspection found;
   found.head = state.head;
@@ -81,6 +70,7 @@ std::vector<std::string> verify_beside(Journal& journal) {
 
 Result<VerifyReport> verify_journal(Journal& journal) {
   auto& state = JournalInside::of(journal);
+  static_cast<void>(JournalInside::carry(journal));  // a failure is among the faults
   state.file.database().forget_pages();
   return report_of(state.file);
 }
@@ -118,7 +108,8 @@ struct JournalCopying {
   static JournalCopy::State& state(JournalCopy& copy) { return *copy.state_; }
 
   static Result<void> begin_target(JournalCopy::State& state) {
-    if (const auto nobody = take_lock(*state.disk, state.growing); !nobody) return tl::unexpected(nobody.error());
+    const auto nobody = take_lock(*state.disk, state.growing, LockKind::exclusive);
+    if (!nobody && nobody.error().code != ErrorCode::not_found) return tl::unexpected(nobody.error());
     state.begun = true;
     if (Result<void> cleared = clear_growing(state); !cleared) return cleared;
     auto target = Journal::create(state.growing, state.genesis, {.disk = state.disk});
@@ -161,6 +152,7 @@ struct JournalCopying {
       if (Result<void> on = left_out(state, names.error()); !on) return on;
     } else {
       for (const std::string& name : *names) {
+        if (name == kGenerationRegister || name == kIdRegister) continue;  // the copy has its own
         const auto value = state.source->find_register(name);
         if (value && *value) state.registers.emplace_back(name, **value);
         if (!value)
@@ -217,15 +209,12 @@ struct JournalCopying {
   }
 
   static Result<void> put_beside(JournalCopy::State& state) {
-    Result<void> done;
-    for (const auto& [name, value] : state.registers)
-      if (done) done = state.target->set_register(name, value);
-    for (const Person& person : state.people)
-      if (done) done = state.target->set_person(person);
-    if (!state.epochs) return done;
-    if (done) done = state.target->set_register(kRecoveredRegister, encode_number(state.copied.place.value));
-    if (done) done = state.target->set_register(kEpochRegister, encode_number(*state.epochs));
-    return done;
+    Journal::Registers registers = state.registers;
+    if (state.epochs) {
+      registers.emplace_back(kRecoveredRegister, encode_number(state.copied.place.value));
+      registers.emplace_back(kEpochRegister, encode_number(*state.epochs));
+    }
+    return state.target->set_beside(registers, state.people);
   }
 
   static Result<void> copy_checkpoint(JournalCopy::State& state, const Checkpoint& checkpoint) {
@@ -370,9 +359,9 @@ Result<void> delete_journals(const std::vector<fs::path>& files, Disk* given) {
       if (name != file.filename()) doomed.others.push_back(folder_of(file) / name);
     }
     if (!there) return failure(ErrorCode::not_found, "there is no journal " + file.string());
-    auto lock = take_lock(disk, file);
-    if (!lock) return tl::unexpected(lock.error());
-    doomed.lock = std::move(*lock);
+    auto lock = take_lock(disk, file, LockKind::exclusive);
+    if (!lock && lock.error().code != ErrorCode::not_found) return tl::unexpected(lock.error());
+    if (lock) doomed.lock = std::move(*lock);
     all.push_back(std::move(doomed));
   }
   for (Doomed& doomed : all) {
@@ -380,10 +369,8 @@ Result<void> delete_journals(const std::vector<fs::path>& files, Disk* given) {
     // checkpoints are gone, while a log without its file is nothing.
     const fs::path folder = folder_of(doomed.file);
     Result<void> done = disk.remove(doomed.file).and_then([&] { return disk.sync_folder(folder); });
-    std::ranges::sort(doomed.others, {}, [](const fs::path& other) { return other.string().ends_with(kLock); });
     for (const fs::path& other : doomed.others)
       if (done) done = disk.remove(other);
-    if (done) done = disk.remove(doomed.file.string() + std::string(kLock));  // which take_lock() may have made
     if (done) done = disk.sync_folder(folder);
     if (!done) return done;
     doomed.lock.reset();

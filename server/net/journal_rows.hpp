@@ -18,6 +18,9 @@ inline constexpr const char* kPeopleRegister = "people";
 // The one that has the key of what clients are told is safe.
 inline constexpr const char* kWitnessRegister = "witness key";
 
+// The name of the room, where it is no longer the one that it began with.
+inline constexpr const char* kNameRegister = "room name";
+
 // What a room began as: enough to make it again beside the case itself.
 struct RoomGenesis {
   Digest case_hash;

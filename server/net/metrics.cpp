@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "common/field/rejection.hpp"
+#include "server/journal/journal_file.hpp"
 #include "server/net/certificate.hpp"
 #include "server/net/host_port.hpp"
 #include "server/net/room_server.hpp"
@@ -79,7 +80,7 @@ class Page {
 
 double bytes_of(const fs::path& journal) {
   double bytes = 0;
-  for (const fs::path& file : {journal, fs::path(journal.string() + "-wal")}) {
+  for (const fs::path& file : {journal, wal_of(journal), log_of(journal), mirror_of(journal)}) {
     std::error_code failed;
     const std::uintmax_t size = fs::file_size(file, failed);
     if (!failed) bytes += static_cast<double>(size);

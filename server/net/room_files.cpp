@@ -13,7 +13,8 @@ namespace {
 namespace fs = std::filesystem;
 
 // Ends of names of files that are beside a journal, or not a whole one.
-constexpr std::array<std::string_view, 6> kNoJournals{"-wal", ".lock", ".failed", ".checkpoint", ".partial", ".copying"};
+constexpr std::array<std::string_view, 8> kNoJournals{"-wal",    "-log",        "-mirror",  ".lock",
+                                                      ".failed", ".checkpoint", ".partial", ".copying"};
 
 Disk& or_system(Disk* disk) { return disk != nullptr ? *disk : system_disk(); }
 
@@ -22,7 +23,9 @@ Disk& or_system(Disk* disk) { return disk != nullptr ? *disk : system_disk(); }
 tl::unexpected<Error> given_up(const std::string& what) { return failure(ErrorCode::cancelled, what + " was given up"); }
 
 Result<std::unique_ptr<DiskLock>> lock_rooms(const fs::path& folder, Disk* disk) {
-  return or_system(disk).lock(folder / "open-rooms.lock").map_error([&](Error error) {
+  const fs::path file = folder / "open-rooms.lock";
+  if (const auto made = or_system(disk).open(file); !made) return tl::unexpected(made.error());
+  return or_system(disk).lock(file, LockKind::exclusive).map_error([&](Error error) {
     if (error.code == ErrorCode::exists)
       error.message = "the folder --rooms " + folder.string() +
                       " is another osteon-server's, which runs; end that one first, or give this one a folder of its own";
@@ -36,6 +39,23 @@ Result<RoomGenesis> peek_genesis(const fs::path& file, Disk* disk) {
   Result<RoomGenesis> genesis = genesis_from_bytes(peeked->genesis());
   if (!genesis) return failure(genesis.error().code, file.string() + ": " + genesis.error().message);
   return genesis;
+}
+
+Result<std::string> room_name(Journal& journal) {
+  const Result<std::optional<std::string>> renamed = journal.find_register(kNameRegister);
+  if (!renamed) return tl::unexpected(renamed.error());
+  if (*renamed) return **renamed;
+  return genesis_from_bytes(journal.genesis()).map([](const RoomGenesis& genesis) { return genesis.room; });
+}
+
+Result<void> check_room_name(Journal& journal, const fs::path& file, const std::string& name) {
+  const Result<std::string> own = room_name(journal);
+  if (!own) return tl::unexpected(own.error());
+  if (*own == name) return {};
+  return failure(ErrorCode::invalid_input,
+                 file.string() + " holds the room " + *own + ", not " + name +
+                     "; give the file its name again, or rename the room: osteon-server rename-room " + file.string() +
+                     " " + name);
 }
 
 Result<void> check_whole(const Journal& journal, const std::string& option) {
@@ -67,22 +87,17 @@ Result<JournalCopy> begin_branch(Journal& from, const fs::path& to, RoomSeq plac
 
 Result<JournalHead> branch_journal(const fs::path& from, const fs::path& to, RoomSeq place, const std::string& name,
                                    const UpkeepCalls& calls, Disk* disk) {
-  Result<Journal> journal = Journal::open(from, {.disk = disk});
+  Result<Journal> journal = Journal::open_to_read(from, disk);
   if (!journal) return tl::unexpected(journal.error());
-  Result<JournalHead> made = [&]() -> Result<JournalHead> {
-    Result<JournalCopy> copy = begin_branch(*journal, to, place, name);
-    if (!copy) return tl::unexpected(copy.error());
-    for (Result<bool> done = false; !*done;) {
-      if (calls.stop && calls.stop()) return given_up("the branch " + to.string());
-      done = copy->step();
-      if (!done) return tl::unexpected(done.error());
-      if (calls.progress) calls.progress(copy->fraction());
-    }
-    return copy->head();
-  }();
-  const Result<void> closed = journal->close();
-  if (made && !closed) return tl::unexpected(closed.error());
-  return made;
+  Result<JournalCopy> copy = begin_branch(*journal, to, place, name);
+  if (!copy) return tl::unexpected(copy.error());
+  for (Result<bool> done = false; !*done;) {
+    if (calls.stop && calls.stop()) return given_up("the branch " + to.string());
+    done = copy->step();
+    if (!done) return tl::unexpected(done.error());
+    if (calls.progress) calls.progress(copy->fraction());
+  }
+  return copy->head();
 }
 
 Result<std::vector<RoomFile>> branches_of(const fs::path& folder, const fs::path& file, const HasHead& has, Disk* given) {

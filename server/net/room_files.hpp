@@ -55,6 +55,13 @@ struct RoomFile {
 [[nodiscard]] Result<std::vector<std::filesystem::path>> delete_room(const std::filesystem::path& file, bool branches,
                                                                      Disk* disk = nullptr);
 
+// The name that a journal's room has now. Errors: those of reading it.
+[[nodiscard]] Result<std::string> room_name(Journal& journal);
+// Holds the room in a journal against the name that its file has. Error invalid_input: it is another room's, with both
+// names and what to do.
+[[nodiscard]] Result<void> check_room_name(Journal& journal, const std::filesystem::path& file,
+                                           const std::string& name);
+
 // Error: the journal is closed to rows, so that nobody can say that these are all it had. `option` is how a place is asked for
 // instead, up to which it is confirmed.
 [[nodiscard]] Result<void> check_whole(const Journal& journal, const std::string& option);

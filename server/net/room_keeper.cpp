@@ -101,8 +101,15 @@ Result<KeptRoom> RoomKeeper::open(const std::filesystem::path& file, const Case&
   if (!journal) return tl::unexpected(journal.error());
   Result<RoomGenesis> genesis = genesis_from_bytes(journal->genesis());
   if (!genesis) return failure(genesis.error().code, file.string() + ": " + genesis.error().message);
+  if (const Result<void> named = check_room_name(*journal, file, options.name); !named) {
+    (void)journal->close();
+    return tl::unexpected(named.error());
+  }
+  genesis->room = options.name;  // which it may have been given since
   std::unique_ptr<RoomKeeper> keeper(new RoomKeeper(file, std::move(*journal), std::move(*genesis), bone.pitch_mm(),
                                                     options.journal.disk != nullptr ? *options.journal.disk : system_disk()));
+  for (const std::string& repair : keeper->journal_->repairs())
+    log::warn("journal repaired its log", {{"file", file.string()}, {"reason", repair}});
   if (const Error* closed = keeper->journal_->closed_because())
     log::warn("journal takes no rows", {{"file", file.string()}, {"reason", closed->message}});
   else if (Result<std::uint64_t> epoch = keeper->journal_->next_server_epoch(); epoch)
@@ -195,8 +202,8 @@ Result<std::uint32_t> RoomKeeper::person(const std::string& label) {
     if (!given) return tl::unexpected(given.error());
     if (*given) newest = std::max(newest, static_cast<std::uint32_t>(std::stoul(**given)));
     const std::string pseudonym = std::to_string(newest + 1);
-    if (Result<void> set = journal.set_register(kPeopleRegister, pseudonym); !set) return tl::unexpected(set.error());
-    if (Result<void> set = journal.set_person({pseudonym, label, today_()}); !set) return tl::unexpected(set.error());
+    const Result<void> set = journal.set_beside({{kPeopleRegister, pseudonym}}, {{pseudonym, label, today_()}});
+    if (!set) return tl::unexpected(set.error());
     return newest + 1;
   });
 }

@@ -501,7 +501,7 @@ Result<RoomGenesis> Rooms::read(const std::string& name, RoomSeq to, const std::
   const std::lock_guard changing(changing_);
   const Result<fs::path> file = kept_file(name);
   if (!file) return tl::unexpected(file.error());
-  Result<Journal> journal = Journal::open(*file);
+  Result<Journal> journal = Journal::open_to_read(*file);
   if (!journal) return tl::unexpected(journal.error());
   Result<RoomGenesis> genesis = genesis_from_bytes(journal->genesis());
   Result<void> sound;
@@ -511,7 +511,6 @@ Result<RoomGenesis> Rooms::read(const std::string& name, RoomSeq to, const std::
     if (!one) sound = tl::unexpected(one.error());
     return one && take(*one);
   });
-  (void)journal->close();
   if (!sound) return tl::unexpected(sound.error());
   if (!read) return tl::unexpected(read.error());
   return genesis;

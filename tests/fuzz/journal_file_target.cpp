@@ -35,12 +35,13 @@ void append(Journal& journal, std::size_t from, std::size_t to) {
 // With a checkpoint; its last rows in SQLite's log where it was not `closed`. Small pages keep it small.
 MemoryDisk::Image a_journal(bool closed) {
   MemoryDisk disk(1, 512);
-  Journal journal = std::move(Journal::create(kFile, kGenesis, {.disk = &disk, .page_bytes = 512}).value());
+  Journal journal =
+      std::move(Journal::create(kFile, kGenesis, {.disk = &disk, .log_bytes = 2000, .page_bytes = 512}).value());
   append(journal, 0, 6);
   auto file = journal.begin_checkpoint(journal.head(), "meta");
   OSTEON_CHECK(file && file->write("the room at place 6") && file->finish() && journal.add_checkpoint(std::move(*file)));
   OSTEON_CHECK(journal.close().has_value());
-  journal = std::move(Journal::open(kFile, {.disk = &disk}).value());
+  journal = std::move(Journal::open(kFile, {.disk = &disk, .log_bytes = 2000}).value());
   append(journal, 6, 8);
   append(journal, 8, kRows);
   if (closed) OSTEON_CHECK(journal.close().has_value());
@@ -100,12 +101,12 @@ void open_any_journal(std::span<const std::uint8_t> data) {
     OSTEON_CHECK(recovered->head.place.value <= kRows && (!is_sound || recovered->lost() == 0));
     const Result<VerifyReport> now = verify_journal(kRecovered, &disk);
     OSTEON_CHECK(now && now->sound());
-    Result<Journal> journal = Journal::open(kRecovered, {.disk = &disk});
+    Result<Journal> journal = Journal::open(kRecovered, {.disk = &disk, .log_bytes = 2000});
     OSTEON_CHECK(journal && journal->closed_because() == nullptr && journal->head() == recovered->head);
     expect_prefix(*journal);
   }
   disk.load(image);
-  if (Result<Journal> journal = Journal::open(kFile, {.disk = &disk})) {
+  if (Result<Journal> journal = Journal::open(kFile, {.disk = &disk, .log_bytes = 2000})) {
     OSTEON_CHECK(report && (journal->closed_because() == nullptr || !is_sound));
     expect_prefix(*journal);
   } else {

@@ -1,8 +1,11 @@
 // A room in a journal, as processes see it: killed servers, a stop and a start, files that are none.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <csignal>
 #include <fstream>
+#include <map>
+#include <sstream>
 
 #include "common/volume/field_file.hpp"
 #include "tests/integration/killed_servers.hpp"
@@ -154,6 +157,94 @@ void expect_refused(const std::vector<std::string>& arguments, const std::vector
   EXPECT_FALSE(server.timed_out);
   EXPECT_NE(server.exit_code, 0);
   for (const std::string& word : words) EXPECT_NE(server.err.find(word), std::string::npos) << word << " in " << server.err;
+}
+
+std::map<std::string, std::string> bytes_in(const std::filesystem::path& folder) {
+  std::map<std::string, std::string> all;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    std::ostringstream bytes;
+    bytes << std::ifstream(entry.path(), std::ios::binary).rdbuf();
+    all[entry.path().filename().string()] = std::move(bytes).str();
+  }
+  return all;
+}
+
+// Whoever works on the journal of a running server, also after removing what looks like a lock, changes nothing and is
+// told.
+TEST(Kept, AnotherProgramOnTheJournalOfARunningServerIsRefused) {
+  TempDir folder;
+  const std::filesystem::path kept = folder / "kept", file = kept / "room.journal", to = folder / "new";
+  std::filesystem::create_directory(kept);
+  Stage stage(12.0, {"--journal", file.string()});
+  Surgeon hand(stage.address(), folder / "cache");
+  ASSERT_TRUE(wait_until([&] { return hand.complete(); }, kPatience));
+  const auto cut = [&](std::uint64_t number) {
+    Cut one = straight_cut(find_tool("burr-round-5").value(), {-4.0 + static_cast<double>(number), 0, 0},
+                           {-4.0 + static_cast<double>(number), 0, 0}, {0, 0, -1}, number);
+    one.author = hand.author();
+    return hand.session().send(one) && wait_until([&] { return hand.own() == number; }, kPatience);
+  };
+  ASSERT_TRUE(cut(1));
+  std::filesystem::remove(file.string() + ".lock");
+  const auto before = bytes_in(kept);
+  const std::string bone = (stage / "case").string();
+  for (const std::vector<std::string>& command :
+       std::vector<std::vector<std::string>>{{"verify", file},
+                                             {"recover", file, to},
+                                             {"backup", file, to},
+                                             {"migrate", file, to},
+                                             {"branch", file, to},
+                                             {"replay", file, "--case", bone},
+                                             {"export", file, to},
+                                             {"people", file},
+                                             {"forget", file, "--older-than", "1"},
+                                             {"rename-room", file, "other"},
+                                             {"delete", file, "--alone"},
+                                             {"--case", bone, "--journal", file}}) {
+    const RunResult other = run(program("osteon-server"), command, 30s);
+    EXPECT_NE(other.exit_code, 0) << command.front();
+    EXPECT_NE(other.err.find("room.journal is in use by another process"), std::string::npos) << other.err;
+    EXPECT_FALSE(std::filesystem::exists(to)) << command.front();
+  }
+  EXPECT_EQ(bytes_in(kept), before);
+  ASSERT_TRUE(cut(2));
+  const std::string bytes = status_of(hand.session().room()).field_hash();
+  Digest hash;
+  ASSERT_EQ(bytes.size(), hash.bytes.size());
+  std::ranges::copy(bytes, hash.bytes.begin());
+  stage.server().signal(SIGKILL);
+  ASSERT_TRUE(stage.server().wait(10s).has_value());
+  const RunResult replayed = run(program("osteon-server"), {"replay", file, "--case", bone}, 60s);
+  EXPECT_EQ(replayed.exit_code, 0) << replayed.err;
+  EXPECT_NE(replayed.out.find(to_hex(hash)), std::string::npos) << replayed.out;
+}
+
+// Two rooms of one case, whose files somebody has exchanged.
+TEST(Kept, ARoomIsServedOnlyUnderItsOwnName) {
+  TempDir folder;
+  const std::filesystem::path kept = folder / "rooms", a = kept / "anna.journal", b = kept / "berta.journal";
+  Stage stage(12.0, {"--rooms", kept.string()});
+  for (const char* name : {"anna", "berta"}) ASSERT_NE(rooms(stage, {"create", name}).find(name), std::string::npos);
+  ASSERT_EQ(stage.server().terminate(), 0) << stage.server().err();
+  std::filesystem::rename(a, folder / "aside");
+  std::filesystem::rename(b, a);
+  std::filesystem::rename(folder / "aside", b);
+
+  const std::string bone = (stage / "case").string();
+  expect_refused({"--case", bone, "--journal", a.string()},
+                 {a.string() + " holds the room berta, not anna", "osteon-server rename-room " + a.string() + " anna"});
+  stage.start_server({"--rooms", kept.string()});
+  const RunResult opened = run(program("osteon-server"), {"rooms", "open", "anna", "--server", stage.address()}, 30s);
+  EXPECT_NE(opened.exit_code, 0);
+  EXPECT_NE((opened.err + stage.server().err()).find("holds the room berta, not anna"), std::string::npos)
+      << opened.err;
+  ASSERT_EQ(stage.server().terminate(), 0);
+  EXPECT_EQ(run(program("osteon-server"), {"rename-room", a.string(), "anna"}, 30s).exit_code, 0);
+  stage.start_server({"--rooms", kept.string()});
+  const std::string list = rooms(stage, {"list"});
+  EXPECT_NE(list.find("anna                 open"), std::string::npos) << list;
+  EXPECT_NE(list.find("berta                closed"), std::string::npos) << list;
+  ASSERT_EQ(stage.server().terminate(), 0);
 }
 
 TEST(Kept, SaysWhatIsWrongWithAJournal) {

@@ -94,7 +94,8 @@ std::map<std::string, std::uint64_t> journal_bytes(const fs::path& folder) {
     const std::string name = entry.path().filename();
     const std::uint64_t size = entry.file_size(gone);
     if (gone) continue;
-    bytes[name.ends_with("-wal") ? "log" : name.ends_with(".journal") ? "database" : "checkpoints"] += size;
+    const bool of_log = name.ends_with("-wal") || name.ends_with("-log") || name.ends_with("-mirror");
+    bytes[of_log ? "log" : name.ends_with(".journal") ? "database" : "checkpoints"] += size;
   }
   return bytes;
 }

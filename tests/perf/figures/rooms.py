@@ -1,6 +1,9 @@
 """Figures of a room that loses nothing: simulated rooms, journals on failing disks, killed servers, bad networks, forgers and
 many observers. All hands are simulated; networks are simulated, or impaired on this machine."""
 import json
+import os
+
+import numpy as np
 
 from registry import Measured
 
@@ -59,18 +62,46 @@ def simulated_broken(run):
 
 
 def journal(run):
-    seeds, operations = (20_000, 1000) if run.soak else (2000, 1000)
+    seeds, operations, damages = (20_000, 1000, 100_000) if run.soak else (2000, 1000, 10_000)
     run.say("journals on failing disks")
-    out = json.loads(run.output("osteon-journal-trials", seeds, operations))
+    out = json.loads(run.output("osteon-journal-trials", seeds, operations, damages))
     run.tables.append(("Journals on a disk that forgets", [(name, json.dumps(tally)) for name, tally in out.items()]))
-    durable = [tally for name, tally in out.items() if name != "not_durable"]
+    durable = [out[name] for name in ("power_loss", "full_disk", "failing_disk", "forgotten_sync")]
+    killed = [out[name] for name in ("kills", "power_failures")]
     return {
         "journal_trials": (sum(tally["trials"] for tally in durable), None),
         "journal_acknowledged": (sum(tally["acknowledged"] for tally in durable), None),
         "journal_lost": (sum(tally["lost"] for tally in durable), None),
         "journal_bad_trials": (sum(tally["bad_trials"] for tally in durable), None),
         "journal_not_durable_lost": (out["not_durable"]["lost"], None),
+        "journal_damage_trials": (out["damage"]["trials"], None),
+        "journal_damage_silent": (out["damage"]["silent"], None),
+        "journal_damage_only_log_silent": (out["damage_only_log"]["silent"], None),
+        "journal_kill_trials": (sum(tally["trials"] for tally in killed), None),
+        "journal_false_alarms": (sum(tally["called_damaged"] + tally["silent"] for tally in killed), None),
     }
+
+
+def journal_commits(run):
+    """In turns with an earlier osteon-journal-commits, if OSTEON_EARLIER_JOURNAL names one."""
+    earlier = os.environ.get("OSTEON_EARLIER_JOURNAL")
+    programs = {"now": "osteon-journal-commits"} | ({"before": earlier} if earlier else {})
+    values, rows = {}, []
+    for per_commit in (1, 4):
+        run.say(f"commits of {per_commit} rows")
+        found = {which: [] for which in programs}
+        for turn in range(15 if run.soak else 7):
+            for which, program in programs.items():
+                file = run.folder / f"commits-{which}-{per_commit}-{turn}"
+                found[which].append(json.loads(run.output(program, file, 8000, per_commit)))
+        middle = {which: {key: float(np.median([out[key] for out in outs])) for key in outs[0]}
+                  for which, outs in found.items()}
+        rows += [(f"{which}, {per_commit} a commit", json.dumps(keys)) for which, keys in middle.items()]
+        for name, key in (("p50", "p50_us"), ("p99", "p99_us"), ("bytes", "with_close")):
+            now, before = middle["now"][key], middle.get("before", {}).get(key)
+            values[f"journal_commit_{name}_{per_commit}"] = (now / before if before else None, before)
+    run.tables.append(("Commits of rows of 150 bytes", rows))
+    return values
 
 
 def server_kills(run):
@@ -236,5 +267,6 @@ def override(run):
 
 GROUPS = {"override": override,
           "simulated": simulated, "simulated_full": simulated_full, "simulated_broken": simulated_broken, "journal": journal,
+          "journal_commits": journal_commits,
           "server_kills": server_kills, "bad_network": bad_network, "felt_stages": felt_stages, "uplink": uplink,
           "rooms_per_core": rooms_per_core, "forgery": forgery, "observers": observers}

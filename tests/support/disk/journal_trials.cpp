@@ -51,11 +51,12 @@ JournalHead plain_head(const std::string& genesis, const std::vector<JournalRow>
   return head;
 }
 
-JournalWriter::JournalWriter(std::uint64_t seed, MemoryDisk& disk, bool durable) : random_(seed), disk_(disk) {
+JournalWriter::JournalWriter(std::uint64_t seed, MemoryDisk& disk, bool durable, std::string genesis)
+    : random_(seed), disk_(disk), genesis_(std::move(genesis)) {
   options_.disk = &disk;
   options_.durable = durable;
   options_.page_bytes = disk.sector_bytes() < 4096 && below(2) == 0 ? 1024 : 4096;
-  options_.most_log_bytes = 4096 << below(6);  // so that the log is carried into the file every few rows
+  options_.log_bytes = 4096 << below(6);  // so that the log is carried into the file every few rows
 }
 
 bool JournalWriter::open() {

@@ -19,7 +19,7 @@ namespace osteon::test {
 // Someone who writes to a journal all that can be written, and knows what was promised.
 class JournalWriter {
  public:
-  JournalWriter(std::uint64_t seed, MemoryDisk& disk, bool durable = true);
+  JournalWriter(std::uint64_t seed, MemoryDisk& disk, bool durable = true, std::string genesis = "a genesis");
 
   // Makes the journal, or opens it. False: the disk failed meanwhile. Faults that it must not have are noted.
   bool open();
@@ -37,6 +37,7 @@ class JournalWriter {
   [[nodiscard]] bool is_open() const { return journal_.has_value(); }
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
   [[nodiscard]] const std::vector<JournalRow>& acknowledged() const { return acknowledged_; }
+  [[nodiscard]] const std::vector<JournalRow>& asked() const { return asked_; }  // of an append that failed
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
   [[nodiscard]] std::uint64_t kept_unasked() const { return kept_unasked_; }  // rows that were not acknowledged, yet are there
   [[nodiscard]] const std::vector<std::string>& faults() const { return faults_; }
@@ -51,7 +52,7 @@ class JournalWriter {
   MemoryDisk& disk_;
   JournalOptions options_;
   std::filesystem::path file_ = "/room/journal";
-  std::string genesis_ = "a genesis";
+  std::string genesis_;
   std::optional<Journal> journal_;
   bool made_ = false;
   std::vector<JournalRow> acknowledged_, asked_;  // asked: the batch in whose midst the disk failed

@@ -20,7 +20,8 @@ std::string name_of(const fs::path& file) { return file.lexically_normal().strin
 
 tl::unexpected<Error> cannot(const char* what, const fs::path& file, int reason) {
   return failure(reason == ENOENT ? ErrorCode::not_found : ErrorCode::internal,
-                 "cannot " + std::string(what) + " " + file.string() + ": " + std::generic_category().message(reason));
+                 "cannot " + std::string(what) + " " + file.string() + ": " + std::generic_category().message(reason) +
+                     std::string(remedy_of(reason)));
 }
 
 Result<void> done_or(int reason, const char* what, const fs::path& file) {
@@ -34,6 +35,8 @@ struct MemoryDisk::Content {
   std::string seen;              // what reading gives
   std::string kept;              // what is on the disk
   std::set<std::size_t> waiting; // sectors written since they were last synced
+  int exclusive = 0, shared = 0; // locks held since `boot`
+  std::uint64_t boot = 0;
 
   void mark(std::size_t sector_bytes, std::uint64_t from, std::uint64_t to) {
     if (from >= to) return;
@@ -348,7 +351,7 @@ void MemoryDisk::power_returns() {
   changes_.clear();
   names_ = synced_names_;
   for (const auto& [name, content] : names_) lose_power(*content);
-  locks_.clear();
+  ++boots_;
   off_ = false;
   mend();
 }
@@ -410,6 +413,9 @@ class MemoryDisk::OpenFile final : public DiskFile {
   Result<void> write(std::string_view piece) override {
     return done_or(disk_.write_at(*content_, content_->seen.size(), piece), "write", file_);
   }
+  Result<void> write_at(std::uint64_t from, std::string_view piece) override {
+    return done_or(disk_.write_at(*content_, from, piece), "write", file_);
+  }
   Result<void> sync() override { return done_or(disk_.sync(*content_), "sync", file_); }
 
  private:
@@ -420,16 +426,38 @@ class MemoryDisk::OpenFile final : public DiskFile {
 
 class MemoryDisk::HeldLock final : public DiskLock {
  public:
-  HeldLock(MemoryDisk& disk, std::string name, std::uint64_t number) : disk_(disk), name_(std::move(name)), number_(number) {}
-  ~HeldLock() override {
-    const auto held = disk_.locks_.find(name_);
-    if (held != disk_.locks_.end() && held->second == number_) disk_.locks_.erase(held);
+  HeldLock(Contents content, LockKind kind) : content_(std::move(content)), kind_(kind), boot_(content_->boot) {
+    ++count();
   }
+  ~HeldLock() override {
+    if (content_->boot == boot_) --count();
+  }
+  HeldLock(const HeldLock&) = delete;
+  HeldLock& operator=(const HeldLock&) = delete;
+
+ private:
+  int& count() { return kind_ == LockKind::exclusive ? content_->exclusive : content_->shared; }
+  Contents content_;
+  LockKind kind_;
+  std::uint64_t boot_;
+};
+
+class MemoryDisk::Scratch final : public ScratchFolder {
+ public:
+  Scratch(MemoryDisk& disk, fs::path path) : disk_(disk), path_(std::move(path)) {}
+  ~Scratch() override {
+    const auto inside = [&](const auto& file) { return folder_of(file.first) == path_; };
+    std::erase_if(disk_.names_, inside);
+    std::erase_if(disk_.synced_names_, inside);
+    std::erase_if(disk_.changes_, [&](const auto& change) { return inside(change.front()); });
+  }
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  [[nodiscard]] const fs::path& path() const override { return path_; }
 
  private:
   MemoryDisk& disk_;
-  std::string name_;
-  std::uint64_t number_;
+  fs::path path_;
 };
 
 Result<std::unique_ptr<DiskFile>> MemoryDisk::create(const fs::path& file) {
@@ -444,6 +472,17 @@ Result<std::unique_ptr<DiskFile>> MemoryDisk::create(const fs::path& file) {
   return std::make_unique<OpenFile>(*this, file, std::move(content));
 }
 
+Result<std::unique_ptr<DiskFile>> MemoryDisk::open(const fs::path& file) {
+  if (off_) return cannot("open", file, EIO);
+  const std::string name = name_of(file);
+  Contents content = find(name);
+  if (!content) {
+    content = std::make_shared<Content>();
+    if (const int reason = change_names({{name, content}})) return cannot("open", file, reason);
+  }
+  return std::make_unique<OpenFile>(*this, file, std::move(content));
+}
+
 Result<std::string> MemoryDisk::read(const fs::path& file, std::uint64_t from, std::size_t most) {
   if (off_) return cannot("read", file, EIO);
   const Contents content = find(name_of(file));
@@ -451,11 +490,11 @@ Result<std::string> MemoryDisk::read(const fs::path& file, std::uint64_t from, s
   return from < content->seen.size() ? content->seen.substr(from, most) : std::string();
 }
 
-Result<std::optional<std::uint64_t>> MemoryDisk::size(const fs::path& file) {
+Result<std::optional<FileIdentity>> MemoryDisk::identity(const fs::path& file) {
   if (off_) return cannot("look at", file, EIO);
   const Contents content = find(name_of(file));
   if (!content) return std::nullopt;
-  return content->seen.size();
+  return FileIdentity{0, reinterpret_cast<std::uintptr_t>(content.get()), content->seen.size()};
 }
 
 Result<void> MemoryDisk::rename(const fs::path& from, const fs::path& to) {
@@ -480,11 +519,20 @@ Result<std::vector<std::string>> MemoryDisk::list(const fs::path& folder) {
   return names;
 }
 
-Result<std::unique_ptr<DiskLock>> MemoryDisk::lock(const fs::path& file) {
+Result<std::unique_ptr<DiskLock>> MemoryDisk::lock(const fs::path& file, LockKind kind) {
   if (off_) return cannot("lock", file, EIO);
-  const std::string name = name_of(file);
-  if (!locks_.emplace(name, last_lock_ + 1).second) return failure(ErrorCode::exists, name + " is held by another process");
-  return std::make_unique<HeldLock>(*this, name, ++last_lock_);
+  Contents content = find(name_of(file));
+  if (!content) return cannot("open", file, ENOENT);
+  if (content->boot != boots_) content->exclusive = content->shared = 0;
+  content->boot = boots_;
+  if (content->exclusive != 0 || (kind == LockKind::exclusive && content->shared != 0))
+    return failure(ErrorCode::exists, file.string() + " is held by another process");
+  return std::make_unique<HeldLock>(std::move(content), kind);
+}
+
+Result<std::unique_ptr<ScratchFolder>> MemoryDisk::scratch_folder() {
+  if (off_) return cannot("make a folder in", "/scratch", EIO);
+  return std::make_unique<Scratch>(*this, "/scratch/" + std::to_string(++scratches_));
 }
 
 }  // namespace osteon::test

@@ -25,13 +25,15 @@ class MemoryDisk final : public Disk {
   MemoryDisk& operator=(const MemoryDisk&) = delete;
 
   Result<std::unique_ptr<DiskFile>> create(const std::filesystem::path& file) override;
+  Result<std::unique_ptr<DiskFile>> open(const std::filesystem::path& file) override;
   Result<std::string> read(const std::filesystem::path& file, std::uint64_t from, std::size_t most) override;
-  Result<std::optional<std::uint64_t>> size(const std::filesystem::path& file) override;
+  Result<std::optional<FileIdentity>> identity(const std::filesystem::path& file) override;
   Result<void> rename(const std::filesystem::path& from, const std::filesystem::path& to) override;
   Result<void> remove(const std::filesystem::path& file) override;
   Result<void> sync_folder(const std::filesystem::path& folder) override;
   Result<std::vector<std::string>> list(const std::filesystem::path& folder) override;
-  Result<std::unique_ptr<DiskLock>> lock(const std::filesystem::path& file) override;
+  Result<std::unique_ptr<DiskLock>> lock(const std::filesystem::path& file, LockKind kind) override;
+  Result<std::unique_ptr<ScratchFolder>> scratch_folder() override;
   std::string vfs() const override;
 
   // Faults. They count from now, 1 being the next; `error` is an errno value: EIO, ENOSPC.
@@ -68,6 +70,7 @@ class MemoryDisk final : public Disk {
   friend struct Sqlite;
   class OpenFile;
   class HeldLock;
+  class Scratch;
   struct Fault {
     std::uint64_t at = 0;  // counted down; 0: none
     int error = 0;
@@ -92,8 +95,8 @@ class MemoryDisk final : public Disk {
   std::map<std::string, Contents> names_, synced_names_;
   // Not yet synced, oldest first: what these names stand for since (null: nothing), all at once.
   std::vector<std::vector<std::pair<std::string, Contents>>> changes_;
-  std::map<std::string, std::uint64_t> locks_;
-  std::uint64_t last_lock_ = 0;
+  std::uint64_t boots_ = 0;  // locks end with the power
+  std::uint64_t scratches_ = 0;
   Fault fault_, write_fault_, sync_fault_, power_fault_;
   bool off_ = false, failed_ = false;
   int open_files_ = 0;

@@ -92,7 +92,7 @@ TEST(MemoryDisk, FailsWhereItIsTold) {
   EXPECT_TRUE((*file)->write("1"));
   const auto full = (*file)->write("2");
   ASSERT_FALSE(full);
-  EXPECT_EQ(full.error().message, "cannot write /a/file: No space left on device");
+  EXPECT_EQ(full.error().message, "cannot write /a/file: No space left on device; make room on the disk");
   EXPECT_TRUE(disk.has_failed());
   EXPECT_TRUE((*file)->write("3"));
   disk.fail_at(3, EIO, MemoryDisk::Lasting::from_then_on);
@@ -145,11 +145,37 @@ void keep_promises(Disk& disk, const std::filesystem::path& folder) {
   });
   EXPECT_EQ(all, "abc");
   EXPECT_EQ(read->size, 3u);
-  auto held = disk.lock(folder / "lock");
+  EXPECT_EQ(disk.lock(folder / "none", LockKind::exclusive).error().code, ErrorCode::not_found);
+  {
+    auto opened = disk.open(folder / "file");
+    ASSERT_TRUE(opened && (*opened)->write_at(1, "X") && (*opened)->write_at(4, "e") && (*opened)->sync());
+    EXPECT_EQ(disk.read(folder / "file", 0, 9).value(), std::string("aXc\0e", 5));
+  }
+  const auto identity = disk.identity(folder / "file").value();
+  ASSERT_TRUE(identity);
+  EXPECT_EQ(identity->size, 5u);
+  auto held = disk.lock(folder / "file", LockKind::exclusive);
   ASSERT_TRUE(held);
-  EXPECT_EQ(disk.lock(folder / "lock").error().code, ErrorCode::exists);
+  for (const LockKind kind : {LockKind::exclusive, LockKind::shared})
+    EXPECT_EQ(disk.lock(folder / "file", kind).error().code, ErrorCode::exists);
+  ASSERT_TRUE(disk.rename(folder / "file", folder / "renamed"));
+  EXPECT_TRUE(disk.identity(folder / "renamed").value()->same_file(*identity));
+  EXPECT_EQ(disk.lock(folder / "renamed", LockKind::shared).error().code, ErrorCode::exists)
+      << "the file is locked, not its name";
   held->reset();
-  EXPECT_TRUE(disk.lock(folder / "lock"));
+  const auto one = disk.lock(folder / "renamed", LockKind::shared),
+             two = disk.lock(folder / "renamed", LockKind::shared);
+  EXPECT_TRUE(one && two);
+  EXPECT_EQ(disk.lock(folder / "renamed", LockKind::exclusive).error().code, ErrorCode::exists);
+  std::filesystem::path scratch;
+  {
+    const auto made = disk.scratch_folder();
+    ASSERT_TRUE(made);
+    scratch = (*made)->path();
+    write(disk, scratch / "inside", "x", true);
+    EXPECT_EQ(disk.size(scratch / "inside").value(), 1u);
+  }
+  EXPECT_EQ(disk.size(scratch / "inside").value(), std::nullopt);
 }
 
 TEST(Disks, KeepTheSamePromises) {
@@ -166,7 +192,8 @@ TEST(Disks, ALockWhoseFileIsRemovedByItsHolderIsStillHeldByOneAlone) {
   std::atomic<int> holders = 0, most = 0, held = 0;
   const auto take_turns = [&] {
     for (int i = 0; i < 5000; ++i) {
-      const auto lock = system_disk().lock(file);
+      if (!system_disk().open(file)) continue;
+      const auto lock = system_disk().lock(file, LockKind::exclusive);
       if (!lock) continue;
       most = std::max<int>(most, ++holders);
       ++held;

@@ -2,8 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <csignal>
+#include <algorithm>
 #include <cstdio>
+#include <fstream>
 #include <random>
+#include <sstream>
 #include <thread>
 
 #include "server/journal/upkeep.hpp"
@@ -17,7 +20,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr int kKills = 100;
+constexpr int kKills = 100, kDamages = 200;
 constexpr int kKillsPerJournal = 20;
 
 // The place in the last whole line of what it printed.
@@ -76,6 +79,70 @@ TEST(JournalKill, LosesNoAcknowledgedRowAndLetsTheNextOneIn) {
   }
   std::printf("%d kills, %lu rows acknowledged, %lu found, 0 lost\n", kKills, acknowledged, acknowledged + kept);
   EXPECT_GT(acknowledged, 5u * kKills);
+}
+
+// What a breaker does to one file, chosen by `random`. Gives what it was.
+std::string damage(const std::filesystem::path& file, std::mt19937_64& random) {
+  std::string bytes;
+  {
+    std::ostringstream all;
+    all << std::ifstream(file, std::ios::binary).rdbuf();
+    bytes = std::move(all).str();
+  }
+  const std::size_t at = bytes.empty() ? 0 : random() % bytes.size();
+  const std::size_t count = std::min<std::size_t>(1 + random() % 5000, bytes.size() - at);
+  std::string done;
+  switch (random() % 5) {
+    case 0:
+      if (!bytes.empty()) bytes[at] = static_cast<char>(bytes[at] ^ (1 << random() % 8));
+      done = "flip";
+      break;
+    case 1: bytes.replace(at, count, std::string(count, '\0')), done = "zero"; break;
+    case 2: bytes.resize(at), done = "truncate"; break;
+    case 3:
+      bytes.replace(at, count, bytes.substr(random() % (bytes.size() - count + 1), count)), done = "duplicate";
+      break;
+    default: std::filesystem::remove(file); return "delete";
+  }
+  std::ofstream(file, std::ios::binary | std::ios::trunc) << bytes;
+  return done;
+}
+
+// The oracle is what the killed process had printed.
+TEST(JournalKill, DamageAfterItIsHarmlessOrNamed) {
+  std::mt19937_64 random(2);
+  int whole = 0, named = 0, refused = 0;
+  for (int trial = 0; trial < kDamages; ++trial) {
+    const test::TempDir folder;
+    const std::filesystem::path file = folder / "journal";
+    test::Process writer(test::program("journal_kill_writer"), {file.string(), std::to_string(random())});
+    for (std::uint64_t i = 1 + random() % 40; i > 0; --i) ASSERT_TRUE(writer.read_line(60s)) << writer.err();
+    std::this_thread::sleep_for(std::chrono::microseconds(random() % 2000));
+    writer.signal(SIGKILL);
+    ASSERT_EQ(writer.wait(60s), 128 + SIGKILL);
+    const std::uint64_t told = last_place(writer.out());
+
+    std::vector<std::filesystem::path> files;
+    for (const auto& entry : std::filesystem::directory_iterator(folder.path())) files.push_back(entry.path());
+    std::ranges::sort(files);
+    const std::filesystem::path chosen = files[random() % files.size()];
+    SCOPED_TRACE(damage(chosen, random) + " " + chosen.filename().string());
+    const auto report = verify_journal(file);
+    const auto journal = Journal::open(file);
+    if (!journal) {
+      ++refused;
+      ASSERT_FALSE(report && report->sound());
+    } else if (journal->closed_because() != nullptr) {
+      ++named;
+      ASSERT_FALSE(report && report->sound());
+    } else {
+      ++whole;
+      ASSERT_GE(journal->head().place.value, told);
+    }
+  }
+  std::printf("%d damages: %d harmless, %d named, %d refused, 0 silent\n", kDamages, whole, named, refused);
+  EXPECT_GT(whole, kDamages / 4);
+  EXPECT_GT(named + refused, kDamages / 20);
 }
 
 // Both at once: the holder of a journal is alive, then killed.

@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
   const std::filesystem::path file = argv[1];
   std::uint64_t random = std::strtoull(argv[2], nullptr, 10);
   JournalOptions options;
-  options.most_log_bytes = 200 << 10;  // so that it is carried into the file every now and then
+  options.log_bytes = 200 << 10;  // so that it is carried into the file every now and then
   auto journal = std::filesystem::exists(file) ? Journal::open(file, options) : Journal::create(file, "bone", options);
   if (!journal || journal->closed_because() != nullptr) {
     std::fprintf(stderr, "%s\n", journal ? journal->closed_because()->message.c_str() : journal.error().message.c_str());

@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <cstdio>
 
+#include "tests/support/disk/damage_trials.hpp"
 #include "tests/support/disk/journal_trials.hpp"
 
 namespace osteon::test {
@@ -63,6 +64,39 @@ TEST(JournalTrials, LosesNothingAcknowledgedWhereAFailedSyncWasForgotten) {
   expect_nothing_lost(tally);
   EXPECT_EQ(tally.failed, 1000u);
   EXPECT_EQ(tally.closed, 0u);
+}
+
+void show(const char* what, const DamageTally& tally) {
+  std::printf("%s: %lu trials, %lu rows acknowledged; %lu whole, %lu damage named, %lu refused, %lu silent, ", what,
+              tally.trials, tally.acknowledged, tally.whole, tally.named, tally.refused, tally.silent);
+  std::printf("%lu called damaged\n", tally.called_damaged);
+  for (const std::string& fault : tally.faults) std::printf("  %s\n", fault.c_str());
+}
+
+TEST(JournalTrials, DamageToAnyOneFileIsHarmlessOrNamed) {
+  const DamageTally tally = damage_trials(1, 2000);
+  show("damage", tally);
+  EXPECT_EQ(tally.silent, 0u) << tally.faults.front();
+  EXPECT_GT(tally.whole, tally.trials / 4);
+  EXPECT_GT(tally.named, tally.trials / 20);
+  EXPECT_GT(tally.refused, tally.trials / 20);
+}
+
+// The same trials must find it when one log is all that there is.
+TEST(JournalTrials, DamageToTheOnlyLogIsSilent) {
+  const DamageTally tally = damage_trials(1, 300, DamagedFiles::only_log_left);
+  show("damage, without a mirror", tally);
+  EXPECT_GT(tally.silent, 0u);
+}
+
+TEST(JournalTrials, NobodyCallsAKilledJournalDamaged) {
+  for (const bool power_fails : {false, true}) {
+    const DamageTally tally = kill_trials(30000, 1000, power_fails);
+    show(power_fails ? "power failures" : "kills", tally);
+    EXPECT_EQ(tally.called_damaged, 0u);
+    EXPECT_EQ(tally.silent, 0u);
+    EXPECT_GT(tally.acknowledged, tally.trials);
+  }
 }
 
 }  // namespace

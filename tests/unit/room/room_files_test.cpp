@@ -96,6 +96,30 @@ TEST(RoomFiles, APeekOnTheComputersDiskDisturbsNobody) {
   EXPECT_TRUE(verify_journal(file)->sound());
 }
 
+TEST_F(RoomFilesTest, ARoomIsOpenedOnlyUnderItsName) {
+  {
+    KeptCuts kept(kFile, &disk_, "femur");
+    kept.cut(5);
+    ASSERT_TRUE(kept.keeper->close());
+  }
+  RoomKeeper::Options options;
+  options.journal.disk = &disk_;
+  options.name = "tibia";
+  const auto refused = RoomKeeper::open(kFile, test_block(), options);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().message,
+            std::string(kFile) + " holds the room femur, not tibia; give the file its name again, or rename the room: "
+                                 "osteon-server rename-room " + kFile + " tibia");
+  {
+    Journal journal = std::move(Journal::open(kFile, {.disk = &disk_}).value());
+    ASSERT_TRUE(journal.set_register(kNameRegister, "tibia"));
+    ASSERT_TRUE(journal.close());
+  }
+  const auto renamed = RoomKeeper::open(kFile, test_block(), options);
+  ASSERT_TRUE(renamed) << renamed.error().message;
+  EXPECT_EQ(renamed->keeper->genesis().room, "tibia");
+}
+
 TEST_F(RoomFilesTest, WhoJoinedTooLongAgoIsForgotten) {
   std::int32_t today = 100;
   KeptCuts kept(kFile, &disk_, "femur");
@@ -224,7 +248,7 @@ TEST_F(FamilyTest, BranchesAreKnownByTheHistoryThatTheyName) {
 
 TEST_F(FamilyTest, DeletedWithItsBranchesNothingOfItIsLeft) {
   {
-    const KeptCuts used("/rooms/b11", &disk_, "");
+    const KeptCuts used("/rooms/b11", &disk_, "b11");
     const MemoryDisk::Image before = disk_.image();
     EXPECT_EQ(delete_room(kFile, true, &disk_).error().code, ErrorCode::exists);
     EXPECT_EQ(disk_.image(), before);

@@ -84,7 +84,7 @@ TEST_F(JournalCommands, AnExportReplacesNothing) {
   refused("export", {(dir_ / "link").string()}, {"already"});
   EXPECT_FALSE(there("elsewhere"));
   // What the next opening would take for its own.
-  for (const std::string end : {"-wal", ".failed", ".lock"}) {
+  for (const std::string end : {"-log", "-mirror", "-wal", ".failed", ".lock"}) {
     refused("export", {file_.string() + end}, {"give another name"});
     EXPECT_EQ(bytes_of(file_), whole_);
   }

@@ -1,0 +1,339 @@
+#include "server/journal/mirrored_log.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "common/core/check.hpp"
+#include "server/journal/log_bytes.hpp"
+
+namespace osteon {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A file is a first sector, which says what it belongs to, and entries one after the other. An entry is as long as it
+// needs to be: a torn write may spoil the sector in which the last one ends, and then the other file has that one.
+constexpr std::string_view kMagic = "OsteonL1";
+constexpr std::size_t kFirstSector = 4096, kSaltBytes = 16, kChainBytes = 32, kChecksumBytes = 16;
+constexpr std::size_t kStartBytes = kMagic.size() + kChainBytes + 2 * 8 + kChainBytes + kSaltBytes + kChecksumBytes;
+constexpr const char* kForeign = "belongs to another journal";
+constexpr std::size_t kEntryHead = kSaltBytes + 3 * 8 + kChainBytes;  // salt, bytes of rows, count, first place, chain
+
+std::string checksum(std::string_view bytes) {
+  Hasher hasher;
+  hasher.bytes(std::as_bytes(std::span(bytes)));
+  const Digest digest = hasher.finish();
+  return {reinterpret_cast<const char*>(digest.bytes.data()), kChecksumBytes};
+}
+
+std::string_view text_of(const Digest& digest) {
+  return {reinterpret_cast<const char*>(digest.bytes.data()), digest.bytes.size()};
+}
+
+Digest digest_from(std::string_view bytes) {
+  Digest digest;
+  std::copy_n(bytes.begin(), digest.bytes.size(), reinterpret_cast<char*>(digest.bytes.data()));
+  return digest;
+}
+
+std::string encode_start(const LogStart& start, std::string_view salt) {
+  std::string bytes(kMagic);
+  bytes += text_of(start.journal);
+  put_integer(bytes, start.generation);
+  put_integer(bytes, start.base.place.value);
+  bytes += text_of(start.base.chain);
+  bytes += salt;
+  return bytes + checksum(bytes);
+}
+
+std::string encode_entry(std::span<const JournalRow> rows, const JournalHead& head, std::string_view salt) {
+  std::string body;
+  for (const JournalRow& row : rows) {
+    put_integer(body, static_cast<std::uint64_t>(row.at_ns));
+    put_integer(body, row.bytes.size());
+    body += row.bytes;
+  }
+  std::string bytes(salt);
+  put_integer(bytes, body.size());
+  put_integer(bytes, rows.size());
+  put_integer(bytes, rows.front().place.value);
+  bytes += text_of(head.chain);
+  bytes += body;
+  return bytes + checksum(bytes);
+}
+
+struct Entry {
+  std::uint64_t first = 0;  // place
+  JournalHead head;         // after it
+  std::vector<JournalRow> rows;
+};
+
+// The entry at the front of `bytes`, and how long it is. Nothing where no whole and sound one is there.
+std::optional<std::pair<Entry, std::size_t>> decode_entry(std::string_view bytes, std::string_view salt) {
+  if (bytes.size() < kEntryHead + kChecksumBytes || !bytes.starts_with(salt)) return std::nullopt;
+  const std::uint64_t body = integer_at(bytes, kSaltBytes), count = integer_at(bytes, kSaltBytes + 8);
+  if (body > bytes.size() - kEntryHead - kChecksumBytes || count == 0 || count > body) return std::nullopt;
+  const std::size_t size = kEntryHead + body;
+  if (checksum(bytes.substr(0, size)) != bytes.substr(size, kChecksumBytes)) return std::nullopt;
+
+  Entry entry;
+  entry.first = integer_at(bytes, kSaltBytes + 16);
+  entry.head = {RoomSeq{entry.first + count - 1}, digest_from(bytes.substr(kSaltBytes + 24, kChainBytes))};
+  std::string_view left = bytes.substr(kEntryHead, body);
+  for (std::uint64_t i = 0; i < count; ++i) {
+    if (left.size() < 16 || integer_at(left, 8) > left.size() - 16) return std::nullopt;
+    const std::uint64_t length = integer_at(left, 8);
+    entry.rows.push_back({RoomSeq{entry.first + i}, static_cast<std::int64_t>(integer_at(left, 0)),
+                          std::string(left.substr(16, length))});
+    left.remove_prefix(16 + length);
+  }
+  if (!left.empty()) return std::nullopt;
+  return std::pair{std::move(entry), size + kChecksumBytes};
+}
+
+// What one of the two files holds.
+struct FoundFile {
+  fs::path path;
+  std::string unreadable;         // why nothing of it counts; empty: its start is sound
+  LogStart start;
+  std::vector<Entry> entries;
+  bool is_there = false;
+  bool damaged = false;           // something that cannot be read lies between entries
+  bool ends_in_part = false;      // of an entry
+  [[nodiscard]] RoomSeq last() const { return entries.empty() ? start.base.place : entries.back().head.place; }
+};
+
+void read_entries(std::string_view bytes, std::string_view salt, FoundFile& file) {
+  std::size_t at = kFirstSector;
+  while (at < bytes.size()) {
+    if (auto entry = decode_entry(bytes.substr(at), salt)) {
+      at += entry->second;
+      file.entries.push_back(std::move(entry->first));
+      continue;
+    }
+    // The bytes here may be what an earlier generation left, part of an entry, or damage with entries behind it.
+    std::size_t next = bytes.find(salt, at + 1);
+    while (next != bytes.npos && !decode_entry(bytes.substr(next), salt)) next = bytes.find(salt, next + 1);
+    if (next == bytes.npos) {
+      file.ends_in_part = bytes.substr(at).starts_with(salt);
+      return;
+    }
+    file.damaged = true;
+    at = next;
+  }
+}
+
+Result<FoundFile> read_member(const fs::path& path, const Digest& journal, Disk& disk) {
+  FoundFile file;
+  file.path = path;
+  const auto size = disk.size(path);
+  if (!size) return tl::unexpected(size.error());
+  if (!*size) {
+    file.unreadable = "is missing";
+    return file;
+  }
+  file.is_there = true;
+  const auto read = disk.read(path, 0, **size);
+  if (!read) return tl::unexpected(read.error());
+  const std::string_view bytes(*read);
+  const std::string_view first = bytes.substr(0, kStartBytes - kChecksumBytes);
+  if (bytes.size() < kStartBytes || !bytes.starts_with(kMagic) ||
+      bytes.substr(first.size(), kChecksumBytes) != checksum(first)) {
+    file.unreadable = "is damaged";
+    return file;
+  }
+  std::size_t at = kMagic.size();
+  file.start.journal = digest_from(first.substr(at));
+  at += kChainBytes;
+  file.start.generation = integer_at(first, at);
+  file.start.base.place.value = integer_at(first, at + 8);
+  file.start.base.chain = digest_from(first.substr(at + 16));
+  if (file.start.journal != journal) {
+    file.unreadable = kForeign;
+    return file;
+  }
+  read_entries(bytes, first.substr(first.size() - kSaltBytes), file);
+  return file;
+}
+
+// The rows of an entry that follow `head`, if they lead to where the entry says. Nothing: it is of another history.
+std::optional<std::vector<JournalRow>> rows_after(const Entry& entry, JournalHead head) {
+  std::vector<JournalRow> rows;
+  for (const JournalRow& row : entry.rows) {
+    if (row.place <= head.place) continue;
+    head = next_head(head, row);
+    rows.push_back(row);
+  }
+  if (head != entry.head) return std::nullopt;
+  return rows;
+}
+
+// The entry of a file that goes on from `head`, or nothing.
+const Entry* find_next(const FoundFile& file, const JournalHead& head) {
+  const auto found = std::ranges::find_if(file.entries, [&](const Entry& entry) {
+    return entry.first <= head.place.value + 1 && entry.head.place > head.place;
+  });
+  return found == file.entries.end() ? nullptr : &*found;
+}
+
+// A kill or a power failure leaves the mirror one entry behind the log, or one generation ahead of it and empty. Any
+// other distance means that one of them was exchanged for an older copy.
+void find_older_copy(FoundFile& log, FoundFile& mirror) {
+  if (!log.unreadable.empty() || !mirror.unreadable.empty()) return;
+  const std::uint64_t a = log.start.generation, b = mirror.start.generation;
+  if (b < a) mirror.unreadable = "is an older copy";
+  if (b > a + 1 || (b == a + 1 && !mirror.entries.empty())) log.unreadable = "is an older copy";
+}
+
+// What of one file the other makes good.
+void note_repairs(const FoundFile& log, const FoundFile& mirror, LogContents& found) {
+  const auto note = [&](const FoundFile& bad, const FoundFile& good, const std::string& what) {
+    found.repairs.push_back(bad.path.string() + " " + what + "; its rows were read from " + good.path.string());
+  };
+  const auto lacks_rows = [&](const FoundFile& one, const FoundFile& other) {
+    return std::ranges::any_of(other.entries, [&](const Entry& entry) {
+      return entry.head.place <= one.last() && entry.first > one.start.base.place.value &&
+             std::ranges::none_of(one.entries, [&](const Entry& own) { return own.head == entry.head; });
+    });
+  };
+  if (!log.unreadable.empty() && !mirror.unreadable.empty()) return;
+  if (!log.unreadable.empty()) return note(log, mirror, log.unreadable);
+  if (!mirror.unreadable.empty()) return note(mirror, log, mirror.unreadable);
+  if (mirror.start.generation > log.start.generation) return;
+  if (log.damaged || log.last() < mirror.last() || lacks_rows(log, mirror)) note(log, mirror, "is damaged");
+  const bool one_behind = !log.entries.empty() && mirror.last().value + 1 == log.entries.back().first;
+  if (mirror.damaged || (mirror.last() < log.last() && !one_behind) || lacks_rows(mirror, log))
+    note(mirror, log, "is damaged");
+  found.unfinished = found.unfinished || (one_behind && mirror.last() < log.last());
+}
+
+}  // namespace
+
+fs::path log_of(const fs::path& journal) { return journal.string() + "-log"; }
+fs::path mirror_of(const fs::path& journal) { return journal.string() + "-mirror"; }
+
+Result<LogContents> read_log(const fs::path& journal, const Digest& identity, const JournalHead& from, Disk& disk) {
+  std::array<FoundFile, 2> members;
+  for (const bool is_mirror : {false, true}) {
+    auto file = read_member(is_mirror ? mirror_of(journal) : log_of(journal), identity, disk);
+    if (!file) return tl::unexpected(file.error());
+    members[is_mirror ? 1 : 0] = std::move(*file);
+  }
+  find_older_copy(members[0], members[1]);
+  LogContents found;
+  found.head = from;
+  for (const FoundFile& file : members) {
+    if (file.unreadable == kForeign)
+      found.foreign.push_back(file.path.string() + " belongs to another journal than " + journal.string());
+    if (!file.unreadable.empty()) continue;
+    found.generation = std::max(found.generation, file.start.generation);
+    found.witnessed = std::max({found.witnessed, file.start.base.place, file.last()});
+    found.unfinished = found.unfinished || file.ends_in_part;
+    found.bases.emplace_back(file.path, file.start.base);
+  }
+  for (bool more = true; more;) {
+    more = false;
+    for (const FoundFile& file : members) {
+      const Entry* next = file.unreadable.empty() ? find_next(file, found.head) : nullptr;
+      if (next == nullptr) continue;
+      const auto rows = rows_after(*next, found.head);
+      if (!rows) continue;
+      found.rows.insert(found.rows.end(), rows->begin(), rows->end());
+      found.head = next->head;
+      more = true;
+      break;
+    }
+  }
+  const bool any = members[0].is_there || members[1].is_there;
+  if (any && !members[0].unreadable.empty() && !members[1].unreadable.empty())
+    for (const FoundFile& file : members) found.faults.push_back(file.path.string() + " " + file.unreadable);
+  if (any) note_repairs(members[0], members[1], found);
+  const auto &log = members[0], &mirror = members[1];
+  const auto cut_short = [](const FoundFile& file) { return file.ends_in_part || file.damaged; };
+  if (log.unreadable.empty() != mirror.unreadable.empty())
+    found.doubtful = cut_short(log.unreadable.empty() ? log : mirror);
+  else
+    found.doubtful = log.unreadable.empty() && log.start.generation == mirror.start.generation &&
+                     ((log.ends_in_part && mirror.last() < log.last()) ||
+                      (mirror.ends_in_part && log.last() <= mirror.last()));
+  return found;
+}
+
+Result<void> remove_log(const fs::path& journal, Disk& disk) {
+  return disk.remove(log_of(journal)).and_then([&] { return disk.remove(mirror_of(journal)); });
+}
+
+Result<MirroredLog> MirroredLog::open(const fs::path& journal, std::uint64_t capacity, Disk& disk, bool durable) {
+  MirroredLog made(kFirstSector + capacity, disk, durable);
+  for (const bool is_mirror : {false, true}) {
+    auto member = made.open_member(is_mirror ? mirror_of(journal) : log_of(journal));
+    if (!member) return tl::unexpected(member.error());
+    (is_mirror ? made.mirror_ : made.log_) = std::move(*member);
+  }
+  if (Result<void> named = disk.sync_folder(folder_of(journal)); !named) return tl::unexpected(named.error());
+  return made;
+}
+
+Result<MirroredLog::Member> MirroredLog::open_member(const fs::path& path) {
+  constexpr std::size_t kPiece = std::size_t{1} << 20;
+  Member member;
+  member.path = path;
+  auto file = disk_->open(path);
+  if (!file) return tl::unexpected(file.error());
+  member.file = std::move(*file);
+  const auto identity = disk_->identity(path);
+  if (!identity) return tl::unexpected(identity.error());
+  if (!*identity) return failure(ErrorCode::internal, path.string() + " was removed while it was opened");
+  member.identity = **identity;
+  member.written = member.identity.size;
+  // Written, not only reserved: the first write to reserved space changes the file system's own records.
+  const std::string zeros(kPiece, '\0');
+  for (std::uint64_t at = member.identity.size; at < capacity_; at += kPiece) {
+    const std::string_view piece = std::string_view(zeros).substr(0, std::min<std::uint64_t>(kPiece, capacity_ - at));
+    if (Result<void> put = member.file->write_at(at, piece); !put) return tl::unexpected(put.error());
+  }
+  if (Result<void> synced = sync(member); !synced) return tl::unexpected(synced.error());
+  member.written = std::max(member.written, capacity_);
+  return member;
+}
+
+Result<void> MirroredLog::check_named(const Member& member) {
+  const auto now = disk_->identity(member.path);
+  if (!now) return tl::unexpected(now.error());
+  if (*now && (*now)->same_file(member.identity) && (*now)->size >= member.written) return {};
+  return failure(ErrorCode::internal, member.path.string() + " was " + (*now ? "replaced or cut" : "removed") +
+                                          " while its room was open; recover the journal into a new one");
+}
+
+Result<void> MirroredLog::begin(Member& member, const LogStart& start) {
+  // Nobody can put something into a row that is taken for an entry.
+  member.salt = random_bytes(kSaltBytes);
+  member.end = kFirstSector;
+  return check_named(member)
+      .and_then([&] { return member.file->write_at(0, encode_start(start, member.salt)); })
+      .and_then([&] { return sync(member); });
+}
+
+Result<void> MirroredLog::begin_mirror(const LogStart& start) { return begin(mirror_, start); }
+Result<void> MirroredLog::begin_log(const LogStart& start) { return begin(log_, start); }
+
+Result<void> MirroredLog::append(std::span<const JournalRow> rows, const JournalHead& head) {
+  OSTEON_CHECK(!rows.empty() && log_.end != 0 && mirror_.end != 0);
+  // One after the other: a write that the power cuts short spoils one file at most.
+  for (Member* member : {&log_, &mirror_}) {
+    const std::string entry = encode_entry(rows, head, member->salt);
+    if (Result<void> named = check_named(*member); !named) return named;
+    const Result<void> put = durable_ ? member->file->write_durably(member->end, entry)
+                                      : member->file->write_at(member->end, entry);
+    if (!put) return put;
+    member->end += entry.size();
+    member->written = std::max(member->written, member->end);
+  }
+  return {};
+}
+
+std::uint64_t MirroredLog::used_bytes() const { return log_.end - std::min<std::uint64_t>(log_.end, kFirstSector); }
+bool MirroredLog::is_full() const { return log_.end >= capacity_; }
+
+}  // namespace osteon

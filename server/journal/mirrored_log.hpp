@@ -1,0 +1,95 @@
+// The newest rows of a journal, before its database has them: a write-ahead log in two files with the same entries. A
+// row is durable in both before anybody is told of it, so each file says how far the other must go. What is damaged in
+// one is read from the other.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/journal/chain.hpp"
+#include "server/journal/disk.hpp"
+
+namespace osteon {
+
+[[nodiscard]] std::filesystem::path log_of(const std::filesystem::path& journal);
+[[nodiscard]] std::filesystem::path mirror_of(const std::filesystem::path& journal);
+
+// What the entries of a log go on from.
+struct LogStart {
+  Digest journal;                // which journal it belongs to: the chain of its genesis
+  std::uint64_t generation = 0;  // rises by one each time that the log begins anew
+  JournalHead base;              // the last row that the database had then
+};
+
+// What both files together hold.
+struct LogContents {
+  std::uint64_t generation = 0;      // the newest that either file is of; 0: neither can be read
+  std::vector<JournalRow> rows;      // after the head that was asked for
+  JournalHead head;                  // of the last of them
+  std::vector<std::pair<std::filesystem::path, JournalHead>> bases;  // what each file goes on from
+  RoomSeq witnessed;                 // the furthest place that either file knows
+  std::vector<std::string> repairs;  // what one file lacks and the other has; one sentence each
+  std::vector<std::string> foreign;  // files of another journal; one sentence each
+  std::vector<std::string> faults;   // why neither can be read; one sentence each
+  bool unfinished = false;           // an entry was being written that nobody was told of
+  // A write was cut short in one file, which may have spoiled the entry before it, and the other file does not have
+  // that.
+  bool doubtful = false;
+};
+
+// Reads what follows `from`, with the chain of `journal`. Neither file need be there. Errors: those of reading.
+[[nodiscard]] Result<LogContents> read_log(const std::filesystem::path& journal, const Digest& identity,
+                                           const JournalHead& from, Disk& disk);
+
+// Removes both files.
+[[nodiscard]] Result<void> remove_log(const std::filesystem::path& journal, Disk& disk);
+
+// One thread at a time. After an error nothing more may be appended.
+class MirroredLog {
+ public:
+  // Opens both files, or makes them, with room for `capacity` bytes each, so that a commit needs no change of the file
+  // system's own. What they hold stays until begin_mirror() and begin_log().
+  // `durable`: false only for tests, which must see rows lost when no sync is waited for.
+  [[nodiscard]] static Result<MirroredLog> open(const std::filesystem::path& journal, std::uint64_t capacity,
+                                                Disk& disk, bool durable = true);
+
+  // Begins the next generation, first in the mirror, then in the log. Between the two calls the database notes the
+  // generation: at every moment one file has all rows that the database may lack.
+  [[nodiscard]] Result<void> begin_mirror(const LogStart& start);
+  [[nodiscard]] Result<void> begin_log(const LogStart& start);
+
+  // Rows that go on from the last ones. Durable in both files when it returns. `head`: after them. Error internal: a
+  // write failed, or a name no longer stands for the file that is open.
+  [[nodiscard]] Result<void> append(std::span<const JournalRow> rows, const JournalHead& head);
+
+  [[nodiscard]] std::uint64_t used_bytes() const;  // of entries, in one of the files
+  [[nodiscard]] bool is_full() const;
+
+ private:
+  struct Member {
+    std::filesystem::path path;
+    std::unique_ptr<DiskFile> file;
+    FileIdentity identity;
+    std::string salt;
+    std::uint64_t end = 0;      // of the entries, bytes
+    std::uint64_t written = 0;  // the furthest byte that was ever written
+  };
+  MirroredLog(std::uint64_t capacity, Disk& disk, bool durable)
+      : capacity_(capacity), disk_(&disk), durable_(durable) {}
+  [[nodiscard]] Result<void> sync(Member& member) { return durable_ ? member.file->sync() : Result<void>{}; }
+  [[nodiscard]] Result<Member> open_member(const std::filesystem::path& path);
+  [[nodiscard]] Result<void> check_named(const Member& member);
+  [[nodiscard]] Result<void> begin(Member& member, const LogStart& start);
+
+  std::uint64_t capacity_;
+  Disk* disk_;
+  bool durable_;
+  Member log_, mirror_;
+};
+
+}  // namespace osteon

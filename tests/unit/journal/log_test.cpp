@@ -1,0 +1,351 @@
+// The newest rows of a journal: what a breaker does to their files, and to the journal while it is open.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <sqlite3.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "server/journal/mirrored_log.hpp"
+#include "server/journal/upkeep.hpp"
+#include "tests/support/disk/journal_trials.hpp"
+#include "tests/support/disk/memory_disk.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/unit/journal/rows.hpp"
+
+namespace osteon {
+namespace {
+
+namespace fs = std::filesystem;
+
+using test::MemoryDisk;
+using test::plain_head;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+constexpr const char *kFile = "/room/journal", *kLog = "/room/journal-log", *kMirror = "/room/journal-mirror";
+
+class LogTest : public ::testing::Test {
+ protected:
+  JournalOptions options() { return {.disk = &disk_, .log_bytes = 32 << 10}; }
+  // A journal whose process was killed: some rows in the database, the others in its log.
+  void make_killed() {
+    Journal journal = std::move(Journal::create(kFile, "bone", options()).value());
+    append(journal, rows_, 0, 40);
+    ASSERT_TRUE(journal.next_server_epoch());
+    before_ = disk_.image();
+    for (std::size_t i = 40; i < rows_.size(); i += 2) append(journal, rows_, i, i + 2);
+  }
+  // Opens it and expects all rows. Gives what was repaired.
+  std::vector<std::string> expect_whole() {
+    const auto report = verify_journal(kFile, &disk_);
+    EXPECT_TRUE(report && report->sound()) << (report ? report->faults.front() : report.error().message);
+    Journal journal = std::move(Journal::open(kFile, options()).value());
+    EXPECT_EQ(journal.closed_because(), nullptr) << journal.closed_because()->message;
+    EXPECT_TRUE(equal(rows_of(journal), rows_));
+    EXPECT_EQ(report->repairs, journal.repairs());
+    return journal.repairs();
+  }
+  // Opens it and expects that it takes no rows. Gives why.
+  std::string expect_closed(std::size_t rows) {
+    const auto report = verify_journal(kFile, &disk_);
+    EXPECT_TRUE(report && !report->sound());
+    EXPECT_EQ(backup_journal(kFile, "/backup/journal", &disk_).error().code, ErrorCode::invalid_input);
+    Journal journal = std::move(Journal::open(kFile, options()).value());
+    EXPECT_NE(journal.closed_because(), nullptr) << "it takes rows";
+    if (journal.closed_because() == nullptr) return {};
+    EXPECT_FALSE(journal.next_server_epoch()) << "an epoch could come twice";
+    EXPECT_TRUE(equal(rows_of(journal), {rows_.begin(), rows_.begin() + static_cast<std::ptrdiff_t>(rows)}));
+    return journal.closed_because()->message;
+  }
+  void flip(const char* file, std::size_t row) {
+    const std::size_t at = disk_.image().at(file).find(rows_[row].bytes);
+    ASSERT_NE(at, std::string::npos);
+    disk_.flip_bit(file, 8 * at + 3);
+  }
+  MemoryDisk disk_{1};
+  std::vector<JournalRow> rows_ = [] {
+    std::vector<JournalRow> rows = some_rows(5, 60);
+    for (JournalRow& row : rows) row.bytes += "a row is as long as this at least";
+    return rows;
+  }();
+  MemoryDisk::Image before_;
+};
+
+TEST_F(LogTest, HasTheNewestRowsTwiceAndNothingElseHasThem) {
+  make_killed();
+  for (const auto& [name, bytes] : disk_.image()) {
+    const bool has = bytes.find(rows_[59].bytes) != std::string::npos;
+    EXPECT_EQ(has, name == kLog || name == kMirror) << name;
+  }
+  EXPECT_THAT(expect_whole(), IsEmpty());
+}
+
+TEST_F(LogTest, DamageToOneOfItsFilesIsReadFromTheOther) {
+  make_killed();
+  const MemoryDisk::Image killed = disk_.image();
+  for (const char* file : {kLog, kMirror}) {
+    const char* other = file == kLog ? kMirror : kLog;
+    SCOPED_TRACE(file);
+    const auto with = [&](const std::string& what) {
+      return std::string(file) + " " + what + "; its rows were read from " + other;
+    };
+    disk_.load(killed);
+    flip(file, 50);
+    EXPECT_THAT(expect_whole(), ElementsAre(with("is damaged")));
+    disk_.load(killed);
+    disk_.cut(file, killed.at(file).find(rows_[56].bytes));
+    expect_whole();
+    disk_.load(killed);
+    disk_.cut(file, 0);
+    EXPECT_THAT(expect_whole(), ElementsAre(with("is damaged")));
+    disk_.load(killed);
+    ASSERT_TRUE(disk_.remove(file));
+    EXPECT_THAT(expect_whole(), ElementsAre(with("is missing")));
+    disk_.load(killed);
+    disk_.put(file, before_.at(file));
+    expect_whole();
+  }
+}
+
+TEST_F(LogTest, DamageToBothIsNamedWithTheRowsThatAreMissing) {
+  make_killed();
+  for (const char* file : {kLog, kMirror}) flip(file, 50);
+  EXPECT_THAT(expect_closed(50), HasSubstr("goes to place 50, but its log vouches for place 60: 10 rows are missing"));
+  const auto recovered = recover_journal(kFile, "/room/new", &disk_);
+  ASSERT_TRUE(recovered);
+  EXPECT_EQ(recovered->head.place, RoomSeq{50});
+  EXPECT_EQ(recovered->lost(), 10u);
+  Journal journal = std::move(Journal::open("/room/new", options()).value());
+  EXPECT_GT(journal.next_server_epoch().value(), 1000u);
+}
+
+TEST_F(LogTest, ItsLossIsNamed) {
+  make_killed();
+  const MemoryDisk::Image killed = disk_.image();
+  for (const char* file : {kLog, kMirror}) ASSERT_TRUE(disk_.remove(file));
+  EXPECT_THAT(expect_closed(40),
+              HasSubstr("its log is missing: how many rows are missing after place 40 cannot be told"));
+  disk_.load(killed);
+  for (const char* file : {kLog, kMirror}) disk_.cut(file, 0);
+  EXPECT_THAT(expect_closed(40), HasSubstr("is damaged"));
+}
+
+TEST_F(LogTest, AnOlderDatabaseBesideANewerLogIsNamed) {
+  MemoryDisk::Image earlier;
+  {
+    Journal journal = std::move(Journal::create(kFile, "bone", options()).value());
+    append(journal, rows_, 0, 20);
+    ASSERT_TRUE(journal.next_server_epoch());
+    earlier = disk_.image();
+    append(journal, rows_, 20, 40);
+    ASSERT_TRUE(journal.next_server_epoch());
+    append(journal, rows_, 40, 60);
+  }
+  disk_.put(kFile, earlier.at(kFile));
+  EXPECT_THAT(expect_closed(20), HasSubstr("goes to place 20, but its log vouches for place 60: 40 rows are missing"));
+  for (const char* file : {kLog, kMirror}) disk_.put(file, earlier.at(file));
+  EXPECT_EQ(Journal::open(kFile, options())->head().place, RoomSeq{20})
+      << "an older copy of all files: only witnesses know more";
+}
+
+TEST_F(LogTest, AnOlderLogBesideANewerDatabaseIsNamed) {
+  MemoryDisk::Image earlier;
+  {
+    Journal journal = std::move(Journal::create(kFile, "bone", options()).value());
+    append(journal, rows_, 0, 20);
+    earlier = disk_.image();
+    ASSERT_TRUE(journal.next_server_epoch());
+    append(journal, rows_, 20, 60);
+  }
+  for (const char* file : {kLog, kMirror}) disk_.put(file, earlier.at(file));
+  EXPECT_THAT(expect_closed(20),
+              HasSubstr("its log is an older copy: how many rows are missing after place 20 cannot be told"));
+}
+
+TEST_F(LogTest, IsNotTakenFromAnotherJournalThatBeganAlike) {
+  make_killed();
+  const MemoryDisk::Image killed = disk_.image();
+  disk_.load({});
+  make_killed();
+  for (const char* file : {kLog, kMirror}) disk_.put(file, killed.at(file));
+  EXPECT_THAT(expect_closed(40), HasSubstr("belongs to another journal"));
+}
+
+TEST_F(LogTest, FailsTheRoomWhoseFilesAreExchangedCutOrRemoved) {
+  const std::vector<std::pair<const char*, const char*>> damages{
+      {"removed", "removed"}, {"replaced", "replaced or cut"}, {"cut", "replaced or cut"}};
+  for (const char* file : {kFile, kLog, kMirror})
+    for (const auto& [what, said] : damages) {
+      disk_.load({});
+      Journal journal = std::move(Journal::create(kFile, "bone", options()).value());
+      append(journal, rows_, 0, 40);
+      const MemoryDisk::Image now = disk_.image();
+      if (std::string_view(what) == "removed") {
+        ASSERT_TRUE(disk_.remove(file));
+      }
+      if (std::string_view(what) == "replaced") disk_.put(file, now.at(file));
+      if (std::string_view(what) == "cut") disk_.cut(file, now.at(file).size() - 1);
+      const Result<void> done = journal.append({&rows_[40], 1});
+      ASSERT_FALSE(done) << file << " " << what;
+      EXPECT_THAT(done.error().message, HasSubstr(said)) << file;
+      EXPECT_NE(journal.closed_because(), nullptr);
+    }
+}
+
+// A row is as large as it may be, and has in it what looks like the entry of a log.
+TEST_F(LogTest, TakesARowThatIsLargerThanItself) {
+  {
+    Journal journal = std::move(Journal::create(kFile, "bone", options()).value());
+    append(journal, rows_, 0, 59);
+    rows_[59].bytes = disk_.image().at(kLog) + disk_.image().at(kMirror);
+    append(journal, rows_, 59, 60);
+    EXPECT_EQ(journal.head(), plain_head("bone", rows_));
+  }
+  EXPECT_THAT(expect_whole(), IsEmpty());
+  EXPECT_LT(disk_.size(kLog).value().value(), 200u << 10) << "the row went into the database";
+}
+
+std::map<std::string, std::string> contents_of(const fs::path& folder) {
+  std::map<std::string, std::string> all;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    std::ostringstream bytes;
+    bytes << std::ifstream(entry.path(), std::ios::binary).rdbuf();
+    all[entry.path().filename().string()] = std::move(bytes).str();
+  }
+  return all;
+}
+
+// Whatever was beside the journal may be removed: the file itself is locked.
+TEST(JournalSecondOpener, IsRefusedAndChangesNoByte) {
+  const test::TempDir folder;
+  const fs::path file = folder / "journal";
+  const std::vector<JournalRow> rows = some_rows(3, 20);
+  Journal journal = std::move(Journal::create(file, "bone").value());
+  append(journal, rows, 0, 10);
+  for (const char* end : {".lock", "-wal"}) fs::remove(file.string() + end);
+  const auto before = contents_of(folder.path());
+  const std::string in_use = file.string() + " is in use by another process; close the room there first";
+  EXPECT_EQ(Journal::open(file).error().message, in_use);
+  EXPECT_EQ(Journal::open_to_read(file).error().message, in_use);
+  EXPECT_EQ(Journal::create(file, "bone").error().code, ErrorCode::exists);
+  EXPECT_EQ(verify_journal(file).error().message, in_use);
+  EXPECT_EQ(backup_journal(file, folder / "copy").error().message, in_use);
+  EXPECT_EQ(migrate_journal(file, folder / "copy").error().message, in_use);
+  EXPECT_EQ(recover_journal(file, folder / "copy").error().message, in_use);
+  EXPECT_EQ(delete_journals({file}).error().message, in_use);
+  EXPECT_EQ(contents_of(folder.path()), before);
+  append(journal, rows, 10, 20);
+  EXPECT_TRUE(equal(rows_of(journal), rows));
+}
+
+TEST(JournalReaders, WriteNothingAndMayBeMany) {
+  const test::TempDir folder;
+  const fs::path file = folder / "journal";
+  const std::vector<JournalRow> rows = some_rows(4, 30);
+  for (const bool closed : {false, true}) {
+    fs::remove(file);
+    {
+      Journal journal = std::move(Journal::create(file, "bone").value());
+      append(journal, rows, 0, 30);
+      if (closed) {
+        ASSERT_TRUE(journal.close());
+      }
+    }
+    const auto before = contents_of(folder.path());
+    {
+      Journal one = std::move(Journal::open_to_read(file).value());
+      Journal two = std::move(Journal::open_to_read(file).value());
+      EXPECT_EQ(Journal::open(file).error().code, ErrorCode::exists);
+      EXPECT_TRUE(verify_journal(file)->sound());
+      EXPECT_TRUE(equal(rows_of(one), rows));
+      EXPECT_TRUE(equal(rows_of(two), rows));
+      const JournalRow next{RoomSeq{31}, 0, "next"};
+      EXPECT_THAT(one.append({&next, 1}).error().message, HasSubstr("was opened only to be read"));
+      EXPECT_EQ(one.closed_because(), nullptr);
+    }
+    EXPECT_EQ(contents_of(folder.path()), before);
+    if (!closed) {
+      for (const char* end : {"-log", "-mirror", "-wal"}) fs::remove(file.string() + end);
+    }
+  }
+}
+
+// The tables and the write-ahead log of version 2, as its program left them when it was killed.
+void make_version_2(const fs::path& file, const std::vector<JournalRow>& rows) {
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    sqlite3* database = nullptr;
+    const auto run = [&](const std::string& sql) {
+      if (sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) ::_exit(1);
+    };
+    const auto hex = [](const auto& bytes) {
+      std::string text = "x'";
+      for (const auto byte : bytes) {
+        char digits[3];
+        std::snprintf(digits, sizeof digits, "%02x", static_cast<unsigned>(static_cast<unsigned char>(byte)));
+        text += digits;
+      }
+      return text + "'";
+    };
+    if (sqlite3_open(file.c_str(), &database) != SQLITE_OK) ::_exit(1);
+    sqlite3_db_config(database, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+    run("PRAGMA journal_mode=WAL; PRAGMA wal_autocheckpoint=0");
+    run("CREATE TABLE rows(place INTEGER PRIMARY KEY, at_ns INTEGER NOT NULL, bytes BLOB NOT NULL, chain BLOB NOT "
+        "NULL) STRICT");
+    run("CREATE TABLE registers(name TEXT PRIMARY KEY, value BLOB NOT NULL, seal BLOB NOT NULL) STRICT, WITHOUT ROWID");
+    run("CREATE TABLE checkpoints(place INTEGER PRIMARY KEY, chain BLOB NOT NULL, meta BLOB NOT NULL, size INTEGER NOT "
+        "NULL,"
+        " digest BLOB NOT NULL, seal BLOB NOT NULL) STRICT");
+    run("CREATE TABLE people(pseudonym TEXT PRIMARY KEY, label TEXT NOT NULL, joined_day INTEGER NOT NULL,"
+        " seal BLOB NOT NULL) STRICT, WITHOUT ROWID");
+    run("PRAGMA application_id=0x4f73744a; PRAGMA user_version=2");
+    Hasher seal;
+    seal.text("register");
+    seal.text("genesis");
+    seal.text("bone");
+    run("INSERT INTO registers VALUES('genesis', " + hex(std::string("bone")) + ", " + hex(seal.finish().bytes) + ")");
+    run("PRAGMA wal_checkpoint(TRUNCATE)");
+    std::vector<JournalRow> so_far;
+    for (const JournalRow& row : rows) {
+      so_far.push_back(row);
+      run("INSERT INTO rows VALUES(" + std::to_string(row.place.value) + ", " + std::to_string(row.at_ns) + ", " +
+          hex(row.bytes) + ", " + hex(plain_head("bone", so_far).chain.bytes) + ")");
+    }
+    ::_exit(0);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_EQ(status, 0);
+  ASSERT_GT(fs::file_size(file.string() + "-wal"), 0u) << "its rows are in SQLite's log";
+}
+
+TEST(Migration, OpensTheSecondVersionAsItIs) {
+  const test::TempDir folder;
+  const fs::path file = folder / "journal";
+  const std::vector<JournalRow> rows = some_rows(12, 31);
+  ASSERT_NO_FATAL_FAILURE(make_version_2(file, {rows.begin(), rows.begin() + 30}));
+  const auto before = contents_of(folder.path());
+  const auto verified = verify_journal(file);
+  ASSERT_TRUE(verified) << verified.error().message;
+  EXPECT_THAT(verified->faults, IsEmpty());
+  EXPECT_EQ(verified->version, 2);
+  EXPECT_EQ(verified->head.place, RoomSeq{30});
+  EXPECT_EQ(contents_of(folder.path()), before);
+  {
+    Journal journal = std::move(Journal::open(file).value());
+    EXPECT_EQ(journal.closed_because(), nullptr);
+    append(journal, rows, 30, 31);
+  }
+  EXPECT_EQ(verify_journal(file)->version, 3);
+  Journal journal = std::move(Journal::open(file).value());
+  EXPECT_TRUE(equal(rows_of(journal), rows));
+}
+
+}  // namespace
+}  // namespace osteon
