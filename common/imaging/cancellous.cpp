@@ -181,7 +181,7 @@ Result<VoxelMask> cancellous_between(const HuVolume& volume, const VoxelMask& de
   auto candidate = candidates(volume, dense, params, part(keep_going, 0.0, 0.3));
   if (!candidate) return candidate;
   // A core is farther from dense bone than half of a joint's width.
-  const auto near = within_mm(dense, volume.spacing_mm, params.bridged_mm, part(keep_going, 0.3, 0.5));
+  auto near = within_mm(dense, volume.spacing_mm, params.bridged_mm, part(keep_going, 0.3, 0.5));
   if (!near) return near;
   const auto core_of = [&](const VoxelMask& mask) {
     VoxelMask core(mask.dims);
@@ -201,7 +201,7 @@ Result<VoxelMask> cancellous_between(const HuVolume& volume, const VoxelMask& de
     return tl::unexpected(left.error());
   for (std::size_t i = 0; i < found->values.size(); ++i)
     if (candidate->values[i] == 0) found->values[i] = 0;
-  const auto around =
+  auto around =
       within_mm(core_of(*found), volume.spacing_mm, 2.0 * params.bridged_mm, part(keep_going, 0.9, 1.0));
   if (!around) return around;
   for (std::size_t i = 0; i < found->values.size(); ++i)

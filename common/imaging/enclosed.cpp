@@ -187,7 +187,7 @@ Result<VoxelMask> grow_cores(const VoxelMask& solid, const VoxelMask& cores, con
 Result<VoxelMask> enclosed_by(const VoxelMask& solid, const Vec3& spacing_mm, const SegmentationParams& params,
                               const ScanEnds& ends, const KeepGoing& keep_going) {
   // Where the centre of the ball cannot be: in the bone or nearer to it than the ball's radius.
-  const auto wall = within_mm(solid, spacing_mm, params.bridged_mm, part(keep_going, 0.0, 0.15));
+  auto wall = within_mm(solid, spacing_mm, params.bridged_mm, part(keep_going, 0.0, 0.15));
   if (!wall) return wall;
   VoxelMask cores(solid.dims);
   if (auto marked = mark_closed(*wall, spacing_mm, params, ends, cores, part(keep_going, 0.15, 0.35)); !marked)
@@ -198,9 +198,9 @@ Result<VoxelMask> enclosed_by(const VoxelMask& solid, const Vec3& spacing_mm, co
     VoxelMask centres(solid.dims);  // of the ball, outside
     for (std::size_t i = 0; i < centres.values.size(); ++i)
       centres.values[i] = wall->values[i] == 0 && cores.values[i] == 0 ? 1 : 0;
-    const auto reach = within_mm(centres, spacing_mm, params.bridged_mm, part(keep_going, 0.35, 0.5));
+    auto reach = within_mm(centres, spacing_mm, params.bridged_mm, part(keep_going, 0.35, 0.5));
     if (!reach) return reach;
-    const auto grown =
+    auto grown =
         grow_cores(solid, cores, *reach, spacing_mm, 2.0 * params.bridged_mm, part(keep_going, 0.5, 0.8));
     if (!grown) return grown;
     for (std::size_t i = 0; i < closed.values.size(); ++i)

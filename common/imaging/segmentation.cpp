@@ -82,7 +82,7 @@ Result<VoxelMask> segment_bone(const HuVolume& volume, const SegmentationParams&
 
   VoxelMask solid = *dense;
   if (params.cancellous_hu < params.threshold_hu) {
-    const auto cancellous = cancellous_between(volume, *dense, params, part(keep_going, kThresholdEnd, kCancellousEnd));
+    auto cancellous = cancellous_between(volume, *dense, params, part(keep_going, kThresholdEnd, kCancellousEnd));
     if (!cancellous) return cancellous;
     for (std::size_t i = 0; i < solid.values.size(); ++i) solid.values[i] |= cancellous->values[i];
   }

@@ -23,7 +23,7 @@ double milliseconds_since(Clock::time_point begin) { return std::chrono::duratio
 
 double quantile(std::vector<double> values, double part) {
   if (values.empty()) return 0.0;
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1) + 0.5);
+  const auto at = values.begin() + std::lround(part * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), at, values.end());
   return *at;
 }
