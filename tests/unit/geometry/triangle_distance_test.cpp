@@ -39,6 +39,12 @@ TEST(TriangleDistance, IsThatToTheNearestPointOfIt) {
   }
 }
 
+TEST(SegmentDistance, IsThatOfThePointWhereBothEndsAreOne) {
+  const Vec3 p(1, 2, 3), end(1, 0, 0);
+  EXPECT_EQ(squared_distance_to_segment<double>(p, end, end), 13.0);
+  EXPECT_EQ(squared_distance_to_segment<double>(p, end, Vec3(1, 9, 0)), 9.0);
+}
+
 // Corners that coincide, two or all, and corners in a line: what the corner at a voxel on the threshold makes.
 TEST(TriangleDistance, IsFiniteAndRightWithoutArea) {
   std::mt19937 random(2);

@@ -188,6 +188,17 @@ TEST(Segmentation, WithNoiseToo) {
   EXPECT_LT(static_cast<double>(wrong), 0.01 * static_cast<double>(all));
 }
 
+// 7 of every 27 voxels are as bright as cancellous bone, wherever one looks: fewer than half, fewer than a corner has.
+TEST(Segmentation, AFewBrightVoxelsBetweenTwoBonesAreNoBone) {
+  const HuVolume volume = draw({52, 52, 72}, Vec3::Constant(0.5), [](const Vec3& p) {
+    if (std::max(std::abs(p.x()), std::abs(p.y())) > 10.0) return kAir;
+    const auto third = [](double mm) { return (std::lround(2.0 * mm + 100.5) % 3 + 3) % 3; };
+    const bool bright = third(p.x()) + 3 * third(p.y()) + 9 * third(p.z()) < 7;
+    return slab(p, bright ? 158 : kMuscle);
+  });
+  EXPECT_EQ(kind_at(volume, segment(volume), {0, 0, 0}), BoneVoxel::none);
+}
+
 TEST(Segmentation, MuscleBetweenTwoBonesIsNoBone) {
   const HuVolume volume = draw({52, 52, 72}, Vec3::Constant(0.5), [](const Vec3& p) { return slab(p, kMuscle); });
   EXPECT_EQ(kind_at(volume, segment(volume), {0.25, 0.25, 0.25}), BoneVoxel::none);

@@ -12,6 +12,7 @@
 #include "server/import/archive_files.hpp"
 #include "server/import/dicom_header.hpp"
 #include "server/import/isolated_reader.hpp"
+#include "server/import/skipped_files.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/import/fixtures.hpp"
 
@@ -22,6 +23,17 @@ namespace fs = std::filesystem;
 
 Content content_of_text(const std::string& text) {
   return content_of({reinterpret_cast<const unsigned char*>(text.data()), std::min(text.size(), kHeadBytes)});
+}
+
+TEST(SkippedFiles, OfTwoSearchesAreAddedUp) {
+  SkippedFiles one, other;
+  for (const char* name : {"a", "b"}) one.add(FileKind::damaged, name);
+  other.add(FileKind::damaged, "c");
+  other.add(FileKind::damaged, "d");
+  other.add(FileKind::dose_report, "e");
+  one.add(other);
+  EXPECT_EQ(one.count(FileKind::damaged), 4);
+  EXPECT_EQ(one.text(), "1 dose report, 4 damaged files (a, b, c, ...)");
 }
 
 TEST(ContentOf, RawNumbersAreNotDicom) {
