@@ -176,7 +176,7 @@ Result<void> verify(const Arguments& given) {
   say("events", text_of(report->head));
   say("witnessed", std::to_string(report->witnessed.value));
   say("closed", report->closed_cleanly ? "cleanly" : "not cleanly: the server was ended otherwise, or runs");
-  for (const std::string& repair : report->repairs) say("note", repair + "; nothing is lost");
+  for (const std::string& note : report->notes) say("note", note);
   for (const std::string& fault : report->faults) say("fault", fault);
   if (!report->sound())
     return failure(ErrorCode::invalid_input, given.file.string() + " is damaged; osteon-server recover " + given.file.string() +

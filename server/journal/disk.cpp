@@ -149,7 +149,9 @@ class SystemDisk final : public Disk {
   Result<std::unique_ptr<DiskFile>> open(const fs::path& file) override {
     const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
     if (fd < 0) return cannot_make("open", file, errno);
-    return std::make_unique<SystemFile>(file, fd);
+    auto opened = std::make_unique<SystemFile>(file, fd);
+    if (::lseek(fd, 0, SEEK_END) < 0) return cannot("open", file, errno);  // where write() goes on
+    return opened;
   }
 
   Result<std::string> read(const fs::path& file, std::uint64_t from, std::size_t most) override {

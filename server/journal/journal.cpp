@@ -133,7 +133,7 @@ Result<Journal> Journal::open_to_read(const fs::path& file, Disk* given) {
   State& state = *journal.state_;
   Inspection found = state.file.inspect(false);
   state.head = found.head;
-  state.repairs = std::move(found.repairs);
+  state.notes = std::move(found.notes);
   if (!found.faults.empty()) state.closed = Error{ErrorCode::unavailable, found.faults.front()};
   return journal;
 }
@@ -154,7 +154,7 @@ Result<Journal> Journal::open_locked(const fs::path& file, const JournalOptions&
   State& state = *journal.state_;
   Inspection found = state.file.inspect(false);
   state.head = found.head;
-  state.repairs = std::move(found.repairs);
+  state.notes = std::move(found.notes);
   if (!found.faults.empty()) {
     state.closed = Error{ErrorCode::unavailable, found.faults.front()};
     return journal;
@@ -242,7 +242,7 @@ Result<void> Journal::write_through(const std::function<Result<void>()>& work) {
   return write([&] { return work().and_then([&] { return carry(); }); });
 }
 
-const std::vector<std::string>& Journal::repairs() const { return state_->repairs; }
+const std::vector<std::string>& Journal::log_notes() const { return state_->notes; }
 
 void Journal::close_for_good(Error reason) {
   State& state = *state_;

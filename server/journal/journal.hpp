@@ -111,8 +111,9 @@ class Journal {
   // Carries the rows of the log into the database, if there are some hundred: for when the room is idle, since it takes
   // a few syncs. An error closes the journal to rows.
   [[nodiscard]] Result<void> tidy();
-  // What one of the two log files lacked when the journal was opened, and the other had: a sentence each.
-  [[nodiscard]] const std::vector<std::string>& repairs() const;
+  // What was found in its log when it was opened, a sentence each: what one file lacked and the other had, a write that
+  // is not whole, since its process was killed.
+  [[nodiscard]] const std::vector<std::string>& log_notes() const;
   // Vouches for the head in a footer, with which the log is needed no more and goes; of a journal that is closed to
   // rows, nothing. The journal must not be used afterwards.
   [[nodiscard]] Result<void> close();

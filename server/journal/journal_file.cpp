@@ -7,7 +7,8 @@
 #include <utility>
 
 #include "common/core/check.hpp"
-#include "server/journal/log_bytes.hpp"
+#include "common/link/random_bytes.hpp"
+#include "server/journal/bytes.hpp"
 
 namespace osteon {
 namespace {
@@ -46,13 +47,6 @@ constexpr std::array kVersions{
 
 const Version& version_of(int number) {
   return *std::find_if(kVersions.begin(), kVersions.end(), [&](const Version& v) { return v.number == number; });
-}
-
-std::optional<Digest> digest_of(std::string_view bytes) {
-  Digest digest;
-  if (bytes.size() != digest.bytes.size()) return std::nullopt;
-  std::memcpy(digest.bytes.data(), bytes.data(), bytes.size());
-  return digest;
 }
 
 constexpr const char* kInsertRow = "INSERT INTO rows(place, at_ns, bytes, chain) VALUES(?, ?, ?, ?)";
@@ -165,10 +159,6 @@ bool belongs_to(const fs::path& journal, std::string_view name) {
   return is_partial_of(journal, name) || parse_checkpoint_file(journal, name);
 }
 
-std::string_view as_text(const Digest& digest) {
-  return {reinterpret_cast<const char*>(digest.bytes.data()), digest.bytes.size()};
-}
-
 std::string encode_number(std::uint64_t number) {
   std::string bytes;
   put_integer(bytes, number);
@@ -276,7 +266,9 @@ Digest JournalFile::identity() const {
 
 Result<void> JournalFile::make_id() {
   if (!id_.empty()) return {};
-  id_ = random_bytes(16);
+  std::array<std::uint8_t, 16> id{};
+  system_random()(id);
+  id_.assign(id.begin(), id.end());
   return set_register(kIdRegister, id_);
 }
 
@@ -516,7 +508,7 @@ Inspection JournalFile::inspect(bool files) {
 }
 
 void JournalFile::inspect_log(Inspection& found) {
-  found.repairs = log_.repairs;
+  found.notes = log_.notes;
   if (log_.witnessed > found.head.place) check_witness({log_.witnessed, {}}, "its log", found);
   found.witnessed = std::max(found.witnessed, log_.witnessed);
   for (const std::string& foreign : log_.foreign)
@@ -525,7 +517,7 @@ void JournalFile::inspect_log(Inspection& found) {
   for (const std::string& fault : log_.faults) found.faults.push_back(fault + std::string(kRemedy));
   if (log_.doubtful)
     found.faults.push_back(file_.string() +
-                           ": a write to one file of its log was cut short, and the other is damaged: how many " +
+                           ": a write to one file of its log was cut short, and the other is damaged: how many "
                            "rows are missing after place " + std::to_string(found.head.place.value) +
                            " cannot be told" + std::string(kRemedy));
   if (log_.generation < generation_ && log_.faults.empty())

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "server/journal/bytes.hpp"
 #include "server/journal/chain.hpp"
 #include "server/journal/database.hpp"
 #include "server/journal/disk.hpp"
@@ -43,7 +44,7 @@ struct Inspection {
   std::optional<RoomSeq> first_bad;  // row
   bool closed_cleanly = false;
   RoomSeq witnessed;                 // the furthest place that its log, a footer or a checkpoint vouches for
-  std::vector<std::string> repairs;  // what one of its two log files lacks and the other has: nothing is lost
+  std::vector<std::string> notes;    // of its log: what one file lacks and the other has, a write that is not whole
 };
 
 struct Walk {
@@ -143,8 +144,6 @@ struct Footer {
 [[nodiscard]] std::optional<Footer> decode_footer(std::string_view bytes);
 [[nodiscard]] std::string encode_number(std::uint64_t number);
 [[nodiscard]] std::optional<std::uint64_t> decode_number(std::string_view bytes);
-
-[[nodiscard]] std::string_view as_text(const Digest& digest);
 
 inline constexpr int kVersionWithTimes = 2;
 // Version 3 has the tables of version 2, and a log of its own beside the file.

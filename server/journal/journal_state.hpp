@@ -23,7 +23,7 @@ struct Journal::State {
   std::uint64_t generation = 0;    // of the log
   std::optional<RoomSeq> recovered_to;
   std::optional<Error> closed;
-  std::vector<std::string> repairs;  // of the log, when it was opened
+  std::vector<std::string> notes;  // of the log, when it was opened
   bool only_read = false;
 };
 

@@ -5,7 +5,8 @@
 #include <utility>
 
 #include "common/core/check.hpp"
-#include "server/journal/log_bytes.hpp"
+#include "common/link/random_bytes.hpp"
+#include "server/journal/bytes.hpp"
 
 namespace osteon {
 namespace {
@@ -27,22 +28,12 @@ std::string checksum(std::string_view bytes) {
   return {reinterpret_cast<const char*>(digest.bytes.data()), kChecksumBytes};
 }
 
-std::string_view text_of(const Digest& digest) {
-  return {reinterpret_cast<const char*>(digest.bytes.data()), digest.bytes.size()};
-}
-
-Digest digest_from(std::string_view bytes) {
-  Digest digest;
-  std::copy_n(bytes.begin(), digest.bytes.size(), reinterpret_cast<char*>(digest.bytes.data()));
-  return digest;
-}
-
 std::string encode_start(const LogStart& start, std::string_view salt) {
   std::string bytes(kMagic);
-  bytes += text_of(start.journal);
+  bytes += as_text(start.journal);
   put_integer(bytes, start.generation);
   put_integer(bytes, start.base.place.value);
-  bytes += text_of(start.base.chain);
+  bytes += as_text(start.base.chain);
   bytes += salt;
   return bytes + checksum(bytes);
 }
@@ -58,7 +49,7 @@ std::string encode_entry(std::span<const JournalRow> rows, const JournalHead& he
   put_integer(bytes, body.size());
   put_integer(bytes, rows.size());
   put_integer(bytes, rows.front().place.value);
-  bytes += text_of(head.chain);
+  bytes += as_text(head.chain);
   bytes += body;
   return bytes + checksum(bytes);
 }
@@ -79,7 +70,7 @@ std::optional<std::pair<Entry, std::size_t>> decode_entry(std::string_view bytes
 
   Entry entry;
   entry.first = integer_at(bytes, kSaltBytes + 16);
-  entry.head = {RoomSeq{entry.first + count - 1}, digest_from(bytes.substr(kSaltBytes + 24, kChainBytes))};
+  entry.head = {RoomSeq{entry.first + count - 1}, *digest_of(bytes.substr(kSaltBytes + 24, kChainBytes))};
   std::string_view left = bytes.substr(kEntryHead, body);
   for (std::uint64_t i = 0; i < count; ++i) {
     if (left.size() < 16 || integer_at(left, 8) > left.size() - 16) return std::nullopt;
@@ -144,11 +135,11 @@ Result<FoundFile> read_member(const fs::path& path, const Digest& journal, Disk&
     return file;
   }
   std::size_t at = kMagic.size();
-  file.start.journal = digest_from(first.substr(at));
+  file.start.journal = *digest_of(first.substr(at, kChainBytes));
   at += kChainBytes;
   file.start.generation = integer_at(first, at);
   file.start.base.place.value = integer_at(first, at + 8);
-  file.start.base.chain = digest_from(first.substr(at + 16));
+  file.start.base.chain = *digest_of(first.substr(at + 16, kChainBytes));
   if (file.start.journal != journal) {
     file.unreadable = kForeign;
     return file;
@@ -186,10 +177,10 @@ void find_older_copy(FoundFile& log, FoundFile& mirror) {
   if (b > a + 1 || (b == a + 1 && !mirror.entries.empty())) log.unreadable = "is an older copy";
 }
 
-// What of one file the other makes good.
-void note_repairs(const FoundFile& log, const FoundFile& mirror, LogContents& found) {
+// What of one file the other makes good, and a write that is not whole.
+void note_differences(const FoundFile& log, const FoundFile& mirror, LogContents& found) {
   const auto note = [&](const FoundFile& bad, const FoundFile& good, const std::string& what) {
-    found.repairs.push_back(bad.path.string() + " " + what + "; its rows were read from " + good.path.string());
+    found.notes.push_back(bad.path.string() + " " + what + "; its rows were read from " + good.path.string());
   };
   const auto lacks_rows = [&](const FoundFile& one, const FoundFile& other) {
     return std::ranges::any_of(other.entries, [&](const Entry& entry) {
@@ -200,12 +191,14 @@ void note_repairs(const FoundFile& log, const FoundFile& mirror, LogContents& fo
   if (!log.unreadable.empty() && !mirror.unreadable.empty()) return;
   if (!log.unreadable.empty()) return note(log, mirror, log.unreadable);
   if (!mirror.unreadable.empty()) return note(mirror, log, mirror.unreadable);
+  for (const FoundFile* file : {&log, &mirror})
+    if (file->ends_in_part)
+      found.notes.push_back(file->path.string() + " ends in a write that is not whole");
   if (mirror.start.generation > log.start.generation) return;
   if (log.damaged || log.last() < mirror.last() || lacks_rows(log, mirror)) note(log, mirror, "is damaged");
   const bool one_behind = !log.entries.empty() && mirror.last().value + 1 == log.entries.back().first;
   if (mirror.damaged || (mirror.last() < log.last() && !one_behind) || lacks_rows(mirror, log))
     note(mirror, log, "is damaged");
-  found.unfinished = found.unfinished || (one_behind && mirror.last() < log.last());
 }
 
 }  // namespace
@@ -229,7 +222,6 @@ Result<LogContents> read_log(const fs::path& journal, const Digest& identity, co
     if (!file.unreadable.empty()) continue;
     found.generation = std::max(found.generation, file.start.generation);
     found.witnessed = std::max({found.witnessed, file.start.base.place, file.last()});
-    found.unfinished = found.unfinished || file.ends_in_part;
     found.bases.emplace_back(file.path, file.start.base);
   }
   for (bool more = true; more;) {
@@ -248,7 +240,7 @@ Result<LogContents> read_log(const fs::path& journal, const Digest& identity, co
   const bool any = members[0].is_there || members[1].is_there;
   if (any && !members[0].unreadable.empty() && !members[1].unreadable.empty())
     for (const FoundFile& file : members) found.faults.push_back(file.path.string() + " " + file.unreadable);
-  if (any) note_repairs(members[0], members[1], found);
+  if (any) note_differences(members[0], members[1], found);
   const auto &log = members[0], &mirror = members[1];
   const auto cut_short = [](const FoundFile& file) { return file.ends_in_part || file.damaged; };
   if (log.unreadable.empty() != mirror.unreadable.empty())
@@ -308,7 +300,9 @@ Result<void> MirroredLog::check_named(const Member& member) {
 
 Result<void> MirroredLog::begin(Member& member, const LogStart& start) {
   // Nobody can put something into a row that is taken for an entry.
-  member.salt = random_bytes(kSaltBytes);
+  std::array<std::uint8_t, kSaltBytes> salt{};
+  system_random()(salt);
+  member.salt.assign(salt.begin(), salt.end());
   member.end = kFirstSector;
   return check_named(member)
       .and_then([&] { return member.file->write_at(0, encode_start(start, member.salt)); })

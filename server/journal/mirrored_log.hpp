@@ -33,10 +33,10 @@ struct LogContents {
   JournalHead head;                  // of the last of them
   std::vector<std::pair<std::filesystem::path, JournalHead>> bases;  // what each file goes on from
   RoomSeq witnessed;                 // the furthest place that either file knows
-  std::vector<std::string> repairs;  // what one file lacks and the other has; one sentence each
+  std::vector<std::string>
+      notes;  // what one file lacks and the other has, a write that is not whole; one sentence each
   std::vector<std::string> foreign;  // files of another journal; one sentence each
   std::vector<std::string> faults;   // why neither can be read; one sentence each
-  bool unfinished = false;           // an entry was being written that nobody was told of
   // A write was cut short in one file, which may have spoiled the entry before it, and the other file does not have
   // that.
   bool doubtful = false;

@@ -47,7 +47,7 @@ VerifyReport report_of(JournalFile& file) {
   return {file.version(),       found.head,
           found.first_bad,      found.witnessed,
           found.closed_cleanly, std::move(found.faults),
-          std::move(found.repairs)};
+          std::move(found.notes)};
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ struct VerifyReport {
   RoomSeq witnessed;                 // the furthest place that a footer or checkpoint vouches for
   bool closed_cleanly = false;
   std::vector<std::string> faults;   // one sentence each
-  std::vector<std::string> repairs;  // what one of its two log files lacks and the other has: nothing is lost
+  std::vector<std::string> notes;    // of its log: what one file lacks and the other has, a write that is not whole
   [[nodiscard]] bool sound() const { return faults.empty(); }
 };
 // Everything: pages, chain, footer, checkpoints and their files. Of any version. Errors: not_found; exists (in use: then the

@@ -148,12 +148,12 @@ void keep_promises(Disk& disk, const std::filesystem::path& folder) {
   EXPECT_EQ(disk.lock(folder / "none", LockKind::exclusive).error().code, ErrorCode::not_found);
   {
     auto opened = disk.open(folder / "file");
-    ASSERT_TRUE(opened && (*opened)->write_at(1, "X") && (*opened)->write_at(4, "e") && (*opened)->sync());
-    EXPECT_EQ(disk.read(folder / "file", 0, 9).value(), std::string("aXc\0e", 5));
+    ASSERT_TRUE(opened && (*opened)->write("d") && (*opened)->write_at(1, "X") && (*opened)->write_durably(5, "f"));
+    EXPECT_EQ(disk.read(folder / "file", 0, 9).value(), std::string("aXcd\0f", 6));
   }
   const auto identity = disk.identity(folder / "file").value();
   ASSERT_TRUE(identity);
-  EXPECT_EQ(identity->size, 5u);
+  EXPECT_EQ(identity->size, 6u);
   auto held = disk.lock(folder / "file", LockKind::exclusive);
   ASSERT_TRUE(held);
   for (const LockKind kind : {LockKind::exclusive, LockKind::shared})

@@ -1,9 +1,5 @@
 // The newest rows of a journal: what a breaker does to their files, and to the journal while it is open.
-#include <fcntl.h>
 #include <gmock/gmock.h>
-#include <sqlite3.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <sstream>
@@ -13,6 +9,7 @@
 #include "tests/support/disk/journal_trials.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/support/temp_dir.hpp"
+#include "tests/unit/journal/old_journals.hpp"
 #include "tests/unit/journal/rows.hpp"
 
 namespace osteon {
@@ -47,8 +44,8 @@ class LogTest : public ::testing::Test {
     Journal journal = std::move(Journal::open(kFile, options()).value());
     EXPECT_EQ(journal.closed_because(), nullptr) << journal.closed_because()->message;
     EXPECT_TRUE(equal(rows_of(journal), rows_));
-    EXPECT_EQ(report->repairs, journal.repairs());
-    return journal.repairs();
+    EXPECT_EQ(report->notes, journal.log_notes());
+    return journal.log_notes();
   }
   // Opens it and expects that it takes no rows. Gives why.
   std::string expect_closed(std::size_t rows) {
@@ -99,7 +96,8 @@ TEST_F(LogTest, DamageToOneOfItsFilesIsReadFromTheOther) {
     EXPECT_THAT(expect_whole(), ElementsAre(with("is damaged")));
     disk_.load(killed);
     disk_.cut(file, killed.at(file).find(rows_[56].bytes));
-    expect_whole();
+    EXPECT_THAT(expect_whole(),
+                ElementsAre(std::string(file) + " ends in a write that is not whole", with("is damaged")));
     disk_.load(killed);
     disk_.cut(file, 0);
     EXPECT_THAT(expect_whole(), ElementsAre(with("is damaged")));
@@ -275,61 +273,11 @@ TEST(JournalReaders, WriteNothingAndMayBeMany) {
   }
 }
 
-// The tables and the write-ahead log of version 2, as its program left them when it was killed.
-void make_version_2(const fs::path& file, const std::vector<JournalRow>& rows) {
-  const pid_t child = ::fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    sqlite3* database = nullptr;
-    const auto run = [&](const std::string& sql) {
-      if (sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) ::_exit(1);
-    };
-    const auto hex = [](const auto& bytes) {
-      std::string text = "x'";
-      for (const auto byte : bytes) {
-        char digits[3];
-        std::snprintf(digits, sizeof digits, "%02x", static_cast<unsigned>(static_cast<unsigned char>(byte)));
-        text += digits;
-      }
-      return text + "'";
-    };
-    if (sqlite3_open(file.c_str(), &database) != SQLITE_OK) ::_exit(1);
-    sqlite3_db_config(database, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
-    run("PRAGMA journal_mode=WAL; PRAGMA wal_autocheckpoint=0");
-    run("CREATE TABLE rows(place INTEGER PRIMARY KEY, at_ns INTEGER NOT NULL, bytes BLOB NOT NULL, chain BLOB NOT "
-        "NULL) STRICT");
-    run("CREATE TABLE registers(name TEXT PRIMARY KEY, value BLOB NOT NULL, seal BLOB NOT NULL) STRICT, WITHOUT ROWID");
-    run("CREATE TABLE checkpoints(place INTEGER PRIMARY KEY, chain BLOB NOT NULL, meta BLOB NOT NULL, size INTEGER NOT "
-        "NULL,"
-        " digest BLOB NOT NULL, seal BLOB NOT NULL) STRICT");
-    run("CREATE TABLE people(pseudonym TEXT PRIMARY KEY, label TEXT NOT NULL, joined_day INTEGER NOT NULL,"
-        " seal BLOB NOT NULL) STRICT, WITHOUT ROWID");
-    run("PRAGMA application_id=0x4f73744a; PRAGMA user_version=2");
-    Hasher seal;
-    seal.text("register");
-    seal.text("genesis");
-    seal.text("bone");
-    run("INSERT INTO registers VALUES('genesis', " + hex(std::string("bone")) + ", " + hex(seal.finish().bytes) + ")");
-    run("PRAGMA wal_checkpoint(TRUNCATE)");
-    std::vector<JournalRow> so_far;
-    for (const JournalRow& row : rows) {
-      so_far.push_back(row);
-      run("INSERT INTO rows VALUES(" + std::to_string(row.place.value) + ", " + std::to_string(row.at_ns) + ", " +
-          hex(row.bytes) + ", " + hex(plain_head("bone", so_far).chain.bytes) + ")");
-    }
-    ::_exit(0);
-  }
-  int status = 0;
-  ASSERT_EQ(::waitpid(child, &status, 0), child);
-  ASSERT_EQ(status, 0);
-  ASSERT_GT(fs::file_size(file.string() + "-wal"), 0u) << "its rows are in SQLite's log";
-}
-
 TEST(Migration, OpensTheSecondVersionAsItIs) {
   const test::TempDir folder;
   const fs::path file = folder / "journal";
   const std::vector<JournalRow> rows = some_rows(12, 31);
-  ASSERT_NO_FATAL_FAILURE(make_version_2(file, {rows.begin(), rows.begin() + 30}));
+  ASSERT_NO_FATAL_FAILURE(make_old_journal(file, 2, {rows.begin(), rows.begin() + 30}, RowsIn::sqlites_log));
   const auto before = contents_of(folder.path());
   const auto verified = verify_journal(file);
   ASSERT_TRUE(verified) << verified.error().message;

@@ -7,6 +7,7 @@
 #include "tests/support/disk/journal_trials.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/support/temp_dir.hpp"
+#include "tests/unit/journal/old_journals.hpp"
 #include "tests/unit/journal/rows.hpp"
 
 namespace osteon {
@@ -197,51 +198,12 @@ TEST_F(UpkeepTest, WhatClientsKnowCountsAsLost) {
   EXPECT_EQ(recovered->lost(), 4u);
 }
 
-// Made by the program of the first version: its tables, in its words.
-void make_version_1(const std::filesystem::path& file, const std::vector<JournalRow>& rows) {
-  sqlite3* database = nullptr;
-  ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
-  const auto run = [&](const std::string& sql) {
-    char* why = nullptr;
-    ASSERT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, &why), SQLITE_OK) << why << " in " << sql;
-  };
-  const auto hex = [](const auto& bytes) {
-    std::string text = "x'";
-    for (const auto byte : bytes) {
-      char digits[3];
-      std::snprintf(digits, sizeof digits, "%02x", static_cast<unsigned>(static_cast<unsigned char>(byte)));
-      text += digits;
-    }
-    return text + "'";
-  };
-  run("PRAGMA journal_mode=WAL");
-  run("CREATE TABLE rows(place INTEGER PRIMARY KEY, bytes BLOB NOT NULL, chain BLOB NOT NULL) STRICT");
-  run("CREATE TABLE registers(name TEXT PRIMARY KEY, value BLOB NOT NULL, seal BLOB NOT NULL) STRICT, WITHOUT ROWID");
-  run("CREATE TABLE checkpoints(place INTEGER PRIMARY KEY, chain BLOB NOT NULL, meta BLOB NOT NULL, size INTEGER NOT NULL,"
-      " digest BLOB NOT NULL, seal BLOB NOT NULL) STRICT");
-  run("CREATE TABLE people(pseudonym TEXT PRIMARY KEY, label TEXT NOT NULL, joined_day INTEGER NOT NULL,"
-      " seal BLOB NOT NULL) STRICT, WITHOUT ROWID");
-  run("PRAGMA application_id=0x4f73744a; PRAGMA user_version=1");
-  Hasher seal;
-  seal.text("register");
-  seal.text("genesis");
-  seal.text("bone");
-  run("INSERT INTO registers VALUES('genesis', " + hex(std::string("bone")) + ", " + hex(seal.finish().bytes) + ")");
-  std::vector<JournalRow> so_far;
-  for (const JournalRow& row : rows) {
-    so_far.push_back(row);
-    run("INSERT INTO rows VALUES(" + std::to_string(row.place.value) + ", " + hex(row.bytes) + ", " +
-        hex(plain_head("bone", so_far).chain.bytes) + ")");
-  }
-  ASSERT_EQ(sqlite3_close(database), SQLITE_OK);
-}
-
 TEST(Migration, TakesAFirstVersionIntoACopyWithTheSameChain) {
   const test::TempDir folder;
   const std::filesystem::path old = folder / "old", now = folder / "new";
   std::vector<JournalRow> rows = some_rows(11, 30);
   for (JournalRow& row : rows) row.at_ns = 0;  // it kept no times
-  ASSERT_NO_FATAL_FAILURE(make_version_1(old, rows));
+  ASSERT_NO_FATAL_FAILURE(make_old_journal(old, 1, rows, RowsIn::file));
 
   const auto opened = Journal::open(old);
   ASSERT_FALSE(opened);
