@@ -232,8 +232,8 @@ def close_up(step):
 
 def check_journal(programs, journal, case):
     """What osteon-server says of a journal that no server has open, and of the bone that its events make again."""
-    result = subprocess.run([programs / "osteon-server", "verify", journal, "--case", case], capture_output=True, text=True,
-                            check=False)
+    result = subprocess.run([programs / "osteon-server", "verify", journal, "--case", case,
+                             "--key", journal.parent / "signing.key"], capture_output=True, text=True, check=False)
     said = dict(line.split(":", 1) for line in result.stdout.splitlines() if ":" in line)
     return {"sound": result.returncode == 0 and said.get("verdict", "").strip() == "sound",
             "field_hash": said.get("field hash", "").strip(),

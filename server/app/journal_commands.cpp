@@ -17,10 +17,12 @@
 #include <vector>
 
 #include "common/field/kernel.hpp"
+#include "common/runtime/files.hpp"
 #include "common/runtime/progress.hpp"
 #include "common/volume/case.hpp"
 #include "common/volume/field_file.hpp"
 #include "server/journal/journal_file.hpp"
+#include "server/journal/signing.hpp"
 #include "server/journal/upkeep.hpp"
 #include "server/net/journal_rows.hpp"
 #include "server/net/room_files.hpp"
@@ -32,7 +34,8 @@ namespace fs = std::filesystem;
 
 struct Arguments {
   fs::path file, to, case_folder, fields;
-  std::string name;
+  std::string name, key;
+  fs::path signing_key;
   std::uint64_t at = 0;
   std::uint32_t person = 0;
   int days = 0;
@@ -51,10 +54,20 @@ auto with_journal(const fs::path& file, const Do& what) -> decltype(what(std::de
   return what(*journal);
 }
 
+// The key that signs what is changed: the one that was given, or the one in the journal's folder. Null: there is none.
+Result<std::shared_ptr<const SigningKeys>> keys_for(const Arguments& given) {
+  if (!given.signing_key.empty()) return load_signing_keys(given.signing_key);
+  auto keys = load_signing_keys(folder_of(given.file) / kSigningKeyFile);
+  if (!keys && keys.error().code == ErrorCode::not_found) return nullptr;
+  return keys;
+}
+
 // Opens a journal, changes it and closes it, also after an error: so that it still vouches for its end.
 template <class Do>
-auto change_journal(const fs::path& file, const Do& what) -> decltype(what(std::declval<Journal&>())) {
-  Result<Journal> journal = Journal::open(file);
+auto change_journal(const Arguments& given, const Do& what) -> decltype(what(std::declval<Journal&>())) {
+  Result<std::shared_ptr<const SigningKeys>> keys = keys_for(given);
+  if (!keys) return tl::unexpected(keys.error());
+  Result<Journal> journal = Journal::open(given.file, {.keys = std::move(*keys)});
   if (!journal) return tl::unexpected(journal.error());
   auto done = what(*journal);
   const Result<void> closed = journal->close();
@@ -170,7 +183,51 @@ Result<Room> replayed(const Arguments& given) {
   });
 }
 
+std::string rows_text(RoomSeq from, RoomSeq to) {
+  return std::to_string(from.value) + " to " + std::to_string(to.value);
+}
+
+// A key as 64 digits, or a file that has them or is a signing key.
+Result<PublicKey> public_key_of(const std::string& given) {
+  if (Result<PublicKey> key = parse_public_key(given)) return key;
+  std::error_code ignored;
+  if (!fs::exists(given, ignored))
+    return failure(ErrorCode::not_found, "--key " + given + " is neither 64 hexadecimal digits nor a file; give what "
+                                             "osteon-server key show prints");
+  if (const auto keys = load_signing_keys(given)) return (*keys)->key().public_key();
+  const Result<std::string> content = read_file(given);
+  if (!content) return tl::unexpected(content.error());
+  return parse_public_key(*content).map_error([&](Error error) {
+    error.message = "--key " + given + ": " + error.message;
+    return error;
+  });
+}
+
+// Says who signed what. Error invalid_input: the key does not vouch for all of it.
+Result<void> check_signatures(const VerifyReport& report, const Arguments& given, const PublicKey& key) {
+  const Vouched vouched = vouched_by(key, report);
+  const auto by = [&](const PublicKey& who) {
+    return "by " + to_hex(who).substr(0, 16) + (who == key ? "" : ", of the same line of keys");
+  };
+  for (const SignedRange& one : vouched.rows) say("signed", rows_text(one.from, one.to) + " " + by(one.key));
+  for (const SignedRange& one : vouched.by_others)
+    say("not signed", rows_text(one.from, one.to) + " by this key, but by " + to_hex(one.key));
+  for (const auto& [from, to] : vouched.by_nobody) say("not signed", rows_text(from, to) + " by anybody");
+  for (const std::string& entry : vouched.entries_unsigned) say("not signed", entry + " by this key");
+  if (report.closed_cleanly)
+    say("footer", report.footer_by ? "signed by " + to_hex(*report.footer_by).substr(0, 16) : "not signed");
+  if (vouched.all()) return {};
+  return failure(ErrorCode::invalid_input,
+                 given.file.string() + " fits together, but the key " + to_hex(key).substr(0, 16) +
+                     " does not vouch for all of it; give the key of the server that wrote it, or "
+                     "take what is not signed for no evidence");
+}
+
 Result<void> verify(const Arguments& given) {
+  const Result<std::optional<PublicKey>> key =
+      given.key.empty() ? Result<std::optional<PublicKey>>(std::nullopt)
+                        : public_key_of(given.key).map([](const PublicKey& found) { return std::optional(found); });
+  if (!key) return tl::unexpected(key.error());
   const Result<VerifyReport> report = verify_journal(given.file);
   if (!report) return tl::unexpected(report.error());
   say("events", text_of(report->head));
@@ -187,7 +244,12 @@ Result<void> verify(const Arguments& given) {
     say("field hash", to_hex(room->field_hash()));
     say("room hash", to_hex(room->room_hash()));
   }
-  say("verdict", "sound");
+  if (*key) {
+    if (const Result<void> vouched = check_signatures(*report, given, **key); !vouched) return vouched;
+    say("verdict", "sound");
+  } else {
+    say("verdict", "unsigned (it fits together; with --key, who signed it is checked too)");
+  }
   return {};
 }
 
@@ -328,7 +390,7 @@ Result<void> forget(const Arguments& given) {
   if ((given.person == 0) == (given.days == 0))
     return failure(ErrorCode::invalid_input, "forget needs either --person NUMBER, as \"people\" lists it, or --older-than DAYS");
   const auto today = std::chrono::duration_cast<std::chrono::days>(std::chrono::system_clock::now().time_since_epoch());
-  return change_journal(given.file, [&](Journal& journal) -> Result<void> {
+  return change_journal(given, [&](Journal& journal) -> Result<void> {
     // Also where nobody was to be forgotten: a name may be in what cannot be read.
     if (const Error* closed = journal.closed_because()) return tl::unexpected(*closed);
     const Result<std::size_t> forgotten =
@@ -345,7 +407,7 @@ Result<void> forget(const Arguments& given) {
 
 // What a file is named decides as what room it is served; so a new name is given on purpose.
 Result<void> rename_room(const Arguments& given) {
-  return change_journal(given.file, [&](Journal& journal) -> Result<void> {
+  return change_journal(given, [&](Journal& journal) -> Result<void> {
     if (const Error* closed = journal.closed_because()) return tl::unexpected(*closed);
     const Result<std::string> before = room_name(journal);
     if (!before) return tl::unexpected(before.error());
@@ -370,8 +432,17 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
     sub->add_option("new", given->to, "The file to make; nothing may be there")->required();
     return sub;
   };
-  command("verify", "Holds every event against the chain of hashes, and checkpoints and footer against it", verify)
-      ->add_option("--case", given->case_folder, "Folder of the case: makes the room again, too, and says its hashes");
+  const auto signs = [&](CLI::App* sub) {
+    sub->add_option("--signing-key", given->signing_key,
+                    "The server's signing key; by default signing.key beside the journal, where that is there");
+  };
+  CLI::App* check =
+      command("verify", "Holds every event against the chain of hashes, and checkpoints and footer against it", verify);
+  check->add_option("--case", given->case_folder, "Folder of the case: makes the room again, too, and says its hashes");
+  check->add_option(
+      "--key", given->key,
+      "Public key of the server, as \"key show\" prints it: says who signed the events up to which, and which "
+      "nobody signed");
   copies("recover", "Copies what can be confirmed of a damaged journal into a new one", recover);
   copies("backup", "Copies a sound journal", [](const Arguments& a) { return backup_journal(a.file, a.to); });
   copies("migrate", "Copies a journal of an earlier version into one of today's", [](const Arguments& a) { return migrate_journal(a.file, a.to); });
@@ -389,9 +460,11 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
   CLI::App* gone = command("forget", "Forgets who people were; what they did stays", forget);
   gone->add_option("--person", given->person, "Number of one, as \"people\" lists it");
   gone->add_option("--older-than", given->days, "All who came more than so many days ago");
-  command("rename-room", "Gives a room another name, which its file must have to be served", rename_room)
-      ->add_option("name", given->name, "The new name: that of the file, without .journal")
-      ->required();
+  signs(gone);
+  CLI::App* renamed =
+      command("rename-room", "Gives a room another name, which its file must have to be served", rename_room);
+  renamed->add_option("name", given->name, "The new name: that of the file, without .journal")->required();
+  signs(renamed);
   CLI::App* end = command("delete", "Removes a room: its journal and all files beside it", remove);
   CLI::Option* too = end->add_flag("--branches", given->branches, "And its branches in the same folder, and theirs");
   end->add_flag("--alone", given->alone, "Its branches stay")->excludes(too);

@@ -21,9 +21,11 @@
 #include "common/volume/mesh_distance.hpp"
 #include "server/app/case_commands.hpp"
 #include "server/app/journal_commands.hpp"
+#include "server/app/key_command.hpp"
 #include "server/app/room_commands.hpp"
 #include "server/app/server_config.hpp"
 #include "server/app/ticket_command.hpp"
+#include "server/journal/signing.hpp"
 #include "server/net/metrics.hpp"
 #include "server/net/room_files.hpp"
 #include "server/net/room_server.hpp"
@@ -144,8 +146,10 @@ Result<Room> make_room(const ServerConfig& options, const Case& bone, std::share
 }
 
 // The room that the journal keeps, or a new one in a new journal.
-Result<Room> open_journal(const ServerConfig& options, const Case& bone, std::shared_ptr<ToolBox> tools, std::unique_ptr<RoomKeeper>& keeper) {
+Result<Room> open_journal(const ServerConfig& options, const Case& bone, std::shared_ptr<ToolBox> tools,
+                          std::shared_ptr<const SigningKeys> keys, std::unique_ptr<RoomKeeper>& keeper) {
   RoomKeeper::Options keeping{.name = options.journal_file.stem().string(), .limits = options.limits, .tools = std::move(tools), .journal = {}, .today = {}, .random = {}};
+  keeping.journal.keys = std::move(keys);
   keeping.retention_days = options.retention_days;
   Progress progress("journal");
   Result<KeptRoom> kept = RoomKeeper::open(options.journal_file, bone, keeping, [&](double fraction) { progress.update(fraction); });
@@ -178,10 +182,23 @@ Result<std::vector<KnownCase>> open_uploads(const std::filesystem::path& folder,
   return known;
 }
 
+// What signs the journals. Null: none is kept.
+Result<std::shared_ptr<const SigningKeys>> open_signing_keys(const ServerConfig& options) {
+  if (options.rooms_folder.empty() && options.journal_file.empty()) return nullptr;
+  const std::filesystem::path folder =
+      options.rooms_folder.empty() ? folder_of(options.journal_file) : options.rooms_folder;
+  const std::filesystem::path file = options.signing_key.empty() ? folder / kSigningKeyFile : options.signing_key;
+  auto keys = load_or_make_signing_keys(file);
+  if (keys) log::info("signing key", {{"file", file.string()}, {"public", to_hex((*keys)->key().public_key())}});
+  return keys;
+}
+
 // What the command line asks for: the rooms of a folder, or one room.
 Result<std::unique_ptr<Rooms>> open_rooms(const ServerConfig& options) {
   Result<std::function<std::shared_ptr<ToolBox>()>> tools = tool_boxes(options);
   if (!tools) return tl::unexpected(tools.error());
+  Result<std::shared_ptr<const SigningKeys>> keys = open_signing_keys(options);
+  if (!keys) return tl::unexpected(keys.error());
   RoomsOptions rooms_options;
   rooms_options.folder = options.rooms_folder;
   rooms_options.limits = options.limits;
@@ -190,6 +207,7 @@ Result<std::unique_ptr<Rooms>> open_rooms(const ServerConfig& options) {
   rooms_options.rates.mount = options.mount;
   rooms_options.retention_days = options.retention_days;
   rooms_options.most_rooms = options.most_rooms;
+  rooms_options.keys = *keys;
   rooms_options.case_memory_bytes = static_cast<std::uint64_t>(options.case_memory_mib) << 20;
   std::uint64_t case_bytes = 0;
   for (const std::filesystem::path& folder : options.case_folders) {
@@ -219,7 +237,8 @@ Result<std::unique_ptr<Rooms>> open_rooms(const ServerConfig& options) {
     return rooms;
   }
   std::unique_ptr<RoomKeeper> keeper;
-  Result<Room> room = options.journal_file.empty() ? make_room(options, bone, (*tools)()) : open_journal(options, bone, (*tools)(), keeper);
+  Result<Room> room = options.journal_file.empty() ? make_room(options, bone, (*tools)())
+                                                   : open_journal(options, bone, (*tools)(), *keys, keeper);
   if (!room) return tl::unexpected(room.error());
   const std::string name = keeper ? keeper->genesis().room : "room";
   if (auto added = rooms->add(name, std::move(*room), std::move(keeper), options.save_file, tell); !added)
@@ -319,6 +338,7 @@ int main(int argc, char** argv) {
   add_room_commands(app, command);
   add_case_commands(app, command);
   add_ticket_command(app, command);
+  add_key_command(app, command);
   app.require_subcommand(0, 1);
   app.add_option("--listen", options.listen, "HOST:PORT on this machine; port 0 lets the system choose")->capture_default_str();
   app.add_option("--certificates", options.certificates,
@@ -347,6 +367,9 @@ int main(int argc, char** argv) {
       ->excludes(resume)
       ->excludes("--journal")
       ->excludes("--save");
+  app.add_option(
+      "--signing-key", options.signing_key,
+      "File of the key that signs journals, made where it is missing; by default signing.key beside the journals");
   app.add_option("--uploads", options.uploads_folder,
                  "Folder in which cases are kept that \"osteon-server cases upload\" sends, for rooms of their own; without it none are taken");
   app.add_option("--case-memory-mib", options.case_memory_mib,

@@ -126,6 +126,7 @@ const std::vector<Field>& fields() {
       {"retention_days", [](const Value& v, Config& c) { c.retention_days = whole(v, 1, 36500); }},
       {"rooms", [](const Value& v, Config& c) { c.rooms_folder = path(v); }},
       {"save", [](const Value& v, Config& c) { c.save_file = path(v); }},
+      {"signing_key", [](const Value& v, Config& c) { c.signing_key = path(v); }},
       {"summary", [](const Value& v, Config& c) { c.summary_file = path(v); }},
       {"tools", [](const Value& v, Config& c) { c.tools_folder = path(v); }},
       {"uploads", [](const Value& v, Config& c) { c.uploads_folder = path(v); }},
@@ -252,6 +253,8 @@ Result<void> check_server_config(const ServerConfig& config) {
                      ", on the command line as in a --config file; leave one");
   if (!config.uploads_folder.empty() && config.rooms_folder.empty())
     return wrong("--uploads needs --rooms, since a case that is uploaded is for rooms of its own; give --rooms FOLDER too");
+  if (!config.signing_key.empty() && !ways[0].second && !ways[1].second)
+    return wrong("--signing-key signs journals, and none is kept; give --rooms FOLDER or --journal FILE too");
   if (ways[0].second && !config.save_file.empty())
     return wrong("--rooms excludes --save, on the command line as in a --config file; leave one");
   if (config.plain == !config.certificates.empty())
@@ -277,6 +280,7 @@ Result<void> check_server_places(const ServerConfig& config) {
                                                            {"journal (--journal)", config.journal_file},
                                                            {"save (--save)", config.save_file},
                                                            {"summary (--summary)", config.summary_file},
+                                                           {"signing_key (--signing-key)", config.signing_key},
                                                            {"rooms (--rooms)", config.rooms_folder},
                                                            {"uploads (--uploads)", config.uploads_folder}};
   for (const auto& [what, path] : written) {

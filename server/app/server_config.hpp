@@ -28,6 +28,7 @@ struct ServerConfig {
   int most_rooms = kMostRooms;          // open and closed ones together
   std::filesystem::path address_file, summary_file, tools_folder;
   std::filesystem::path save_file, resume_file, journal_file, rooms_folder, uploads_folder;
+  std::filesystem::path signing_key;    // empty: beside the journals
   int case_memory_mib = static_cast<int>(kMostCaseMemory >> 20);  // of all cases in memory
   int retention_days = 0;               // 0: nobody is forgotten
   Detail detail = Detail::automatic;

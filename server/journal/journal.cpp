@@ -129,8 +129,9 @@ Result<Journal> Journal::open_to_read(const fs::path& file, Disk* given) {
   auto opened = JournalFile::open_to_read(file, disk);
   if (!opened) return tl::unexpected(opened.error());
   Journal journal(std::unique_ptr<State>(
-      new State{file, options, &disk, std::move(*lock), std::move(*opened), {}, {}, {}, 0, {}, {}, {}, true}));
+      new State{file, options, &disk, std::move(*lock), std::move(*opened), {}}));
   State& state = *journal.state_;
+  state.only_read = true;
   Inspection found = state.file.inspect(false);
   state.head = found.head;
   state.notes = std::move(found.notes);
@@ -150,7 +151,7 @@ Result<Journal> Journal::open_locked(const fs::path& file, const JournalOptions&
   if (!identity) return tl::unexpected(identity.error());
   if (!*identity) return failure(ErrorCode::not_found, file.string() + " was removed while it was opened");
   Journal journal(std::unique_ptr<State>(
-      new State{file, options, &disk, std::move(lock), std::move(*opened), **identity, {}, {}, 0, {}, {}, {}, false}));
+      new State{file, options, &disk, std::move(lock), std::move(*opened), **identity}));
   State& state = *journal.state_;
   Inspection found = state.file.inspect(false);
   state.head = found.head;
@@ -163,6 +164,11 @@ Result<Journal> Journal::open_locked(const fs::path& file, const JournalOptions&
   if (!recovered) return tl::unexpected(recovered.error());
   if (*recovered) state.recovered_to = RoomSeq{decode_number(**recovered).value_or(0)};
 
+  if (const Result<void> signing = journal.begin_signing(); !signing) {
+    if (signing.error().code != ErrorCode::unavailable) return tl::unexpected(signing.error());
+    state.closed = signing.error();
+    return journal;
+  }
   const auto kept = state.file.checkpoints();
   if (!kept) return tl::unexpected(kept.error());
   if (Result<void> cleared = clear_leftovers(disk, file, *kept); !cleared) return tl::unexpected(cleared.error());
@@ -180,15 +186,73 @@ Result<void> Journal::begin_log() {
   if (!log) return tl::unexpected(log.error());
   state.log = std::move(*log);
   state.generation = state.file.generation();
-  return carry();
+  return note_keys().and_then([&] { return carry(); });
+}
+
+// Whoever has a later key of the same server, or an earlier one, finds here that they belong together.
+Result<void> Journal::note_keys() {
+  State& state = *state_;
+  if (!state.options.keys) return {};
+  const auto stored = state.file.find_register(kKeysRegister);
+  if (!stored) return tl::unexpected(stored.error());
+  std::vector<Succession> all = *stored ? decode_successions(**stored).value_or(std::vector<Succession>{})
+                                        : std::vector<Succession>{};
+  const std::size_t known = all.size();
+  for (const Succession& one : state.options.keys->successions())
+    if (std::ranges::find(all, one) == all.end()) all.push_back(one);
+  return all.size() == known ? Result<void>{} : state.file.set_register(kKeysRegister, encode_successions(all));
+}
+
+Result<void> Journal::begin_signing() {
+  State& state = *state_;
+  const SigningKeys* keys = state.options.keys.get();
+  if (keys == nullptr) return {};
+  state.file.sign_with(&keys->key());
+  const auto all = state.file.signed_rows();
+  if (!all) return tl::unexpected(all.error());
+  const auto last =
+      std::find_if(all->rbegin(), all->rend(), [&](const SignedRows& one) { return keys->trusts(one.key); });
+  const RoomSeq head = state.head.place;
+  const bool any = last != all->rend();
+  if (any && last->head.place == head) {
+    state.signed_since = last->since;
+    return {};
+  }
+  state.signed_since = RoomSeq{head.value + 1};
+  if (head.value == 0) return {};
+  const RoomSeq signed_to = any ? last->head.place : RoomSeq{};
+  const std::string rows = "rows " + std::to_string(signed_to.value + 1) + " to " + std::to_string(head.value);
+  if (any && head > state.recovered_to.value_or(RoomSeq{}))
+    return failure(ErrorCode::unavailable, state.path.string() + ": this server's key signed the rows up to " +
+                                               std::to_string(signed_to.value) + ", but not " + rows +
+                                               ": somebody else wrote them; recover it into a new journal");
+  state.notes.push_back(rows + " were not signed by this server's key, which signs those after them");
+  return {};
+}
+
+Result<bool> Journal::is_vouched_for(std::string_view name) {
+  const SigningKeys* keys = state_->options.keys.get();
+  if (keys == nullptr) return true;
+  const auto found = state_->file.find_sealed(name);
+  if (!found) return tl::unexpected(found.error());
+  if (!*found) return true;
+  const auto signer = state_->file.signer_of(**found);
+  return signer && keys->trusts(*signer);
+}
+
+Result<void> Journal::keep_signature() {
+  State& state = *state_;
+  return state.last_signature ? state.file.add_signed_rows(*state.last_signature) : Result<void>{};
 }
 
 // At every moment either the database or one of the log files has each row: see MirroredLog::begin_mirror().
 Result<void> Journal::carry() {
   State& state = *state_;
   Database& database = state.file.database();
-  const LogStart start{state.file.identity(), state.generation + 1, state.head};
-  return database.commit()
+  LogStart start{state.file.identity(), state.generation + 1, state.head};
+  if (state.signed_since) start.signer = {state.options.keys->key().public_key(), *state.signed_since};
+  return keep_signature()
+      .and_then([&] { return database.commit(); })
       .and_then([&] { return state.log->begin_mirror(start); })
       .and_then([&] { return database.begin(); })
       .and_then([&] { return state.file.note_generation(start); })
@@ -200,6 +264,7 @@ Result<void> Journal::carry() {
       .and_then([&](const std::optional<FileIdentity>& now) -> Result<void> {
         if (now && now->same_file(state.identity)) state.identity = *now;  // as long as it is now, at least
         state.generation = start.generation;
+        state.last_signature.reset();
         return {};
       });
 }
@@ -242,7 +307,7 @@ Result<void> Journal::write_through(const std::function<Result<void>()>& work) {
   return write([&] { return work().and_then([&] { return carry(); }); });
 }
 
-const std::vector<std::string>& Journal::log_notes() const { return state_->notes; }
+const std::vector<std::string>& Journal::notes() const { return state_->notes; }
 
 void Journal::close_for_good(Error reason) {
   State& state = *state_;
@@ -262,8 +327,16 @@ Result<void> Journal::append(std::span<const JournalRow> rows) {
   if (rows.empty()) return {};
   JournalHead head = state.head;
   // Into the transaction, which is in memory, and into the log, which makes them safe.
-  const Result<void> done =
-      write([&] { return state.file.add_rows(rows, head).and_then([&] { return state.log->append(rows, head); }); });
+  const Result<void> done = write([&] {
+    return state.file.add_rows(rows, head).and_then([&] {
+      std::optional<Signature> signature;
+      if (state.signed_since) {
+        state.last_signature = sign_rows(state.options.keys->key(), *state.signed_since, head);
+        signature = state.last_signature->signature;
+      }
+      return state.log->append(rows, head, signature);
+    });
+  });
   if (!done) return done;
   state.head = head;
   // The rows are safe whatever becomes of this.
@@ -328,7 +401,8 @@ Result<void> Journal::check_witness(const JournalHead& witness) {
                  file + " and a client know different histories up to place " + place + "; it has to join anew");
 }
 
-Result<CheckpointFile> Journal::begin_checkpoint(const JournalHead& at, std::string_view meta) {
+Result<CheckpointFile> Journal::begin_checkpoint(const JournalHead& at, std::string_view meta,
+                                                 std::string_view seal) {
   State& state = *state_;
   if (state.closed) return tl::unexpected(*state.closed);
   const auto chain = state.file.chain_at(at.place);
@@ -342,7 +416,7 @@ Result<CheckpointFile> Journal::begin_checkpoint(const JournalHead& at, std::str
     return failure(ErrorCode::exists, state.path.string() + " has a checkpoint at place " + std::to_string(at.place.value));
   auto file = DurableFile::begin(*state.disk, checkpoint_file(state.path, at));
   if (!file) return tl::unexpected(file.error());
-  return CheckpointFile({at, std::string(meta), 0, {}}, std::move(*file));
+  return CheckpointFile({at, std::string(meta), 0, {}, std::string(seal)}, std::move(*file));
 }
 
 Result<void> Journal::add_checkpoint(CheckpointFile file) {
@@ -392,7 +466,7 @@ Result<void> Journal::set_beside(const Registers& registers, const std::vector<P
     Result<void> done;
     for (const auto& [name, value] : registers) {
       OSTEON_CHECK(name != kGenesisRegister && name != kFooterRegister && name != kGenerationRegister &&
-                   name != kIdRegister);
+                   name != kIdRegister && name != kKeysRegister);
       if (done) done = state_->file.set_register(name, value);
     }
     for (const Person& person : people)
@@ -458,7 +532,8 @@ Result<void> Journal::close() {
   if (vouched) {
     Database& database = state.file.database();
     done = write([&] {
-      return state.file.set_register(kFooterRegister, encode_footer({state.head, true}))
+      return keep_signature()
+          .and_then([&] { return state.file.set_register(kFooterRegister, encode_footer({state.head, true})); })
           .and_then([&] { return database.commit(); })
           .and_then([&] { return database.carry_log(); });
     });

@@ -86,8 +86,10 @@ class Journal {
   // Where it was cut off when it was recovered from a damaged one: what a witness knows beyond is lost for good.
   [[nodiscard]] std::optional<RoomSeq> recovered_to() const;
 
-  // The room as it was at `at`, not beyond head(). Error exists: there is one of that place; invalid_input: another history.
-  [[nodiscard]] Result<CheckpointFile> begin_checkpoint(const JournalHead& at, std::string_view meta);
+  // The room as it was at `at`, not beyond head(). `seal`: of the checkpoint that this one is a copy of. Errors: exists
+  // (there is one of that place), invalid_input (another history).
+  [[nodiscard]] Result<CheckpointFile> begin_checkpoint(const JournalHead& at, std::string_view meta,
+                                                        std::string_view seal = {});
   // Of a finished file. Only the newest two stay.
   [[nodiscard]] Result<void> add_checkpoint(CheckpointFile file);
   [[nodiscard]] Result<std::vector<Checkpoint>> checkpoints();  // newest first
@@ -111,9 +113,11 @@ class Journal {
   // Carries the rows of the log into the database, if there are some hundred: for when the room is idle, since it takes
   // a few syncs. An error closes the journal to rows.
   [[nodiscard]] Result<void> tidy();
-  // What was found in its log when it was opened, a sentence each: what one file lacked and the other had, a write that
-  // is not whole, since its process was killed.
-  [[nodiscard]] const std::vector<std::string>& log_notes() const;
+  // What was found when it was opened, a sentence each: what one file of its log lacked and the other had, a write that
+  // is not whole, since its process was killed, rows that its key does not vouch for.
+  [[nodiscard]] const std::vector<std::string>& notes() const;
+  // Whether one of JournalOptions::keys signed a register that is there; without keys, whatever is there.
+  [[nodiscard]] Result<bool> is_vouched_for(std::string_view name);
   // Vouches for the head in a footer, with which the log is needed no more and goes; of a journal that is closed to
   // rows, nothing. The journal must not be used afterwards.
   [[nodiscard]] Result<void> close();
@@ -130,6 +134,11 @@ class Journal {
   [[nodiscard]] Result<void> carry();  // the log into the database
   [[nodiscard]] Result<void> check_named();
   [[nodiscard]] Result<void> begin_log();
+  // Finds out from which row on its key vouches for the rows. Error unavailable: rows without a signature follow on
+  // signed ones.
+  [[nodiscard]] Result<void> begin_signing();
+  [[nodiscard]] Result<void> note_keys();
+  [[nodiscard]] Result<void> keep_signature();  // of the newest rows, in the database
   void close_for_good(Error reason);  // with a note beside the file for the next process
   [[nodiscard]] Result<std::size_t> keep_people(const std::function<bool(const Person&)>& kept);
   std::unique_ptr<State> state_;

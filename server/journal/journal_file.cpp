@@ -22,7 +22,7 @@ constexpr std::string_view kRemedy = "; recover it into a new journal";
 // older ones columns for what they did not have.
 struct Version {
   int number;
-  const char* tables;
+  std::string tables;
   const char* rows;
 };
 
@@ -36,14 +36,19 @@ struct Version {
 constexpr const char* kTimedTables =
     "CREATE TABLE rows(place INTEGER PRIMARY KEY, at_ns INTEGER NOT NULL, bytes BLOB NOT NULL,"
     " chain BLOB NOT NULL) STRICT;" OSTEON_OTHER_TABLES;
+constexpr const char* kSignatureTable =
+    "CREATE TABLE signatures(place INTEGER PRIMARY KEY, since INTEGER NOT NULL, chain BLOB NOT NULL, key BLOB NOT NULL,"
+    " signature BLOB NOT NULL) STRICT;";
+constexpr int kVersionWithSignatures = 4;
 constexpr const char* kTimedRows =
     "SELECT place, at_ns, bytes, chain FROM rows WHERE place > ? AND place <= ? ORDER BY place";
 
-constexpr std::array kVersions{
+const std::array kVersions{
     Version{1,
             "CREATE TABLE rows(place INTEGER PRIMARY KEY, bytes BLOB NOT NULL, chain BLOB NOT NULL) STRICT;" OSTEON_OTHER_TABLES,
             "SELECT place, 0, bytes, chain FROM rows WHERE place > ? AND place <= ? ORDER BY place"},
-    Version{2, kTimedTables, kTimedRows}, Version{kJournalVersion, kTimedTables, kTimedRows}};
+    Version{2, kTimedTables, kTimedRows}, Version{3, kTimedTables, kTimedRows},
+    Version{kJournalVersion, std::string(kTimedTables) + kSignatureTable, kTimedRows}};
 
 const Version& version_of(int number) {
   return *std::find_if(kVersions.begin(), kVersions.end(), [&](const Version& v) { return v.number == number; });
@@ -189,7 +194,7 @@ Result<void> JournalFile::make(const fs::path& file, std::string_view genesis, D
   Database& own = made.database_;
   return own.begin()
       .and_then([&] {
-        return own.run(std::string(version_of(kJournalVersion).tables) +
+        return own.run(version_of(kJournalVersion).tables +
                        "PRAGMA application_id=" + std::to_string(kApplication) +
                        "; PRAGMA user_version=" + std::to_string(kJournalVersion) + ";");
       })
@@ -417,7 +422,8 @@ Result<std::vector<Checkpoint>> JournalFile::checkpoints() {
     checkpoint.meta = statement->bytes(2);
     checkpoint.size = static_cast<std::uint64_t>(statement->integer(3));
     checkpoint.digest = digest.value_or(Digest{});
-    if (!chain || !digest || statement->bytes(5) != as_text(seal_of(checkpoint)))
+    checkpoint.seal = statement->bytes(5);
+    if (!chain || !digest || !check_seal(checkpoint.seal, seal_of(checkpoint), first_head(genesis_).chain))
       return damaged("the entry of the checkpoint at place " + std::to_string(checkpoint.at.place.value));
     all.push_back(std::move(checkpoint));
   }
@@ -452,15 +458,88 @@ Result<std::vector<std::string>> JournalFile::registers() {
 }
 
 Result<std::optional<std::string>> JournalFile::find_register(std::string_view name) {
+  return find_sealed(name).map([](std::optional<SealedRegister> found) {
+    return found ? std::optional(std::move(found->value)) : std::nullopt;
+  });
+}
+
+Result<std::optional<SealedRegister>> JournalFile::find_sealed(std::string_view name) {
   auto statement = database_.prepare("SELECT value, seal FROM registers WHERE name = ?");
   if (!statement) return tl::unexpected(statement.error());
   const Result<bool> row = statement->text(0, name).step();
   if (!row) return tl::unexpected(row.error());
   if (!*row) return std::nullopt;
-  std::string value(statement->bytes(0));
-  if (statement->bytes(1) != as_text(seal_of(name, value)))
-    return damaged("its register " + std::string(name));
-  return value;
+  SealedRegister found{std::string(name), std::string(statement->bytes(0)), std::string(statement->bytes(1))};
+  // The genesis is what all others are held against, and bound by the chain itself.
+  const Digest entry = seal_of(name, found.value), genesis = first_head(genesis_).chain;
+  const bool fits =
+      name == kGenesisRegister ? found.seal == as_text(entry) : check_seal(found.seal, entry, genesis).has_value();
+  if (!fits) return damaged("its register " + std::string(name));
+  return found;
+}
+
+std::optional<PublicKey> JournalFile::signer_of(const SealedRegister& found) const {
+  return check_seal(found.seal, seal_of(found.name, found.value), first_head(genesis_).chain).value_or(Seal{}).key;
+}
+
+std::optional<PublicKey> JournalFile::signer_of(const Checkpoint& found) const {
+  return check_seal(found.seal, seal_of(found), first_head(genesis_).chain).value_or(Seal{}).key;
+}
+
+Result<std::vector<SignedRows>> JournalFile::signed_rows() {
+  std::vector<SignedRows> all;
+  if (version_ >= kVersionWithSignatures) {
+    auto statement = database_.prepare("SELECT place, since, chain, key, signature FROM signatures ORDER BY place");
+    if (!statement) return tl::unexpected(statement.error());
+    for (;;) {
+      const Result<bool> more = statement->step();
+      if (!more) return tl::unexpected(more.error());
+      if (!*more) break;
+      SignedRows& one = all.emplace_back();
+      one.head.place.value = static_cast<std::uint64_t>(statement->integer(0));
+      one.since.value = static_cast<std::uint64_t>(statement->integer(1));
+      const auto chain = digest_of(statement->bytes(2));
+      const std::string_view key = statement->bytes(3), signature = statement->bytes(4);
+      if (!chain || key.size() != one.key.bytes.size() || signature.size() != one.signature.bytes.size())
+        return damaged("the signature at place " + std::to_string(one.head.place.value));
+      one.head.chain = *chain;
+      std::ranges::copy(key, one.key.bytes.begin());
+      std::ranges::copy(signature, one.signature.bytes.begin());
+    }
+  }
+  if (log_.signature) all.push_back(*log_.signature);
+  return all;
+}
+
+Result<void> JournalFile::add_signed_rows(const SignedRows& rows) {
+  auto statement = database_.prepare(
+      "INSERT OR REPLACE INTO signatures(place, since, chain, key, signature) VALUES(?, ?, ?, ?, ?)");
+  if (!statement) return tl::unexpected(statement.error());
+  const auto text_of = [](const auto& bytes) {
+    return std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  };
+  return statement->integer(0, static_cast<std::int64_t>(rows.head.place.value))
+      .integer(1, static_cast<std::int64_t>(rows.since.value))
+      .blob(2, as_text(rows.head.chain))
+      .blob(3, text_of(rows.key.bytes))
+      .blob(4, text_of(rows.signature.bytes))
+      .run();
+}
+
+// Whose key it is, only who asks can judge.
+void JournalFile::inspect_signatures(Inspection& found) {
+  const auto all = signed_rows();
+  if (!all) {
+    found.faults.push_back(all.error().message);
+    return;
+  }
+  for (const SignedRows& one : *all) {
+    const std::string what = "the signature at place " + std::to_string(one.head.place.value);
+    if (!verifies(one) || one.since.value == 0 || one.since > one.head.place)
+      found.faults.push_back(damaged(what).value().message);
+    else
+      check_witness(one.head, what, found);
+  }
 }
 
 void JournalFile::check_witness(const JournalHead& witness, const std::string& what, Inspection& found) {
@@ -530,6 +609,7 @@ void JournalFile::inspect_log(Inspection& found) {
 void JournalFile::inspect_beside(bool files, Inspection& found) {
   const auto note = [&](const Error& error) { found.faults.push_back(error.message); };
   inspect_log(found);
+  inspect_signatures(found);
   if (const auto bytes = find_register(kFooterRegister); !bytes) {
     note(bytes.error());
   } else if (*bytes) {
@@ -613,7 +693,12 @@ Result<void> JournalFile::keep_log() {
   return database_.run("ROLLBACK")
       .and_then([&] { return database_.carry_log(); })
       .and_then([&] { return database_.begin(); })
+      .and_then([&] { return upgrade(); })
       .and_then([&] { return add_rows(std::exchange(log_.rows, {}), head); })
+      .and_then([&] {
+        const auto signature = std::exchange(log_.signature, std::nullopt);
+        return signature ? add_signed_rows(*signature) : Result<void>{};
+      })
       // Until the next generation begins it needs no log.
       .and_then([&] { return set_register(kFooterRegister, encode_footer({head, true})); })
       .and_then([&] { return make_id(); })
@@ -622,29 +707,40 @@ Result<void> JournalFile::keep_log() {
       .and_then([&] { return database_.begin(); });
 }
 
+Result<void> JournalFile::upgrade() {
+  if (version_ == kJournalVersion) return {};
+  return database_.run(kSignatureTable + ("PRAGMA user_version=" + std::to_string(kJournalVersion))).map([&] {
+    version_ = kJournalVersion;
+  });
+}
+
 Result<void> JournalFile::set_register(std::string_view name, std::string_view value) {
+  return add_register({std::string(name), std::string(value),
+                       make_seal(seal_of(name, value), first_head(genesis_).chain, key_)});
+}
+
+Result<void> JournalFile::add_register(const SealedRegister& copied) {
   auto statement = database_.prepare("INSERT OR REPLACE INTO registers(name, value, seal) VALUES(?, ?, ?)");
   if (!statement) return tl::unexpected(statement.error());
-  const Digest seal = seal_of(name, value);
-  return statement->text(0, name).blob(1, value).blob(2, as_text(seal)).run();
+  return statement->text(0, copied.name).blob(1, copied.value).blob(2, copied.seal).run();
 }
 
 Result<void> JournalFile::note_generation(const LogStart& start) {
   return set_register(kGenerationRegister, encode_number(start.generation))
-      .and_then([&] { return set_register(kFooterRegister, encode_footer({start.base, false})); })
-      .and_then([&] { return database_.run("PRAGMA user_version=" + std::to_string(kJournalVersion)); });
+      .and_then([&] { return set_register(kFooterRegister, encode_footer({start.base, false})); });
 }
 
 Result<void> JournalFile::add_checkpoint(const Checkpoint& checkpoint) {
   auto statement = database_.prepare("INSERT INTO checkpoints(place, chain, meta, size, digest, seal) VALUES(?, ?, ?, ?, ?, ?)");
   if (!statement) return tl::unexpected(statement.error());
-  const Digest seal = seal_of(checkpoint);
+  const std::string seal = checkpoint.seal.empty() ? make_seal(seal_of(checkpoint), first_head(genesis_).chain, key_)
+                                                   : checkpoint.seal;
   return statement->integer(0, static_cast<std::int64_t>(checkpoint.at.place.value))
       .blob(1, as_text(checkpoint.at.chain))
       .blob(2, checkpoint.meta)
       .integer(3, static_cast<std::int64_t>(checkpoint.size))
       .blob(4, as_text(checkpoint.digest))
-      .blob(5, as_text(seal))
+      .blob(5, seal)
       .run();
 }
 

@@ -18,6 +18,7 @@
 #include "server/journal/disk.hpp"
 #include "server/journal/journal_parts.hpp"
 #include "server/journal/mirrored_log.hpp"
+#include "server/journal/signing.hpp"
 
 namespace osteon {
 
@@ -45,6 +46,11 @@ struct Inspection {
   bool closed_cleanly = false;
   RoomSeq witnessed;                 // the furthest place that its log, a footer or a checkpoint vouches for
   std::vector<std::string> notes;    // of its log: what one file lacks and the other has, a write that is not whole
+};
+
+// A register as it is stored.
+struct SealedRegister {
+  std::string name, value, seal;
 };
 
 struct Walk {
@@ -87,6 +93,12 @@ class JournalFile {
   [[nodiscard]] Result<std::vector<Person>> people();
   [[nodiscard]] Result<std::vector<std::string>> registers();           // their names, the journal's own not
   [[nodiscard]] Result<std::optional<std::string>> find_register(std::string_view name);
+  [[nodiscard]] Result<std::optional<SealedRegister>> find_sealed(std::string_view name);
+  // Who signed an entry that was read from here. None: nobody.
+  [[nodiscard]] std::optional<PublicKey> signer_of(const SealedRegister& found) const;
+  [[nodiscard]] std::optional<PublicKey> signer_of(const Checkpoint& found) const;
+  // In order of their places, that of its log last. inspect() holds them against their keys and against the rows.
+  [[nodiscard]] Result<std::vector<SignedRows>> signed_rows();
   // The whole file: its pages, its chain, its witnesses. `files`: the checkpoints' bytes too.
   [[nodiscard]] Inspection inspect(bool files);
   // All but pages and rows, of which `found` has the head: what vouches for them, and what is kept beside them.
@@ -95,9 +107,14 @@ class JournalFile {
   // Commits the rows of the log, so that the log is needed no more. Of one that was opened to be written to.
   [[nodiscard]] Result<void> keep_log();
 
+  // Entries that are written from now on are signed with it. Null: with none. It must outlive this.
+  void sign_with(const SigningKey* key) { key_ = key; }
+
   // Within a transaction. Rows go on from `head`, which goes on with them.
   [[nodiscard]] Result<void> add_rows(std::span<const JournalRow> rows, JournalHead& head);
   [[nodiscard]] Result<void> set_register(std::string_view name, std::string_view value);
+  [[nodiscard]] Result<void> add_register(const SealedRegister& copied);
+  [[nodiscard]] Result<void> add_signed_rows(const SignedRows& rows);
   [[nodiscard]] Result<void> note_generation(const LogStart& start);  // which ends what a footer said
   [[nodiscard]] Result<void> add_checkpoint(const Checkpoint& checkpoint);
   [[nodiscard]] Result<void> add_person(const Person& person);
@@ -113,6 +130,9 @@ class JournalFile {
   [[nodiscard]] Result<JournalHead> stored_head();
   // Inserts the rows that its log has beyond its last one.
   [[nodiscard]] Result<void> take_log();
+  // To the tables of the current version, within a transaction.
+  [[nodiscard]] Result<void> upgrade();
+  void inspect_signatures(Inspection& found);
   void inspect_log(Inspection& found);
   [[nodiscard]] tl::unexpected<Error> damaged(const std::string& what) const;
   void check_witness(const JournalHead& witness, const std::string& what, Inspection& found);
@@ -122,6 +142,7 @@ class JournalFile {
   std::unique_ptr<ScratchFolder> scratch_;  // where the database is a copy; outlives it
   Database database_;
   std::optional<Statement> insert_;  // of a row
+  const SigningKey* key_ = nullptr;
   int version_ = 0;
   std::string genesis_;
   std::string id_;
@@ -133,7 +154,8 @@ class JournalFile {
 
 inline constexpr std::string_view kGenesisRegister = "genesis", kFooterRegister = "footer",
                                   kEpochRegister = "server_epoch", kRecoveredRegister = "recovered",
-                                  kGenerationRegister = "log generation", kIdRegister = "journal id";
+                                  kGenerationRegister = "log generation", kIdRegister = "journal id",
+                                  kKeysRegister = "signing keys";
 
 // A head that is kept as a register, with a mark.
 struct Footer {
@@ -146,7 +168,7 @@ struct Footer {
 [[nodiscard]] std::optional<std::uint64_t> decode_number(std::string_view bytes);
 
 inline constexpr int kVersionWithTimes = 2;
-// Version 3 has the tables of version 2, and a log of its own beside the file.
-inline constexpr int kJournalVersion = 3;
+// Version 3 has the tables of version 2, and a log of its own beside the file. Version 4 has a table of signatures.
+inline constexpr int kJournalVersion = 4;
 
 }  // namespace osteon

@@ -2,10 +2,12 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 
 #include "server/journal/chain.hpp"
 #include "server/journal/disk.hpp"
+#include "server/journal/signing.hpp"
 
 namespace osteon {
 
@@ -15,6 +17,7 @@ struct JournalOptions {
   std::uint64_t log_bytes = std::uint64_t{1} << 20;  // of each log file; what is beyond it goes into the database
   int page_bytes = 4096;                                // of a new journal; not below the disk's sectors
   bool durable = true;                                  // false, for tests only: no row is waited for
+  std::shared_ptr<const SigningKeys> keys = nullptr;    // that vouch for what is written; null: nobody does
 };
 
 // The room as it was at one place, in a file of its own: opaque to the journal.
@@ -23,6 +26,7 @@ struct Checkpoint {
   std::string meta;  // a few words of the owner's
   std::uint64_t size = 0;
   Digest digest;     // SHA-256 of the file's bytes
+  std::string seal = {};  // of the four above; empty: it is made when the checkpoint is added
 };
 
 // Who a pseudonym of the rows is. Apart from the chain, so that a person can be forgotten and the rows still be confirmed.

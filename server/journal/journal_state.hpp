@@ -1,6 +1,7 @@
 // The inside of a Journal, for what checks and copies one while it is in use.
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -18,12 +19,14 @@ struct Journal::State {
   std::unique_ptr<DiskLock> lock;  // let go last
   JournalFile file;
   FileIdentity identity;           // of the file
-  JournalHead head;
-  std::optional<MirroredLog> log;  // nothing: closed to rows since it was opened
+  JournalHead head = {};
+  std::optional<MirroredLog> log = {};  // nothing: closed to rows since it was opened
   std::uint64_t generation = 0;    // of the log
-  std::optional<RoomSeq> recovered_to;
-  std::optional<Error> closed;
-  std::vector<std::string> notes;  // of the log, when it was opened
+  std::optional<RoomSeq> recovered_to = {};
+  std::optional<Error> closed = {};
+  std::vector<std::string> notes = {};  // of when it was opened
+  std::optional<RoomSeq> signed_since = {};       // none: nothing is signed
+  std::optional<SignedRows> last_signature = {};  // of the newest rows, until the database has it
   bool only_read = false;
 };
 
@@ -32,6 +35,9 @@ struct JournalInside {
   // So that all of it can be read from the disk. Error: of one that takes no rows, why.
   static Result<void> carry(Journal& journal) {
     return journal.write([&] { return journal.carry(); });
+  }
+  static Result<void> write_through(Journal& journal, const std::function<Result<void>(JournalFile&)>& work) {
+    return journal.write_through([&] { return work(journal.state_->file); });
   }
 };
 

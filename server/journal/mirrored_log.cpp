@@ -15,9 +15,12 @@ namespace fs = std::filesystem;
 
 // A file is a first sector, which says what it belongs to, and entries one after the other. An entry is as long as it
 // needs to be: a torn write may spoil the sector in which the last one ends, and then the other file has that one.
-constexpr std::string_view kMagic = "OsteonL1";
+// Where the generation has a signer, its key and its first row stand in the first sector, and a signature behind the
+// rows of each entry.
+constexpr std::string_view kMagic = "OsteonL1", kSignedMagic = "OsteonL2";
 constexpr std::size_t kFirstSector = 4096, kSaltBytes = 16, kChainBytes = 32, kChecksumBytes = 16;
-constexpr std::size_t kStartBytes = kMagic.size() + kChainBytes + 2 * 8 + kChainBytes + kSaltBytes + kChecksumBytes;
+constexpr std::size_t kStartBytes = kMagic.size() + kChainBytes + 2 * 8 + kChainBytes + kSaltBytes;
+constexpr std::size_t kSignerBytes = sizeof(PublicKey) + 8, kSignatureBytes = sizeof(Signature);
 constexpr const char* kForeign = "belongs to another journal";
 constexpr std::size_t kEntryHead = kSaltBytes + 3 * 8 + kChainBytes;  // salt, bytes of rows, count, first place, chain
 
@@ -28,17 +31,27 @@ std::string checksum(std::string_view bytes) {
   return {reinterpret_cast<const char*>(digest.bytes.data()), kChecksumBytes};
 }
 
+template <class Array>
+std::string_view text_of(const Array& bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
 std::string encode_start(const LogStart& start, std::string_view salt) {
-  std::string bytes(kMagic);
+  std::string bytes(start.signer ? kSignedMagic : kMagic);
   bytes += as_text(start.journal);
   put_integer(bytes, start.generation);
   put_integer(bytes, start.base.place.value);
   bytes += as_text(start.base.chain);
   bytes += salt;
+  if (start.signer) {
+    bytes += text_of(start.signer->key.bytes);
+    put_integer(bytes, start.signer->since.value);
+  }
   return bytes + checksum(bytes);
 }
 
-std::string encode_entry(std::span<const JournalRow> rows, const JournalHead& head, std::string_view salt) {
+std::string encode_entry(std::span<const JournalRow> rows, const JournalHead& head,
+                         const std::optional<Signature>& signature, std::string_view salt) {
   std::string body;
   for (const JournalRow& row : rows) {
     put_integer(body, static_cast<std::uint64_t>(row.at_ns));
@@ -51,6 +64,7 @@ std::string encode_entry(std::span<const JournalRow> rows, const JournalHead& he
   put_integer(bytes, rows.front().place.value);
   bytes += as_text(head.chain);
   bytes += body;
+  if (signature) bytes += text_of(signature->bytes);
   return bytes + checksum(bytes);
 }
 
@@ -58,14 +72,17 @@ struct Entry {
   std::uint64_t first = 0;  // place
   JournalHead head;         // after it
   std::vector<JournalRow> rows;
+  std::optional<Signature> signature;
 };
 
 // The entry at the front of `bytes`, and how long it is. Nothing where no whole and sound one is there.
-std::optional<std::pair<Entry, std::size_t>> decode_entry(std::string_view bytes, std::string_view salt) {
-  if (bytes.size() < kEntryHead + kChecksumBytes || !bytes.starts_with(salt)) return std::nullopt;
+std::optional<std::pair<Entry, std::size_t>> decode_entry(std::string_view bytes, std::string_view salt,
+                                                          bool is_signed) {
+  const std::size_t signature = is_signed ? kSignatureBytes : 0, least = kEntryHead + signature + kChecksumBytes;
+  if (bytes.size() < least || !bytes.starts_with(salt)) return std::nullopt;
   const std::uint64_t body = integer_at(bytes, kSaltBytes), count = integer_at(bytes, kSaltBytes + 8);
-  if (body > bytes.size() - kEntryHead - kChecksumBytes || count == 0 || count > body) return std::nullopt;
-  const std::size_t size = kEntryHead + body;
+  if (body > bytes.size() - least || count == 0 || count > body) return std::nullopt;
+  const std::size_t size = kEntryHead + body + signature;
   if (checksum(bytes.substr(0, size)) != bytes.substr(size, kChecksumBytes)) return std::nullopt;
 
   Entry entry;
@@ -80,6 +97,7 @@ std::optional<std::pair<Entry, std::size_t>> decode_entry(std::string_view bytes
     left.remove_prefix(16 + length);
   }
   if (!left.empty()) return std::nullopt;
+  if (is_signed) std::ranges::copy(bytes.substr(kEntryHead + body, signature), entry.signature.emplace().bytes.begin());
   return std::pair{std::move(entry), size + kChecksumBytes};
 }
 
@@ -98,14 +116,15 @@ struct FoundFile {
 void read_entries(std::string_view bytes, std::string_view salt, FoundFile& file) {
   std::size_t at = kFirstSector;
   while (at < bytes.size()) {
-    if (auto entry = decode_entry(bytes.substr(at), salt)) {
+    const bool is_signed = file.start.signer.has_value();
+    if (auto entry = decode_entry(bytes.substr(at), salt, is_signed)) {
       at += entry->second;
       file.entries.push_back(std::move(entry->first));
       continue;
     }
     // The bytes here may be what an earlier generation left, part of an entry, or damage with entries behind it.
     std::size_t next = bytes.find(salt, at + 1);
-    while (next != bytes.npos && !decode_entry(bytes.substr(next), salt)) next = bytes.find(salt, next + 1);
+    while (next != bytes.npos && !decode_entry(bytes.substr(next), salt, is_signed)) next = bytes.find(salt, next + 1);
     if (next == bytes.npos) {
       file.ends_in_part = bytes.substr(at).starts_with(salt);
       return;
@@ -128,8 +147,9 @@ Result<FoundFile> read_member(const fs::path& path, const Digest& journal, Disk&
   const auto read = disk.read(path, 0, **size);
   if (!read) return tl::unexpected(read.error());
   const std::string_view bytes(*read);
-  const std::string_view first = bytes.substr(0, kStartBytes - kChecksumBytes);
-  if (bytes.size() < kStartBytes || !bytes.starts_with(kMagic) ||
+  const bool is_signed = bytes.starts_with(kSignedMagic);
+  const std::string_view first = bytes.substr(0, kStartBytes + (is_signed ? kSignerBytes : 0));
+  if ((!is_signed && !bytes.starts_with(kMagic)) || bytes.size() < first.size() + kChecksumBytes ||
       bytes.substr(first.size(), kChecksumBytes) != checksum(first)) {
     file.unreadable = "is damaged";
     return file;
@@ -144,7 +164,12 @@ Result<FoundFile> read_member(const fs::path& path, const Digest& journal, Disk&
     file.unreadable = kForeign;
     return file;
   }
-  read_entries(bytes, first.substr(first.size() - kSaltBytes), file);
+  if (is_signed) {
+    LogStart::Signer& signer = file.start.signer.emplace();
+    std::ranges::copy(first.substr(kStartBytes, signer.key.bytes.size()), signer.key.bytes.begin());
+    signer.since.value = integer_at(first, kStartBytes + signer.key.bytes.size());
+  }
+  read_entries(bytes, first.substr(kStartBytes - kSaltBytes, kSaltBytes), file);
   return file;
 }
 
@@ -233,6 +258,9 @@ Result<LogContents> read_log(const fs::path& journal, const Digest& identity, co
       if (!rows) continue;
       found.rows.insert(found.rows.end(), rows->begin(), rows->end());
       found.head = next->head;
+      found.signature.reset();
+      if (next->signature)
+        found.signature = SignedRows{file.start.signer->since, next->head, file.start.signer->key, *next->signature};
       more = true;
       break;
     }
@@ -304,6 +332,7 @@ Result<void> MirroredLog::begin(Member& member, const LogStart& start) {
   system_random()(salt);
   member.salt.assign(salt.begin(), salt.end());
   member.end = kFirstSector;
+  member.is_signed = start.signer.has_value();
   return check_named(member)
       .and_then([&] { return member.file->write_at(0, encode_start(start, member.salt)); })
       .and_then([&] { return sync(member); });
@@ -312,11 +341,13 @@ Result<void> MirroredLog::begin(Member& member, const LogStart& start) {
 Result<void> MirroredLog::begin_mirror(const LogStart& start) { return begin(mirror_, start); }
 Result<void> MirroredLog::begin_log(const LogStart& start) { return begin(log_, start); }
 
-Result<void> MirroredLog::append(std::span<const JournalRow> rows, const JournalHead& head) {
+Result<void> MirroredLog::append(std::span<const JournalRow> rows, const JournalHead& head,
+                                 const std::optional<Signature>& signature) {
   OSTEON_CHECK(!rows.empty() && log_.end != 0 && mirror_.end != 0);
   // One after the other: a write that the power cuts short spoils one file at most.
   for (Member* member : {&log_, &mirror_}) {
-    const std::string entry = encode_entry(rows, head, member->salt);
+    OSTEON_CHECK(signature.has_value() == member->is_signed);
+    const std::string entry = encode_entry(rows, head, signature, member->salt);
     if (Result<void> named = check_named(*member); !named) return named;
     const Result<void> put = durable_ ? member->file->write_durably(member->end, entry)
                                       : member->file->write_at(member->end, entry);

@@ -13,6 +13,7 @@
 
 #include "server/journal/chain.hpp"
 #include "server/journal/disk.hpp"
+#include "server/journal/signing.hpp"
 
 namespace osteon {
 
@@ -24,6 +25,12 @@ struct LogStart {
   Digest journal;                // which journal it belongs to: the chain of its genesis
   std::uint64_t generation = 0;  // rises by one each time that the log begins anew
   JournalHead base;              // the last row that the database had then
+  // Who signs each entry, and from which row on. None: nobody does.
+  struct Signer {
+    PublicKey key;
+    RoomSeq since;
+  };
+  std::optional<Signer> signer = {};
 };
 
 // What both files together hold.
@@ -31,6 +38,7 @@ struct LogContents {
   std::uint64_t generation = 0;      // the newest that either file is of; 0: neither can be read
   std::vector<JournalRow> rows;      // after the head that was asked for
   JournalHead head;                  // of the last of them
+  std::optional<SignedRows> signature;  // of the entry that leads to head; may be anything
   std::vector<std::pair<std::filesystem::path, JournalHead>> bases;  // what each file goes on from
   RoomSeq witnessed;                 // the furthest place that either file knows
   std::vector<std::string>
@@ -63,9 +71,10 @@ class MirroredLog {
   [[nodiscard]] Result<void> begin_mirror(const LogStart& start);
   [[nodiscard]] Result<void> begin_log(const LogStart& start);
 
-  // Rows that go on from the last ones. Durable in both files when it returns. `head`: after them. Error internal: a
-  // write failed, or a name no longer stands for the file that is open.
-  [[nodiscard]] Result<void> append(std::span<const JournalRow> rows, const JournalHead& head);
+  // Rows that go on from the last ones. Durable in both files when it returns. `head`: after them. `signature`: there
+  // if the generation has a signer. Error internal: a write failed, or a name no longer stands for the open file.
+  [[nodiscard]] Result<void> append(std::span<const JournalRow> rows, const JournalHead& head,
+                                    const std::optional<Signature>& signature = {});
 
   [[nodiscard]] std::uint64_t used_bytes() const;  // of entries, in one of the files
   [[nodiscard]] bool is_full() const;
@@ -76,6 +85,7 @@ class MirroredLog {
     std::unique_ptr<DiskFile> file;
     FileIdentity identity;
     std::string salt;
+    bool is_signed = false;
     std::uint64_t end = 0;      // of the entries, bytes
     std::uint64_t written = 0;  // the furthest byte that was ever written
   };

@@ -44,10 +44,32 @@ Disk& or_system(Disk* disk) { return disk != nullptr ? *disk : system_disk(); }
 
 VerifyReport report_of(JournalFile& file) {
   Inspection found = file.inspect(true);
-  return {file.version(),       found.head,
-          found.first_bad,      found.witnessed,
-          found.closed_cleanly, std::move(found.faults),
-          std::move(found.notes)};
+  VerifyReport report{.version = file.version(),
+                      .head = found.head,
+                      .first_bad = found.first_bad,
+                      .witnessed = found.witnessed,
+                      .closed_cleanly = found.closed_cleanly,
+                      .faults = std::move(found.faults),
+                      .notes = std::move(found.notes)};
+  if (!report.sound()) return report;  // nobody vouches for what is damaged
+  const auto rows = file.signed_rows();
+  const auto checkpoints = file.checkpoints();
+  const auto keys = file.find_register(kKeysRegister);
+  if (rows)
+    for (const SignedRows& one : *rows) report.signed_rows.push_back({one.since, one.head.place, one.key});
+  if (keys && *keys) report.successions = decode_successions(**keys).value_or(std::vector<Succession>{});
+  if (checkpoints)
+    for (const Checkpoint& one : *checkpoints)
+      report.entries.emplace_back("the checkpoint at place " + std::to_string(one.at.place.value), file.signer_of(one));
+  if (const auto names = file.registers())
+    for (const std::string& name : *names) {
+      if (name == kGenerationRegister || name == kIdRegister || name == kKeysRegister) continue;
+      if (const auto one = file.find_sealed(name); one && *one)
+        report.entries.emplace_back("the register \"" + name + "\"", file.signer_of(**one));
+    }
+  if (const auto footer = file.find_sealed(kFooterRegister); footer && *footer)
+    report.footer_by = file.signer_of(**footer);
+  return report;
 }
 
 }  // namespace
@@ -56,6 +78,41 @@ Result<VerifyReport> verify_journal(const fs::path& file, Disk* disk) {
   auto source = Source::open(file, or_system(disk));
   if (!source) return tl::unexpected(source.error());
   return report_of(**source);
+}
+
+Vouched vouched_by(const PublicKey& key, const VerifyReport& report) {
+  const std::set<PublicKey> line = keys_of_line(key, report.successions);
+  // For each place the key that signed it, one of the line where there is one; cut at every end of a range.
+  std::set<std::uint64_t> cuts{0, report.head.place.value};
+  for (const SignedRange& range : report.signed_rows) {
+    cuts.insert(range.from.value - 1);
+    cuts.insert(range.to.value);
+  }
+  Vouched vouched;
+  const auto add = [](std::vector<SignedRange>& to, const SignedRange& range) {
+    if (!to.empty() && to.back().key == range.key && to.back().to.value + 1 == range.from.value)
+      to.back().to = range.to;
+    else to.push_back(range);
+  };
+  for (auto before = cuts.begin(), after = std::next(before); after != cuts.end(); before = after++) {
+    const RoomSeq from{*before + 1}, to{*after};
+    if (to > report.head.place) break;
+    const SignedRange* by = nullptr;
+    for (const SignedRange& range : report.signed_rows)
+      if (range.from <= from && to <= range.to &&
+          (by == nullptr || (line.contains(range.key) && !line.contains(by->key))))
+        by = &range;
+    if (by == nullptr) {
+      auto& none = vouched.by_nobody;
+      if (!none.empty() && none.back().second.value + 1 == from.value) none.back().second = to;
+      else none.emplace_back(from, to);
+    } else {
+      add(line.contains(by->key) ? vouched.rows : vouched.by_others, {from, to, by->key});
+    }
+  }
+  for (const auto& [what, signer] : report.entries)
+    if (!signer || !line.contains(*signer)) vouched.entries_unsigned.push_back(what);
+  return vouched;
 }
 
 std::vector<std::string> verify_beside(Journal& journal) {
@@ -87,10 +144,12 @@ struct JournalCopy::State {
   std::optional<std::vector<std::string>> only = {};  // a branch: these registers, and nobody
   bool damaged = false;                               // what cannot be read is left out
   std::optional<std::uint64_t> epochs = {};           // recovered: openings that the lost part cannot have counted
+  std::shared_ptr<const SigningKeys> keys = {};       // a branch's; a copy keeps the signatures that are there
   std::optional<Journal> target = {};
   // Taken from the source and not yet put into the target.
   std::vector<JournalRow> rows = {};
-  std::vector<std::pair<std::string, std::string>> registers = {};
+  std::vector<SealedRegister> registers = {};
+  std::vector<SignedRows> signed_rows = {};
   std::vector<Person> people = {};
   std::vector<Checkpoint> checkpoints = {};
   std::optional<Error> no_checkpoint = {};  // why the last of them could not be copied
@@ -112,7 +171,7 @@ struct JournalCopying {
     if (!nobody && nobody.error().code != ErrorCode::not_found) return tl::unexpected(nobody.error());
     state.begun = true;
     if (Result<void> cleared = clear_growing(state); !cleared) return cleared;
-    auto target = Journal::create(state.growing, state.genesis, {.disk = state.disk});
+    auto target = Journal::create(state.growing, state.genesis, {.disk = state.disk, .keys = state.keys});
     if (!target) return tl::unexpected(target.error());
     state.target = std::move(*target);
     return {};
@@ -153,13 +212,20 @@ struct JournalCopying {
     } else {
       for (const std::string& name : *names) {
         if (name == kGenerationRegister || name == kIdRegister) continue;  // the copy has its own
-        const auto value = state.source->find_register(name);
-        if (value && *value) state.registers.emplace_back(name, **value);
-        if (!value)
-          if (Result<void> on = left_out(state, value.error()); !on) return on;
+        const auto found = state.source->find_sealed(name);
+        if (found && *found) state.registers.push_back(**found);
+        if (!found)
+          if (Result<void> on = left_out(state, found.error()); !on) return on;
       }
     }
     if (!state.only) {
+      const auto signatures = state.source->signed_rows();
+      if (!signatures) {
+        if (Result<void> on = left_out(state, signatures.error()); !on) return on;
+      } else {
+        for (const SignedRows& one : *signatures)
+          if (one.head.place <= state.copied.place && verifies(one)) state.signed_rows.push_back(one);
+      }
       auto people = state.source->people();
       if (people) state.people = std::move(*people);
       else if (Result<void> on = left_out(state, people.error()); !on) return on;
@@ -209,12 +275,21 @@ struct JournalCopying {
   }
 
   static Result<void> put_beside(JournalCopy::State& state) {
-    Journal::Registers registers = state.registers;
-    if (state.epochs) {
-      registers.emplace_back(kRecoveredRegister, encode_number(state.copied.place.value));
-      registers.emplace_back(kEpochRegister, encode_number(*state.epochs));
-    }
-    return state.target->set_beside(registers, state.people);
+    return JournalInside::write_through(*state.target, [&](JournalFile& file) {
+      Result<void> done;
+      // Another genesis needs other seals.
+      for (const SealedRegister& one : state.registers)
+        if (done) done = state.only ? file.set_register(one.name, one.value) : file.add_register(one);
+      for (const SignedRows& one : state.signed_rows)
+        if (done) done = file.add_signed_rows(one);
+      for (const Person& person : state.people)
+        if (done) done = file.add_person(person);
+      if (done && state.epochs)
+        done = file.set_register(kRecoveredRegister, encode_number(state.copied.place.value)).and_then([&] {
+          return file.set_register(kEpochRegister, encode_number(*state.epochs));
+        });
+      return done;
+    });
   }
 
   static Result<void> copy_checkpoint(JournalCopy::State& state, const Checkpoint& checkpoint) {
@@ -225,7 +300,7 @@ struct JournalCopying {
       if (!head) return tl::unexpected(head.error());
       at = *head;
     }
-    auto file = state.target->begin_checkpoint(at, checkpoint.meta);
+    auto file = state.target->begin_checkpoint(at, checkpoint.meta, state.only ? "" : checkpoint.seal);
     if (!file) return tl::unexpected(file.error());
     const fs::path from = checkpoint_file(state.from, checkpoint.at);
     const auto read = read_in_pieces(*state.disk, from, [&](std::string_view piece) { return file->write(piece); });
@@ -272,6 +347,7 @@ Result<JournalCopy> JournalCopy::begin_branch(Journal& source, const fs::path& t
   if (!copy) return copy;
   copy->state_->genesis = std::move(genesis);
   copy->state_->only = std::move(registers);
+  copy->state_->keys = state.options.keys;
   return copy;
 }
 

@@ -5,11 +5,18 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/journal/journal.hpp"
 
 namespace osteon {
+
+// Rows that one key vouches for, both ends included.
+struct SignedRange {
+  RoomSeq from, to;
+  PublicKey key;
+};
 
 struct VerifyReport {
   int version = 0;
@@ -19,8 +26,24 @@ struct VerifyReport {
   bool closed_cleanly = false;
   std::vector<std::string> faults;   // one sentence each
   std::vector<std::string> notes;    // of its log: what one file lacks and the other has, a write that is not whole
+  std::vector<SignedRange> signed_rows = {};  // in order of their ends; they may overlap
+  // Checkpoints and registers, and who signed each. Not what the journal notes for itself.
+  std::vector<std::pair<std::string, std::optional<PublicKey>>> entries = {};
+  std::optional<PublicKey> footer_by = {};    // who signed the footer
+  std::vector<Succession> successions = {};   // that it keeps of its server's keys
   [[nodiscard]] bool sound() const { return faults.empty(); }
 };
+
+// What a key and the keys of its line vouch for in a report that is sound.
+struct Vouched {
+  std::vector<SignedRange> rows;            // by this line of keys, one after the other
+  std::vector<SignedRange> by_others;       // rows that another key signed, and none of this line
+  std::vector<std::pair<RoomSeq, RoomSeq>> by_nobody;  // both ends included
+  std::vector<std::string> entries_unsigned;  // of VerifyReport::entries: no key of this line signed them
+  [[nodiscard]] bool all() const { return by_others.empty() && by_nobody.empty() && entries_unsigned.empty(); }
+};
+[[nodiscard]] Vouched vouched_by(const PublicKey& key, const VerifyReport& report);
+
 // Everything: pages, chain, footer, checkpoints and their files. Of any version. Errors: not_found; exists (in use: then the
 // program that uses it has to verify it); invalid_input (nothing of it can be read).
 [[nodiscard]] Result<VerifyReport> verify_journal(const std::filesystem::path& file, Disk* disk = nullptr);

@@ -51,7 +51,16 @@ Result<std::string> room_name(Journal& journal) {
 Result<void> check_room_name(Journal& journal, const fs::path& file, const std::string& name) {
   const Result<std::string> own = room_name(journal);
   if (!own) return tl::unexpected(own.error());
-  if (*own == name) return {};
+  if (*own == name) {
+    const Result<bool> vouched = journal.is_vouched_for(kNameRegister);
+    if (!vouched) return tl::unexpected(vouched.error());
+    if (*vouched) return {};
+    return failure(
+        ErrorCode::invalid_input,
+        file.string() + " was given the name " + name +
+            " without this server's signing key; if that is meant, give it with the key: osteon-server rename-room " +
+            file.string() + " " + name + " --signing-key KEY");
+  }
   return failure(ErrorCode::invalid_input,
                  file.string() + " holds the room " + *own + ", not " + name +
                      "; give the file its name again, or rename the room: osteon-server rename-room " + file.string() +

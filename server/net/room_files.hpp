@@ -58,7 +58,7 @@ struct RoomFile {
 // The name that a journal's room has now. Errors: those of reading it.
 [[nodiscard]] Result<std::string> room_name(Journal& journal);
 // Holds the room in a journal against the name that its file has. Error invalid_input: it is another room's, with both
-// names and what to do.
+// names and what to do; or its name was given without the key that the journal was opened with.
 [[nodiscard]] Result<void> check_room_name(Journal& journal, const std::filesystem::path& file,
                                            const std::string& name);
 

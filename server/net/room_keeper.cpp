@@ -108,8 +108,8 @@ Result<KeptRoom> RoomKeeper::open(const std::filesystem::path& file, const Case&
   genesis->room = options.name;  // which it may have been given since
   std::unique_ptr<RoomKeeper> keeper(new RoomKeeper(file, std::move(*journal), std::move(*genesis), bone.pitch_mm(),
                                                     options.journal.disk != nullptr ? *options.journal.disk : system_disk()));
-  for (const std::string& note : keeper->journal_->log_notes())
-    log::warn("journal's log", {{"file", file.string()}, {"reason", note}});
+  for (const std::string& note : keeper->journal_->notes())
+    log::warn("journal", {{"file", file.string()}, {"note", note}});
   if (const Error* closed = keeper->journal_->closed_because())
     log::warn("journal takes no rows", {{"file", file.string()}, {"reason", closed->message}});
   else if (Result<std::uint64_t> epoch = keeper->journal_->next_server_epoch(); epoch)

@@ -413,6 +413,7 @@ Result<std::shared_ptr<OpenRoom>> Rooms::resume(const std::string& name, const s
 Result<std::shared_ptr<OpenRoom>> Rooms::open(const std::string& name, const LoadedCase& of, bool is_new,
                                               const std::function<void(double)>& progress) {
   RoomKeeper::Options keeping{.name = name, .limits = options_.limits, .tools = {}, .journal = {}, .today = {}, .random = {}};
+  keeping.journal.keys = options_.keys;
   keeping.retention_days = options_.retention_days;
   if (is_new) keeping.tools = options_.tools();
   // Half of the work is the events, half the surface, more or less.

@@ -51,6 +51,7 @@ struct RoomsOptions {
   std::function<std::shared_ptr<ToolBox>()> tools = builtin_tool_box;  // that a new room begins with: a box of its own
   HostRates rates{};
   Detail detail = Detail::automatic;
+  std::shared_ptr<const SigningKeys> keys = nullptr;  // sign the journals; null: nobody does
   int retention_days = 0;             // after which it is forgotten who somebody was; 0: never
   std::shared_ptr<CaseStore> store{};  // where uploaded cases are kept, shared with uploads under way; null: none are taken
   std::uint64_t case_memory_bytes = kMostCaseMemory;  // of all cases that rooms have

@@ -247,6 +247,71 @@ TEST(Kept, ARoomIsServedOnlyUnderItsOwnName) {
   ASSERT_EQ(stage.server().terminate(), 0);
 }
 
+// Whoever knows how the chain is made can go on with it. They do not have the server's key.
+TEST(Kept, InventedEventsAreSignedByNobody) {
+  TempDir folder;
+  const std::filesystem::path file = folder / "room.journal", key_file = folder / "signing.key";
+  Stage stage(12.0, {"--journal", file.string()});
+  {
+    Surgeon hand(stage.address(), folder / "cache");
+    ASSERT_TRUE(wait_until([&] { return hand.complete(); }, kPatience));
+    Cut cut = straight_cut(find_tool("burr-round-5").value(), Vec3::Zero(), Vec3::Zero(), {0, 0, -1}, 1);
+    cut.author = hand.author();
+    ASSERT_TRUE(hand.session().send(cut));
+    ASSERT_TRUE(wait_until([&] { return hand.own() == 1; }, kPatience));
+  }
+  stage.server().signal(SIGKILL);
+  ASSERT_EQ(stage.server().wait(30s), 128 + SIGKILL);
+
+  const auto server = [](std::vector<std::string> arguments) {
+    return run(program("osteon-server"), std::move(arguments), 60s);
+  };
+  const auto shown = server({"key", "show", key_file.string()});
+  ASSERT_EQ(shown.exit_code, 0) << shown.err;
+  const std::string key = shown.out.substr(0, shown.out.find('\n'));
+  RunResult verified = server({"verify", file.string(), "--key", key});
+  EXPECT_EQ(verified.exit_code, 0) << verified.err;
+  EXPECT_NE(verified.out.find("verdict:     sound\n"), std::string::npos) << verified.out;
+  verified = server({"verify", file.string()});
+  EXPECT_EQ(verified.exit_code, 0) << verified.err;
+  EXPECT_NE(verified.out.find("verdict:     unsigned"), std::string::npos) << verified.out;
+
+  std::uint64_t last = 0;
+  {
+    Journal journal = std::move(Journal::open(file).value());
+    last = journal.head().place.value;
+    std::vector<JournalRow> rows;
+    ASSERT_TRUE(journal.read(RoomSeq{last}, [&](const JournalRow& row) {
+      rows.assign(100'000, row);
+      return true;
+    }));
+    for (std::size_t i = 0; i < rows.size(); ++i) rows[i].place.value = last + i + 1;
+    ASSERT_TRUE(journal.append(rows) && journal.close());
+  }
+  verified = server({"verify", file.string(), "--key", key});
+  EXPECT_NE(verified.exit_code, 0);
+  EXPECT_NE(verified.out.find("signed:      1 to " + std::to_string(last) + " by " + key.substr(0, 16)),
+            std::string::npos)
+      << verified.out;
+  EXPECT_NE(verified.out.find("not signed:  " + std::to_string(last + 1) + " to " + std::to_string(last + 100'000) +
+                              " by anybody"),
+            std::string::npos)
+      << verified.out;
+  EXPECT_EQ(verified.out.find("sound"), std::string::npos) << verified.out;
+  verified = server({"verify", file.string()});
+  EXPECT_EQ(verified.out.find("sound"), std::string::npos) << verified.out;
+
+  // Another server's key, a new key of the same server, a key that is none.
+  const auto rotated = server({"key", "rotate", key_file.string()});
+  ASSERT_EQ(rotated.exit_code, 0) << rotated.err;
+  EXPECT_NE(rotated.out.substr(0, 64), key);
+  expect_refused({"verify", file.string(), "--key", std::string(64, '7')}, {"does not vouch for all of it"});
+  expect_refused({"verify", file.string(), "--key", "nowhere"},
+                 {"--key nowhere is neither 64 hexadecimal digits nor a file"});
+  std::filesystem::permissions(key_file, std::filesystem::perms::others_read, std::filesystem::perm_options::add);
+  expect_refused({"key", "show", key_file.string()}, {"chmod 600 " + key_file.string()});
+}
+
 TEST(Kept, SaysWhatIsWrongWithAJournal) {
   TempDir folder;
   const std::string file = (folder / "room.journal").string();

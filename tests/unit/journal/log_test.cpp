@@ -44,8 +44,8 @@ class LogTest : public ::testing::Test {
     Journal journal = std::move(Journal::open(kFile, options()).value());
     EXPECT_EQ(journal.closed_because(), nullptr) << journal.closed_because()->message;
     EXPECT_TRUE(equal(rows_of(journal), rows_));
-    EXPECT_EQ(report->notes, journal.log_notes());
-    return journal.log_notes();
+    EXPECT_EQ(report->notes, journal.notes());
+    return journal.notes();
   }
   // Opens it and expects that it takes no rows. Gives why.
   std::string expect_closed(std::size_t rows) {
@@ -273,16 +273,19 @@ TEST(JournalReaders, WriteNothingAndMayBeMany) {
   }
 }
 
-TEST(Migration, OpensTheSecondVersionAsItIs) {
+class EarlierVersion : public ::testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Migration, EarlierVersion, ::testing::Values(2, 3));
+
+TEST_P(EarlierVersion, OpensAsItIs) {
   const test::TempDir folder;
   const fs::path file = folder / "journal";
   const std::vector<JournalRow> rows = some_rows(12, 31);
-  ASSERT_NO_FATAL_FAILURE(make_old_journal(file, 2, {rows.begin(), rows.begin() + 30}, RowsIn::sqlites_log));
+  ASSERT_NO_FATAL_FAILURE(make_old_journal(file, GetParam(), {rows.begin(), rows.begin() + 30}, RowsIn::sqlites_log));
   const auto before = contents_of(folder.path());
   const auto verified = verify_journal(file);
   ASSERT_TRUE(verified) << verified.error().message;
   EXPECT_THAT(verified->faults, IsEmpty());
-  EXPECT_EQ(verified->version, 2);
+  EXPECT_EQ(verified->version, GetParam());
   EXPECT_EQ(verified->head.place, RoomSeq{30});
   EXPECT_EQ(contents_of(folder.path()), before);
   {
@@ -290,7 +293,7 @@ TEST(Migration, OpensTheSecondVersionAsItIs) {
     EXPECT_EQ(journal.closed_because(), nullptr);
     append(journal, rows, 30, 31);
   }
-  EXPECT_EQ(verify_journal(file)->version, 3);
+  EXPECT_EQ(verify_journal(file)->version, 4);
   Journal journal = std::move(Journal::open(file).value());
   EXPECT_TRUE(equal(rows_of(journal), rows));
 }

@@ -65,7 +65,7 @@ TEST_F(UpkeepTest, ASoundJournalIsFoundSoundAndIsLeftAsItWas) {
     const auto report = verify_journal(kFile, &disk_);
     ASSERT_TRUE(report) << report.error().message;
     EXPECT_THAT(report->faults, IsEmpty());
-    EXPECT_EQ(report->version, 3);
+    EXPECT_EQ(report->version, 4);
     EXPECT_EQ(report->head, plain_head("bone", rows_));
     EXPECT_EQ(report->witnessed, RoomSeq{40});
     EXPECT_EQ(report->closed_cleanly, closed);
@@ -217,7 +217,7 @@ TEST(Migration, TakesAFirstVersionIntoACopyWithTheSameChain) {
   const Result<void> migrated = migrate_journal(old, now);
   ASSERT_TRUE(migrated) << migrated.error().message;
   EXPECT_EQ(verify_journal(old)->version, 1) << "the old one is left";
-  EXPECT_EQ(verify_journal(now)->version, 3);
+  EXPECT_EQ(verify_journal(now)->version, 4);
   Journal journal = std::move(Journal::open(now).value());
   EXPECT_EQ(journal.closed_because(), nullptr);
   EXPECT_TRUE(equal(rows_of(journal), rows));
@@ -239,11 +239,11 @@ void change(const std::filesystem::path& file, const char* sql) {
 TEST(Migration, RefusesAVersionOfTheFuture) {
   const test::TempDir folder;
   { ASSERT_TRUE(Journal::create(folder / "journal", "bone")->close()); }
-  change(folder / "journal", "PRAGMA user_version=4");
+  change(folder / "journal", "PRAGMA user_version=5");
   const auto opened = Journal::open(folder / "journal");
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::unsupported);
-  EXPECT_THAT(opened.error().message, HasSubstr("of version 4, this program reads up to version 3"));
+  EXPECT_THAT(opened.error().message, HasSubstr("of version 5, this program reads up to version 4"));
 }
 
 TEST(Migration, RefusesTablesThatAreNotThoseOfTheVersion) {
@@ -253,7 +253,7 @@ TEST(Migration, RefusesTablesThatAreNotThoseOfTheVersion) {
   const auto opened = Journal::open(folder / "journal");
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::invalid_input);
-  EXPECT_THAT(opened.error().message, HasSubstr("how its tables of version 3 are made"));
+  EXPECT_THAT(opened.error().message, HasSubstr("how its tables of version 4 are made"));
 }
 
 }  // namespace

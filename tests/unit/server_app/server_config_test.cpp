@@ -128,6 +128,7 @@ const std::multimap<std::string, std::pair<std::string, std::string>> kWrong{
     {"retention_days", {"0", "from 1 to 36500"}},
     {"rooms", {"[x]", "write a path"}},
     {"save", {"{}", "write a path"}},
+    {"signing_key", {"[x]", "write a path"}},
     {"summary", {"{}", "write a path"}},
     {"tools", {"{}", "write a path"}},
     {"uploads", {"[x]", "write a path"}},

@@ -1,0 +1,110 @@
+// Ed25519 signatures (RFC 8032) with which a server vouches for what it wrote into a journal. The chain of hashes shows
+// that rows fit together; anybody can compute it. Only who has the secret key can sign.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/journal/chain.hpp"
+
+namespace osteon {
+
+struct PublicKey {
+  std::array<std::uint8_t, 32> bytes{};
+  friend auto operator<=>(const PublicKey&, const PublicKey&) = default;
+};
+struct Signature {
+  std::array<std::uint8_t, 64> bytes{};
+  friend bool operator==(const Signature&, const Signature&) = default;
+};
+
+// 64 hexadecimal digits.
+[[nodiscard]] std::string to_hex(const PublicKey& key);
+// White space around the digits does not count. Error invalid_input: anything else.
+[[nodiscard]] Result<PublicKey> parse_public_key(std::string_view text);
+[[nodiscard]] bool verifies(const PublicKey& key, const Digest& message, const Signature& signature);
+
+// A secret key. Its bytes are wiped when it goes.
+class SigningKey {
+ public:
+  [[nodiscard]] static SigningKey make();  // of the system's random bytes
+  [[nodiscard]] static SigningKey from_seed(const std::array<std::uint8_t, 32>& seed);
+  SigningKey(const SigningKey&) = default;
+  SigningKey& operator=(const SigningKey&) = default;
+  ~SigningKey();
+  [[nodiscard]] const PublicKey& public_key() const { return public_; }
+  [[nodiscard]] Signature sign(const Digest& message) const;
+  [[nodiscard]] std::string seed_as_hex() const;
+
+ private:
+  SigningKey() = default;
+  std::array<std::uint8_t, 64> secret_{};
+  PublicKey public_;
+};
+
+// One key takes over from another. Both sign it: else anybody could name a key of their own as the earlier one.
+struct Succession {
+  PublicKey before, after;
+  Signature by_before, by_after;
+  friend bool operator==(const Succession&, const Succession&) = default;
+};
+[[nodiscard]] Succession succeed(const SigningKey& before, const SigningKey& after);
+[[nodiscard]] std::string encode_successions(std::span<const Succession> all);
+[[nodiscard]] std::optional<std::vector<Succession>> decode_successions(std::string_view bytes);
+// The key, and all that came before and after it as far as both signatures of each step hold.
+[[nodiscard]] std::set<PublicKey> keys_of_line(const PublicKey& key, std::span<const Succession> successions);
+
+// What a server signs with, and the keys that it signed with before. Fixed once it is made: any thread.
+class SigningKeys {
+ public:
+  explicit SigningKeys(SigningKey key, std::vector<Succession> successions = {});
+  [[nodiscard]] const SigningKey& key() const { return key_; }
+  [[nodiscard]] const std::vector<Succession>& successions() const { return successions_; }
+  [[nodiscard]] bool trusts(const PublicKey& key) const { return line_.contains(key); }
+
+ private:
+  SigningKey key_;
+  std::vector<Succession> successions_;
+  std::set<PublicKey> line_;
+};
+
+// Its name, where nobody says another: in the folder of the journals.
+inline constexpr const char* kSigningKeyFile = "signing.key";
+// The keys in a text file that only its owner may read. Errors, naming the file: not_found; invalid_input (it is no key
+// file, or others may read it).
+[[nodiscard]] Result<std::shared_ptr<const SigningKeys>> load_signing_keys(const std::filesystem::path& file);
+// The same. Where the file is missing, one with a new key is made, safe on the disk, for its owner alone. Error
+// internal: it cannot be written.
+[[nodiscard]] Result<std::shared_ptr<const SigningKeys>> load_or_make_signing_keys(const std::filesystem::path& file);
+// Puts a new key into the file, which the present one signs. The file holds the old one or the new one at every moment.
+// Whoever has loaded the file signs with the old key until it loads it again.
+[[nodiscard]] Result<std::shared_ptr<const SigningKeys>> rotate_signing_keys(const std::filesystem::path& file);
+
+// A key says: I decided the rows from `since` on, and they lead to `head`. Through the chain this holds for what those
+// rows are.
+struct SignedRows {
+  RoomSeq since;
+  JournalHead head;
+  PublicKey key;
+  Signature signature;
+};
+[[nodiscard]] SignedRows sign_rows(const SigningKey& key, RoomSeq since, const JournalHead& head);
+[[nodiscard]] bool verifies(const SignedRows& rows);
+
+// What stands beside each entry that the chain does not confirm: its hash, or the key that signed the hash and its
+// signature. `genesis`: chain_0 of the journal, so that it counts in no other.
+[[nodiscard]] std::string make_seal(const Digest& entry, const Digest& genesis, const SigningKey* key);
+struct Seal {
+  std::optional<PublicKey> key;  // none: nobody signed it
+};
+// Nothing: it does not fit the entry.
+[[nodiscard]] std::optional<Seal> check_seal(std::string_view seal, const Digest& entry, const Digest& genesis);
+
+}  // namespace osteon

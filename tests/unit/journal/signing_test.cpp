@@ -1,0 +1,348 @@
+// Who vouches for a journal: its server's key, somebody else's, or nobody.
+#include "server/journal/signing.hpp"
+
+#include <gmock/gmock.h>
+#include <sqlite3.h>
+#include <sys/stat.h>
+
+#include <fstream>
+#include <iterator>
+#include <thread>
+
+#include "server/journal/journal_file.hpp"
+#include "server/journal/upkeep.hpp"
+#include "tests/support/temp_dir.hpp"
+#include "tests/unit/journal/old_journals.hpp"
+#include "tests/unit/journal/rows.hpp"
+
+namespace osteon {
+namespace {
+
+namespace fs = std::filesystem;
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+std::shared_ptr<const SigningKeys> new_keys() { return std::make_shared<const SigningKeys>(SigningKey::make()); }
+
+std::string content_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+void write_key_file(const fs::path& file, const std::string& content) {
+  std::ofstream(file, std::ios::binary) << content;
+  fs::permissions(file, fs::perms::owner_read | fs::perms::owner_write);
+}
+
+unsigned mode_of(const fs::path& file) {
+  struct stat found {};
+  EXPECT_EQ(::stat(file.c_str(), &found), 0);
+  return found.st_mode & 0777;
+}
+
+// RFC 8032, section 7.1, test 1.
+TEST(SigningKey, IsThatOfTheStandard) {
+  std::array<std::uint8_t, 32> seed{0x9d, 0x61, 0xb1, 0x9d, 0xef, 0xfd, 0x5a, 0x60, 0xba, 0x84, 0x4a,
+                                    0xf4, 0x92, 0xec, 0x2c, 0xc4, 0x44, 0x49, 0xc5, 0x69, 0x7b, 0x32,
+                                    0x69, 0x19, 0x70, 0x3b, 0xac, 0x03, 0x1c, 0xae, 0x7f, 0x60};
+  EXPECT_EQ(to_hex(SigningKey::from_seed(seed).public_key()),
+            "d75a980182b10ab7d54bfed3c964073a0ee172f3daa62325af021a68f707511a");
+}
+
+TEST(SigningKey, SignsOneMessage) {
+  const SigningKey key = SigningKey::make(), other = SigningKey::make();
+  Digest message;
+  message.bytes[3] = 7;
+  Signature signature = key.sign(message);
+  EXPECT_TRUE(verifies(key.public_key(), message, signature));
+  EXPECT_FALSE(verifies(other.public_key(), message, signature));
+  message.bytes[3] = 8;
+  EXPECT_FALSE(verifies(key.public_key(), message, signature));
+  message.bytes[3] = 7;
+  signature.bytes[40] ^= 1;
+  EXPECT_FALSE(verifies(key.public_key(), message, signature));
+}
+
+TEST(SigningKeyFile, IsMadeOnceForItsOwnerAlone) {
+  const test::TempDir folder;
+  const fs::path file = folder / "signing.key";
+  EXPECT_EQ(load_signing_keys(file).error().code, ErrorCode::not_found);
+  const auto made = load_or_make_signing_keys(file);
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ(mode_of(file), 0600u);
+  EXPECT_EQ((*load_or_make_signing_keys(file))->key().public_key(), (*made)->key().public_key());
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1) << "a draft is left";
+
+  fs::permissions(file, fs::perms::group_read, fs::perm_options::add);
+  const auto open_to_others = load_or_make_signing_keys(file);
+  ASSERT_FALSE(open_to_others);
+  EXPECT_THAT(open_to_others.error().message, HasSubstr("chmod 600 " + file.string()));
+}
+
+TEST(SigningKeyFile, IsTheSameForServersThatStartAtOnce) {
+  const test::TempDir folder;
+  std::vector<PublicKey> keys(8);
+  std::vector<std::thread> servers;
+  for (PublicKey& key : keys)
+    servers.emplace_back([&] { key = (*load_or_make_signing_keys(folder / "signing.key"))->key().public_key(); });
+  for (std::thread& server : servers) server.join();
+  for (const PublicKey& key : keys) EXPECT_EQ(key, keys.front());
+}
+
+TEST(SigningKeyFile, SaysWhichLineIsWrong) {
+  const test::TempDir folder;
+  const fs::path file = folder / "signing.key", other = folder / "other.key";
+  ASSERT_TRUE(load_or_make_signing_keys(file) && rotate_signing_keys(file));
+  const std::string good = content_of(file);
+  const auto refused = [&](const std::string& content) {
+    write_key_file(other, content);
+    const auto loaded = load_signing_keys(other);
+    EXPECT_FALSE(loaded) << content;
+    return loaded ? std::string() : loaded.error().message;
+  };
+  EXPECT_THAT(refused("PEM\n"), HasSubstr("other.key:1 is not"));
+  EXPECT_THAT(refused(""), HasSubstr("has no secret"));
+  std::string changed = good;
+  changed[good.find("secret ") + 7] = 'x';
+  EXPECT_THAT(refused(changed), HasSubstr("other.key:3 is not the only secret of 64 hexadecimal digits"));
+  changed = good;
+  char& digit = changed[good.find("succession ") + 300];
+  digit = digit == '0' ? '1' : '0';
+  EXPECT_THAT(refused(changed), HasSubstr("other.key:4 is no succession"));
+  EXPECT_THAT(refused(good + "more\n"), HasSubstr("other.key:5 is neither"));
+}
+
+TEST(SigningKeyFile, KeepsTheLineOfItsKeys) {
+  const test::TempDir folder;
+  const fs::path file = folder / "signing.key";
+  const PublicKey first = (*load_or_make_signing_keys(file))->key().public_key();
+  const PublicKey second = (*rotate_signing_keys(file))->key().public_key();
+  const auto third = rotate_signing_keys(file);
+  ASSERT_TRUE(third) << third.error().message;
+  EXPECT_EQ(mode_of(file), 0600u);
+  EXPECT_TRUE((*third)->trusts(first) && (*third)->trusts(second));
+  EXPECT_FALSE((*third)->trusts(SigningKey::make().public_key()));
+  EXPECT_EQ(keys_of_line(first, (*third)->successions()).size(), 3u);
+}
+
+// Whoever makes a key of their own before or after another's has only one of the two signatures.
+TEST(Succession, NeedsBothItsKeys) {
+  const SigningKey ours = SigningKey::make(), theirs = SigningKey::make();
+  for (const bool before : {false, true}) {
+    Succession forged = before ? succeed(theirs, ours) : succeed(ours, theirs);
+    (before ? forged.by_after : forged.by_before) = before ? forged.by_before : forged.by_after;
+    EXPECT_EQ(keys_of_line(ours.public_key(), {&forged, 1}).size(), 1u);
+  }
+}
+
+class SignedJournal : public ::testing::Test {
+ protected:
+  Journal open(const std::shared_ptr<const SigningKeys>& keys) {
+    auto journal = Journal::open(file_, {.keys = keys});
+    EXPECT_TRUE(journal) << journal.error().message;
+    return std::move(*journal);
+  }
+  void write(const std::shared_ptr<const SigningKeys>& keys, std::size_t from, std::size_t to, bool close) {
+    Journal journal =
+        fs::exists(file_) ? open(keys) : std::move(Journal::create(file_, "bone", {.keys = keys}).value());
+    for (std::size_t i = from; i < to; ++i) append(journal, rows_, i, i + 1);
+    if (close) ASSERT_TRUE(journal.close());
+  }
+  Vouched vouched(const PublicKey& key) { return vouched(key, file_); }
+  Vouched vouched(const PublicKey& key, const fs::path& file) {
+    const auto report = verify_journal(file);
+    EXPECT_TRUE(report && report->sound()) << (report ? report->faults.front() : report.error().message);
+    return vouched_by(key, *report);
+  }
+  // As text: "1-30" for each range.
+  static std::vector<std::string> text_of(const std::vector<SignedRange>& ranges) {
+    std::vector<std::string> texts;
+    for (const SignedRange& one : ranges)
+      texts.push_back(std::to_string(one.from.value) + "-" + std::to_string(one.to.value));
+    return texts;
+  }
+  static std::vector<std::string> text_of(const std::vector<std::pair<RoomSeq, RoomSeq>>& ranges) {
+    std::vector<std::string> texts;
+    for (const auto& [from, to] : ranges) texts.push_back(std::to_string(from.value) + "-" + std::to_string(to.value));
+    return texts;
+  }
+  void run_sql(const std::string& sql) {
+    sqlite3* database = nullptr;
+    ASSERT_EQ(sqlite3_open(file_.c_str(), &database), SQLITE_OK);
+    char* why = nullptr;
+    EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, &why), SQLITE_OK) << why;
+    sqlite3_close(database);
+  }
+
+  test::TempDir folder_;
+  fs::path file_ = folder_ / "journal";
+  std::vector<JournalRow> rows_ = some_rows(17, 60);
+  std::shared_ptr<const SigningKeys> keys_ = new_keys();
+  PublicKey key_ = keys_->key().public_key();
+};
+
+TEST_F(SignedJournal, IsVouchedForToItsEndHoweverItsServerEnded) {
+  for (const bool close : {false, true, false}) {
+    fs::remove_all(folder_.path());
+    fs::create_directory(folder_.path());
+    write(keys_, 0, 20, close);
+    write(keys_, 20, 45, !close);
+    const Vouched found = vouched(key_);
+    EXPECT_TRUE(found.all()) << ::testing::PrintToString(found.entries_unsigned);
+    EXPECT_THAT(text_of(found.rows), ElementsAre("1-45"));
+    const Vouched by_another = vouched(SigningKey::make().public_key());
+    EXPECT_THAT(by_another.rows, IsEmpty());
+    EXPECT_THAT(text_of(by_another.by_others), ElementsAre("1-45"));
+  }
+}
+
+TEST_F(SignedJournal, IsVouchedForByNobodyWithoutAKey) {
+  write(nullptr, 0, 20, true);
+  EXPECT_THAT(text_of(vouched(key_).by_nobody), ElementsAre("1-20"));
+  // A server with a key vouches for what it adds, not for what it found.
+  write(keys_, 20, 30, false);
+  const Vouched found = vouched(key_);
+  EXPECT_THAT(text_of(found.rows), ElementsAre("21-30"));
+  EXPECT_THAT(text_of(found.by_nobody), ElementsAre("1-20"));
+  EXPECT_THAT(open(keys_).notes(), IsEmpty()) << "the second time it knows them";
+}
+
+// The chain of hashes has no key: a script can go on with it.
+TEST_F(SignedJournal, NamesRowsThatAScriptAppended) {
+  write(keys_, 0, 20, true);
+  write(nullptr, 20, 50, true);
+  const Vouched found = vouched(key_);
+  EXPECT_THAT(text_of(found.rows), ElementsAre("1-20"));
+  EXPECT_THAT(text_of(found.by_nobody), ElementsAre("21-50"));
+  {
+    Journal journal = open(keys_);
+    ASSERT_NE(journal.closed_because(), nullptr) << "it takes rows behind invented ones";
+    EXPECT_THAT(journal.closed_because()->message, HasSubstr("signed the rows up to 20, but not rows 21 to 50"));
+  }
+  // Taken over on purpose, they still are not vouched for.
+  ASSERT_TRUE(recover_journal(file_, folder_ / "recovered"));
+  file_ = folder_ / "recovered";
+  write(keys_, 50, 60, true);
+  const Vouched recovered = vouched(key_);
+  EXPECT_THAT(text_of(recovered.rows), ElementsAre("1-20", "51-60"));
+  EXPECT_THAT(text_of(recovered.by_nobody), ElementsAre("21-50"));
+  EXPECT_THAT(recovered.entries_unsigned, Contains("the register \"recovered\"")) << "nobody signed that it was";
+}
+
+TEST_F(SignedJournal, NamesRowsThatAnotherKeySigned) {
+  write(keys_, 0, 20, true);
+  const auto others = new_keys();
+  write(others, 20, 50, true);
+  const Vouched found = vouched(key_);
+  EXPECT_THAT(text_of(found.rows), ElementsAre("1-20"));
+  EXPECT_THAT(text_of(found.by_others), ElementsAre("21-50"));
+  EXPECT_FALSE(found.all());
+  EXPECT_THAT(text_of(vouched(others->key().public_key()).rows), ElementsAre("21-50"));
+}
+
+TEST_F(SignedJournal, KnowsTheLineOfItsServersKeys) {
+  const fs::path key_file = folder_ / "signing.key";
+  const auto first = *load_or_make_signing_keys(key_file);
+  write(first, 0, 20, false);
+  const auto second = *rotate_signing_keys(key_file);
+  write(second, 20, 30, false);
+  const auto third = *rotate_signing_keys(key_file);
+  write(third, 30, 40, true);
+  for (const auto& keys : {first, second, third}) EXPECT_TRUE(vouched(keys->key().public_key()).all());
+  EXPECT_FALSE(vouched(key_).all());
+}
+
+TEST_F(SignedJournal, KeepsItsSignaturesInABackup) {
+  write(keys_, 0, 20, false);
+  {
+    Journal journal = open(keys_);
+    auto file = journal.begin_checkpoint(journal.head(), "meta");
+    ASSERT_TRUE(file && file->write("bytes") && file->finish() && journal.add_checkpoint(std::move(*file)));
+    ASSERT_TRUE(journal.set_register("room name", "hip"));
+    append(journal, rows_, 20, 30);
+  }
+  ASSERT_TRUE(backup_journal(file_, folder_ / "backup"));
+  const Vouched found = vouched(key_, folder_ / "backup");
+  EXPECT_TRUE(found.all()) << ::testing::PrintToString(found.entries_unsigned);
+  EXPECT_THAT(text_of(found.rows), ElementsAre("1-30"));
+}
+
+TEST_F(SignedJournal, SignsABranchThatItsServerMakes) {
+  write(keys_, 0, 20, true);
+  Journal journal = open(keys_);
+  auto copy = JournalCopy::begin_branch(journal, folder_ / "branch", RoomSeq{10}, "another bone", {});
+  ASSERT_TRUE(copy);
+  while (!copy->step().value()) {}
+  EXPECT_THAT(text_of(vouched(key_, folder_ / "branch").rows), ElementsAre("1-10"));
+}
+
+TEST_F(SignedJournal, TakesTheSignatureOfEarlierRowsForNoOther) {
+  write(keys_, 0, 20, true);
+  const fs::path first = std::exchange(file_, folder_ / "other");
+  rows_ = some_rows(18, 60);
+  write(keys_, 0, 20, true);
+  // The other journal's rows with the first one's signatures.
+  run_sql("ATTACH '" + first.string() +
+          "' AS first; DELETE FROM signatures; INSERT INTO signatures SELECT * FROM first.signatures");
+  const auto report = verify_journal(file_);
+  ASSERT_TRUE(report);
+  EXPECT_THAT(report->faults, Contains(HasSubstr("the signature at place 20 vouches for another history")));
+}
+
+TEST_F(SignedJournal, NamesASignatureThatNoKeyMade) {
+  write(keys_, 0, 20, true);
+  run_sql("UPDATE signatures SET since = 2 WHERE place = 20");
+  EXPECT_THAT(verify_journal(file_)->faults, Contains(HasSubstr("the signature at place 20 is damaged")));
+  run_sql("UPDATE signatures SET key = zeroblob(31) WHERE place = 20");
+  EXPECT_THAT(verify_journal(file_)->faults, Contains(HasSubstr("the signature at place 20 is damaged")));
+}
+
+TEST_F(SignedJournal, VouchesForItsRegistersAndCheckpoints) {
+  {
+    write(keys_, 0, 20, false);
+    Journal journal = open(keys_);
+    ASSERT_TRUE(journal.set_register("room name", "hip"));
+    EXPECT_TRUE(journal.is_vouched_for("room name").value());
+    EXPECT_TRUE(journal.is_vouched_for("not there").value());
+  }
+  {
+    Journal journal = open(nullptr);
+    ASSERT_TRUE(journal.set_register("room name", "knee"));
+    auto file = journal.begin_checkpoint(journal.head(), "meta");
+    ASSERT_TRUE(file && file->finish() && journal.add_checkpoint(std::move(*file)));
+  }
+  EXPECT_FALSE(open(keys_).is_vouched_for("room name").value());
+  EXPECT_FALSE(open(new_keys()).is_vouched_for("room name").value());
+  EXPECT_THAT(vouched(key_).entries_unsigned, ElementsAre("the checkpoint at place 20", "the register \"room name\""));
+}
+
+// Of another genesis, a register's signature is none.
+TEST_F(SignedJournal, TakesNoRegisterOfAnotherJournal) {
+  write(keys_, 0, 5, false);
+  { ASSERT_TRUE(open(keys_).set_register("room name", "hip")); }
+  const fs::path other = folder_ / "other";
+  {
+    Journal journal = std::move(Journal::create(other, "another bone", {.keys = keys_}).value());
+    ASSERT_TRUE(journal.set_register("room name", "knee"));
+    ASSERT_TRUE(journal.close());
+  }
+  { ASSERT_TRUE(open(keys_).close()); }
+  run_sql("ATTACH '" + other.string() +
+          "' AS other; INSERT OR REPLACE INTO registers SELECT * FROM other.registers WHERE name = 'room name'");
+  EXPECT_THAT(verify_journal(file_)->faults, Contains(HasSubstr("its register room name is damaged")));
+}
+
+TEST_F(SignedJournal, GoesOnFromOneOfAnOldVersion) {
+  ASSERT_NO_FATAL_FAILURE(make_old_journal(file_, 2, {rows_.begin(), rows_.begin() + 30}, RowsIn::sqlites_log));
+  EXPECT_THAT(open(keys_).notes(), Contains(HasSubstr("rows 1 to 30 were not signed by this server's key")));
+  write(keys_, 30, 40, false);
+  const Vouched found = vouched(key_);
+  EXPECT_THAT(text_of(found.by_nobody), ElementsAre("1-30"));
+  EXPECT_THAT(text_of(found.rows), ElementsAre("31-40"));
+}
+
+}  // namespace
+}  // namespace osteon
