@@ -6,13 +6,26 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <memory>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "server/journal/journal.hpp"
+#if __has_include("server/journal/signing.hpp")
+#include "server/journal/signing.hpp"
+#endif
 
 namespace {
+
+// As a server has it: signed, where this version signs.
+osteon::JournalOptions options() {
+  osteon::JournalOptions made;
+#if __has_include("server/journal/signing.hpp")
+  made.keys = std::make_shared<const osteon::SigningKeys>(osteon::SigningKey::make());
+#endif
+  return made;
+}
 
 constexpr std::size_t kRowBytes = 150;  // of a cut
 
@@ -32,7 +45,7 @@ int main(int argc, char** argv) {
   using namespace osteon;
   if (argc != 4) return 2;
   const std::uint64_t rows = std::strtoull(argv[2], nullptr, 10), per_commit = std::strtoull(argv[3], nullptr, 10);
-  auto journal = Journal::create(argv[1], "bone");
+  auto journal = Journal::create(argv[1], "bone", options());
   if (!journal || per_commit == 0) return 1;
   std::mt19937_64 random(1);
   std::vector<double> waits_us;
