@@ -181,20 +181,30 @@ void RoomHost::Impl::end_sessions(const std::string& why, bool to_return) {
   sessions.each([&](SessionSink& sink) { to_return ? sink.replaced(why) : sink.end(why); });
 }
 
+Result<void> RoomHost::check_kept(const Witness& kept) {
+  if (impl_->player) return {};
+  if (impl_->keeper) return impl_->keeper->check_witness(kept);
+  return failure(ErrorCode::unavailable,
+                 "the room begins anew: it has no journal, and none of the " + std::to_string(kept.head.place.value) +
+                     " events that you were told are kept; start again to join it as it is now");
+}
+
 Result<void> RoomHost::resume(AuthorId author, const Digest& secret, const std::optional<Witness>& kept, std::optional<Role> role) {
   if (impl_->player) return tl::unexpected(only_to_be_watched());
-  {
-    const std::shared_lock lock(impl_->room_mutex);
-    if (!impl_->room.proves(author, secret))
-      return failure(ErrorCode::invalid_input, "author " + std::to_string(author.value) +
-                                                   " of an earlier connection is not known here by that secret; join anew");
-    // What an author may take back goes by the role of the join.
-    if (role && impl_->room.people().role(author) != *role)
-      return failure(ErrorCode::denied, "your role here is another than when author " + std::to_string(author.value) +
-                                            " joined; join anew");
-  }
-  if (!kept || !impl_->keeper) return {};
-  return impl_->keeper->check_witness(*kept);
+  if (kept)
+    if (Result<void> has = check_kept(*kept); !has) return has;
+  const std::shared_lock lock(impl_->room_mutex);
+  if (!impl_->room.proves(author, secret))
+    return failure(ErrorCode::invalid_input,
+                   "the room does not know author " + std::to_string(author.value) + " of an earlier connection: " +
+                       (impl_->keeper ? "its journal begins anew, or ends before that join"
+                                      : "without a journal it ends with its server") +
+                       "; start again to join it as it is now");
+  // What an author may take back goes by the role of the join.
+  if (role && impl_->room.people().role(author) != *role)
+    return failure(ErrorCode::denied, "your role here is another than when author " + std::to_string(author.value) +
+                                          " joined; join anew");
+  return {};
 }
 
 void RoomHost::join(MemberKind kind, const std::string& name, const Digest& secret, Role role,

@@ -127,8 +127,12 @@ class RoomHost {
   // The same; waits, so not on the tick or the committing thread, nor of a driven host.
   [[nodiscard]] Result<AuthorId> join(MemberKind kind, const std::string& name = {}, const Digest& secret = {},
                                       Role role = Role::none);
-  // Whether an earlier connection may go on. `kept`: what it was told is safe, if anything. Errors: invalid_input (not the
-  // secret of which the author has the digest), unavailable (the room has lost what was said to be safe), denied (`role` is given, and he joined with another).
+  // What somebody who comes back was told is safe. It counts whoever says it: after a loss the author's number may be
+  // another's, or nobody's. Errors: those of RoomKeeper::check_witness; unavailable (nobody keeps the room).
+  [[nodiscard]] Result<void> check_kept(const Witness& kept);
+  // Whether an earlier connection may go on. `kept`: what it was told is safe, if anything. Errors: first those of
+  // check_kept; invalid_input (not the secret of which the author has the digest); denied (`role` is given, and the
+  // author joined with another).
   [[nodiscard]] Result<void> resume(AuthorId author, const Digest& secret, const std::optional<Witness>& kept,
                                     std::optional<Role> role = {});
   [[nodiscard]] BoneStatus bone_status();

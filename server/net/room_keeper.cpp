@@ -20,6 +20,10 @@ namespace {
 
 constexpr std::size_t kPieceBytes = 128 * 1024;  // of a checkpoint, about
 
+// Of what a client is told whose room has less than it was told of.
+constexpr const char* kToldEvents = " events that you were told are kept";
+constexpr const char* kJoinAsItIs = "; start again to join it as it is now";
+
 constexpr std::size_t kSyncBytes = 1024 * 1024;  // no commit waits behind more than this of a checkpoint
 
 std::int32_t computers_day() {
@@ -235,12 +239,47 @@ Witness RoomKeeper::witness() const {
 }
 
 Result<void> RoomKeeper::check_witness(const Witness& witness) {
+  const std::string room = "the room " + genesis_.room;
+  const std::string told = std::to_string(witness.head.place.value) + kToldEvents;
+  const bool sealed = witness.seal == seal_of(witness.head), without_seal = witness.seal == Digest{};
+  const auto lost_after = [&](RoomSeq place) {
+    return room + " has lost " + std::to_string(witness.head.place.value - place.value) + " of the " + told;
+  };
+  // Another journal has another key.
+  const auto begins_anew = [&] {
+    return failure(ErrorCode::invalid_input, room + " begins anew: its journal has none of the " + told + kJoinAsItIs +
+                                                 ", or have the lost journal put back first");
+  };
   return with_journal([&](Journal& journal) -> Result<void> {
-    if (witness.head.place > journal.head().place && witness.seal != seal_of(witness.head))
-      return failure(ErrorCode::invalid_input, file_.string() + " goes to place " + std::to_string(journal.head().place.value) +
-                                                   ", and a client says without its seal that place " +
-                                                   std::to_string(witness.head.place.value) + " is safe; it has to join anew");
-    return journal.check_witness(witness.head);
+    const RoomSeq head = journal.head().place;
+    const std::optional<RoomSeq> recovered = journal.recovered_to();
+    const auto after_recovery = [&](ErrorCode code) {
+      return failure(code, lost_after(*recovered) + ": its journal was recovered up to event " +
+                               std::to_string(recovered->value) + kJoinAsItIs);
+    };
+    const bool beyond = witness.head.place > head;
+    // The key may be among what was lost.
+    if (beyond && !sealed && recovered) return after_recovery(ErrorCode::invalid_input);
+    if (beyond && without_seal)
+      return failure(ErrorCode::invalid_input,
+                     room + " has " + std::to_string(head.value) + " events, and you name event " +
+                         std::to_string(witness.head.place.value) + " without the room's seal" + kJoinAsItIs);
+    if (beyond && !sealed) return begins_anew();
+    Result<void> checked = journal.check_witness(witness.head);
+    if (checked) return checked;
+    if (beyond && recovered) return after_recovery(checked.error().code);
+    if (beyond)
+      return failure(checked.error().code,
+                     lost_after(head) + ", and takes no more cuts: have its journal recovered, then start again");
+    // Of a journal that is closed it is not known whether its file is as it was written.
+    const Result<JournalHead> here = journal.head_at(witness.head.place);
+    const bool another_history = here && here->chain != witness.head.chain && journal.closed_because() == nullptr;
+    if (!another_history) return checked;
+    if (recovered && *recovered < witness.head.place) return after_recovery(checked.error().code);
+    if (without_seal) return checked;
+    if (!sealed) return begins_anew();
+    return failure(checked.error().code,
+                   room + " has lost some of the " + told + ": an older copy of its journal has gone on" + kJoinAsItIs);
   });
 }
 

@@ -107,8 +107,9 @@ class RoomKeeper {
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
   // What clients are told is safe, now.
   [[nodiscard]] Witness witness() const;
-  // What a client says it was told is safe: see Journal::check_witness. One beyond the journal counts only under its seal, so
-  // that no client can close a room by what it makes up. Error invalid_input: also that it is not.
+  // What a client says it was told is safe: see Journal::check_witness. One beyond the journal counts only under its
+  // seal, so that no client can close a room by what it makes up. An error is a sentence for the client's person: how
+  // many events the room has lost, or that it begins anew, and what to do. Error invalid_input: also without a seal.
   [[nodiscard]] Result<void> check_witness(const Witness& witness);
 
   // The pseudonym under which rows know this person; the same for the same label, until it is forgotten.

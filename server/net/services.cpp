@@ -129,18 +129,28 @@ class RoomServiceImpl final : public RoomBase {
       rooms_.refusals.note("room", address_of(context->peer()), caller ? "there is no such room" : caller.error().message);
       return room ? refuse(reactor, status_of(caller.error())) : reactor;
     }
-    if (Result<void> may = may_join(*caller, *room, *request); !may) {
+    if (Result<void> may = may_join(*caller, *request); !may) {
       rooms_.refusals.note("role", address_of(context->peer()), may.error().message);
       return refuse(reactor, status_of(may.error()));
     }
     room->host().run_slowly([this, room, reactor, context, request, response, caller = *caller] {
       RoomHost& host = room->host();
       const Case& bone = host.bone();
-      const Gate::Coming coming = request->resume_author() != 0 ? Gate::Coming::again : Gate::Coming::anew;
-      // Others may have come while this waited for its turn: who was displaced meanwhile leaves the room as it is.
-      if (const Result<void> still = may_join(caller, *room, *request); !still) return reactor->Finish(status_of(still.error()));
+      const bool again = request->resume_author() != 0;
+      const Gate::Coming coming = again ? Gate::Coming::again : Gate::Coming::anew;
+      // First what the caller was told is kept: after a loss the caller's number may be another's.
+      if (const Result<void> kept = again ? check_kept(host, *request) : Result<void>(); !kept) {
+        rooms_.refusals.note("loss", address_of(context->peer()), kept.error().message);
+        return reactor->Finish(status_of(kept.error()));
+      }
+      // Not sooner: others may have come while this waited for its turn. Who was displaced leaves the room as it is.
+      if (const Result<void> may = again ? may_resume(caller, *room, *request) : Result<void>(); !may) {
+        rooms_.refusals.note("role", address_of(context->peer()), may.error().message);
+        return reactor->Finish(status_of(may.error()));
+      }
+      const std::optional<Role> role = rooms_.gate ? std::optional(caller.role) : std::nullopt;
       const Result<AuthorId> author =
-          request->resume_author() != 0 ? come_back(host, *request, rooms_.gate ? std::optional(caller.role) : std::nullopt) : come(host, *request, *response, caller);
+          again ? come_back(host, *request, role) : come(host, *request, *response, caller);
       if (!author) {
         rooms_.refusals.note("room", address_of(context->peer()), author.error().message);
         return reactor->Finish(status_of(author.error()));
@@ -152,7 +162,7 @@ class RoomServiceImpl final : public RoomBase {
       log::info("joined", {{"room", room->name},
                            {"author", author->value},
                            {"kind", v1::ClientKind_Name(request->kind())},
-                           {"again", request->resume_author() != 0},
+                           {"again", again},
                            {"protocol_version", request->protocol_version()}});
       response->set_author(author->value);
       response->set_room(room->name);
@@ -384,27 +394,32 @@ class RoomServiceImpl final : public RoomBase {
     // Others see who it is by the certificate, where there is one.
     return host.join(kind, caller.user.empty() ? request.name() : caller.user, digest_of_secret(response.secret()), caller.role);
   }
-  // `role`: what the caller may be now; nothing: whatever it was.
+  static Result<void> check_kept(RoomHost& host, const v1::JoinRequest& request) {
+    if (request.kept_room_seq() == 0) return {};
+    const Result<Digest> chain = wire::digest_from_wire(request.kept_chain());
+    if (!chain) return failure(ErrorCode::invalid_input, "kept_chain is not a digest of 32 bytes");
+    // Programs of before there were seals send none.
+    const Result<Digest> seal = wire::digest_from_wire(request.kept_seal());
+    return host.check_kept({{RoomSeq{request.kept_room_seq()}, *chain}, seal ? *seal : Digest{}});
+  }
+  // After check_kept(). `role`: what the caller may be now; nothing: whatever it was.
   static Result<AuthorId> come_back(RoomHost& host, const v1::JoinRequest& request, std::optional<Role> role) {
-    std::optional<Witness> kept;
-    if (request.kept_room_seq() != 0) {
-      const Result<Digest> chain = wire::digest_from_wire(request.kept_chain());
-      if (!chain) return failure(ErrorCode::invalid_input, "kept_chain is not a digest of 32 bytes");
-      // None, of programs of before there were any, is as good as a false one.
-      const Result<Digest> seal = wire::digest_from_wire(request.kept_seal());
-      kept = Witness{{RoomSeq{request.kept_room_seq()}, *chain}, seal ? *seal : Digest{}};
-    }
     const AuthorId author{request.resume_author()};
-    if (Result<void> may = host.resume(author, digest_of_secret(request.secret()), kept, role); !may) return tl::unexpected(may.error());
+    const Result<void> may = host.resume(author, digest_of_secret(request.secret()), {}, role);
+    if (!may) return tl::unexpected(may.error());
     return author;
   }
-  // What the name of the call does not say.
-  [[nodiscard]] Result<void> may_join(const Caller& caller, const OpenRoom& room, const v1::JoinRequest& request) const {
+  [[nodiscard]] Result<void> may_resume(const Caller& caller, const OpenRoom& room,
+                                        const v1::JoinRequest& request) const {
     if (!rooms_.gate) return {};
-    if (request.kind() == v1::CLIENT_KIND_HAPTIC && !has_right(caller.role, Right::hold_a_tool))
-      return failure(ErrorCode::denied, "your role here, " + std::string(to_string(caller.role)) + ", holds no tool; come as a viewer, or ask for a ticket of another role");
-    if (request.resume_author() == 0) return {};
     return rooms_.gate->check_resume(caller, room.name, request.kind(), AuthorId{request.resume_author()});
+  }
+  // What the name of the call does not say.
+  [[nodiscard]] Result<void> may_join(const Caller& caller, const v1::JoinRequest& request) const {
+    if (rooms_.gate && request.kind() == v1::CLIENT_KIND_HAPTIC && !has_right(caller.role, Right::hold_a_tool))
+      return failure(ErrorCode::denied, "your role here, " + std::string(to_string(caller.role)) +
+                                            ", holds no tool; come as a viewer, or ask for a ticket of another role");
+    return {};
   }
   template <class Fill>
   grpc::ServerUnaryReactor* change(const grpc::CallbackServerContext& context, grpc::ServerUnaryReactor* reactor, std::uint64_t author,

@@ -108,17 +108,67 @@ TEST_F(KeeperTest, BelievesWhatItSealedAndNothingElseOfWhatItLacks) {
     const Result<void> told = kept.keeper->check_witness(lie);
     ASSERT_FALSE(told);
     EXPECT_EQ(told.error().code, ErrorCode::invalid_input);
-    EXPECT_THAT(told.error().message, HasSubstr("has to join anew"));
+    EXPECT_THAT(told.error().message, HasSubstr("start again to join it as it is now"));
   }
   kept.cut(1);
   kept.keeper.reset();
   disk_.load(image);
   kept.open(kFile);
-  EXPECT_EQ(kept.keeper->check_witness(late).error().code, ErrorCode::unavailable);
+  const Result<void> lost = kept.keeper->check_witness(late);
+  EXPECT_EQ(lost.error().code, ErrorCode::unavailable);
+  const std::uint64_t told = late.head.place.value, less = told - early.head.place.value;
+  EXPECT_THAT(lost.error().message,
+              HasSubstr("the room femur has lost " + std::to_string(less) + " of the " + std::to_string(told) +
+                        " events that you were told are kept, and takes no more cuts"));
+  EXPECT_EQ(kept.keeper->check_witness(late).error().message, lost.error().message) << "so does the next";
   EXPECT_FALSE(kept.keeper->write(plain_rows(kept.keeper->head().place, 1))) << "rows were lost: it takes no more";
   kept.keeper.reset();
   kept.open(kFile);
   EXPECT_FALSE(kept.keeper->write(plain_rows(kept.keeper->head().place, 1))) << "nor when it is opened again";
+}
+
+// Whatever has become of the journal: the sentence names it, and what is lost.
+TEST_F(KeeperTest, SaysToWhomeverItToldMoreWhatIsLost) {
+  KeptCuts kept(kFile, &disk_, "femur");
+  kept.cut(2);
+  const RoomSeq copied = kept.keeper->head().place;
+  const MemoryDisk::Image image = disk_.image();
+  kept.cut(3);
+  const Witness late = kept.keeper->witness();
+  const std::string of_all = " of the " + std::to_string(late.head.place.value) + " events that you were told are kept";
+  const std::string lost = "the room femur has lost " + std::to_string(late.head.place.value - copied.value) + of_all;
+  const auto told = [&](const fs::path& file, MemoryDisk& disk) {
+    KeptCuts room(file, &disk, "femur", 2);  // with other cuts
+    const auto say = [&] {
+      const Result<void> checked = room.keeper->check_witness(late);
+      return checked ? std::string("nothing") : checked.error().message;
+    };
+    const std::string at_once = say();
+    room.cut(20);  // it goes on beyond what was told
+    return std::pair(at_once, say());
+  };
+  kept.keeper.reset();
+
+  MemoryDisk other{2};
+  const auto anew = told(kFile, other);
+  const std::string none = "the room femur begins anew: its journal has none" + of_all;
+  EXPECT_THAT(anew.first, HasSubstr(none));
+  EXPECT_THAT(anew.second, HasSubstr(none));
+
+  disk_.load(image);
+  const fs::path aside = "/aside/femur";
+  ASSERT_TRUE(recover_journal(kFile, aside, &disk_));
+  const auto recovered = told(aside, disk_);
+  const std::string up_to = lost + ": its journal was recovered up to event " + std::to_string(copied.value);
+  EXPECT_THAT(recovered.first, HasSubstr(up_to));
+  EXPECT_THAT(recovered.second, HasSubstr(up_to));
+
+  disk_.load(image);
+  KeptCuts copy(kFile, &disk_, "femur");
+  copy.cut(20);
+  EXPECT_THAT(copy.keeper->check_witness(late).error().message,
+              HasSubstr("the room femur has lost some" + of_all + ": an older copy of its journal has gone on"));
+  EXPECT_EQ(copy.keeper->closed_to_rows(), nullptr) << "what stands in it now may go on";
 }
 
 TEST_F(KeeperTest, TimeGoesOnByMoreThanHandsWorkInSilence) {

@@ -1,0 +1,131 @@
+// What a haptic client says of its cuts: after a line that broke, without a server, and after the loss of a journal.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <fstream>
+#include <optional>
+#include <thread>
+
+#include "tests/integration/stage.hpp"
+#include "tests/support/scenes/bones.hpp"
+#include "tests/unit/room/members.hpp"
+
+namespace osteon::test {
+namespace {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+using nlohmann::json;
+using ::testing::ContainsRegex;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class Confirmed : public ::testing::Test {
+ protected:
+  std::string journal() const { return (folder_ / "room.journal").string(); }
+  // The journal's files: the log and its mirror lie beside it.
+  std::vector<fs::path> files() const {
+    std::vector<fs::path> found;
+    for (const auto& entry : fs::directory_iterator(folder_.path())) found.push_back(entry.path());
+    return found;
+  }
+  Process drill(const std::string& name, const std::string& address, std::vector<std::string> more = {}) {
+    std::ofstream(stage_ / (name + "-plan.json")) << json{{"steps", json::array({drill_at(0, 0, "rig")})}};
+    std::vector<std::string> arguments{"--server", address, "--plan", stage_ / (name + "-plan.json"), "--cut-log",
+                                       stage_ / (name + "-cuts.csv"), "--summary", stage_ / (name + ".json"), "--cache",
+                                       stage_ / "cache"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return stage_.start("osteon-haptic", arguments);
+  }
+  // Waits until the room has so many events more than now.
+  [[nodiscard]] bool events_more(std::uint64_t count) {
+    const wire::JoinedRoom watcher = join(stage_.address(), wire::ClientKind::viewer);
+    const std::uint64_t now = status_of(watcher).room_seq();
+    return wait_until([&] { return status_of(watcher).room_seq() >= now + count; }, 60s);
+  }
+  void kill_server() {
+    stage_.server().signal(SIGKILL);
+    ASSERT_TRUE(stage_.server().wait(10s).has_value());
+  }
+  void start_again() { stage_.start_server({"--journal", journal(), "--listen", stage_.address()}); }
+  // One sentence ends the program.
+  static std::string last_sentence(const Process& process, const std::string& name) {
+    const std::string err = process.err();
+    const std::size_t at = err.rfind("\n" + name + ": ");
+    return at == std::string::npos ? err : err.substr(at + 1);
+  }
+
+  TempDir folder_;
+  Stage stage_{16.0, {"--journal", journal()}};
+};
+
+// As a trainee sees it at the terminal.
+TEST_F(Confirmed, AJournalThatIsGoneIsSaidToItsClients) {
+  Process hand = drill("hand", stage_.address());
+  ASSERT_TRUE(events_more(60));
+  kill_server();
+  for (const fs::path& file : files()) fs::remove(file);
+  start_again();
+  ASSERT_EQ(hand.wait(60s), 1) << hand.err();
+  const std::string said = last_sentence(hand, "osteon-haptic");
+  EXPECT_THAT(said, ContainsRegex("the room room begins anew: its journal has none of the [1-9][0-9]* events"));
+  EXPECT_THAT(said, HasSubstr("start again to join it as it is now"));
+  EXPECT_THAT(said, Not(HasSubstr("secret")));
+  EXPECT_THAT(stage_.server().err(), HasSubstr("begins anew")) << "the server's log says it too";
+}
+
+// A hand joins and cuts after the journal was copied. Then the copy takes the journal's place.
+class ConfirmedBeforeAnOlderCopy : public Confirmed {
+ protected:
+  void SetUp() override {
+    kill_server();
+    fs::create_directory(copy_.path() / "copy");
+    for (const fs::path& file : files()) fs::copy(file, copy_.path() / "copy");
+    start_again();
+    hand_.emplace(stage_.address(), stage_ / "cache");
+    ASSERT_TRUE(wait_until([&] { return hand_->complete(); }, kPatience));
+    // A room says about once a second how much is kept. So the second cut is waited for.
+    for (std::uint64_t i = 1; i <= 2; ++i) {
+      const Vec3 at{-4.0 + static_cast<double>(i), 0, 0};
+      Cut cut = straight_cut(find_tool("burr-round-5").value(), at, at, {0, 0, -1}, i);
+      cut.author = hand_->author();
+      ASSERT_TRUE(hand_->session().send(cut));
+      ASSERT_TRUE(wait_until([&] { return hand_->own() == i; }, kPatience));
+      if (i == 1) std::this_thread::sleep_for(1200ms);
+    }
+    std::this_thread::sleep_for(300ms);
+    kill_server();
+    for (const fs::path& file : files()) fs::remove(file);
+  }
+  std::string what_the_hand_is_told() {
+    start_again();
+    EXPECT_TRUE(wait_until([&] { return !hand_->lost().empty(); }, kPatience));
+    return hand_->lost();
+  }
+
+  TempDir copy_;
+  std::optional<Surgeon> hand_;
+};
+
+TEST_F(ConfirmedBeforeAnOlderCopy, ItsClientsAreToldOfTheLossAndTheRoomTakesNoCuts) {
+  for (const auto& entry : fs::directory_iterator(copy_.path() / "copy")) fs::copy(entry.path(), folder_.path());
+  EXPECT_THAT(what_the_hand_is_told(),
+              HasSubstr("has lost 3 of the 3 events that you were told are kept, and takes no more cuts"));
+  const auto operator_is_told = [&] {
+    return stage_.server().err().find("recover it into a new journal") != std::string::npos;
+  };
+  EXPECT_TRUE(wait_until(operator_is_told, 10s)) << stage_.server().err();
+}
+
+TEST_F(ConfirmedBeforeAnOlderCopy, ItsClientsAreToldOfTheLossAfterARecovery) {
+  const RunResult recovered =
+      run(program("osteon-server"), {"recover", copy_.path() / "copy" / "room.journal", journal()}, 30s);
+  ASSERT_EQ(recovered.exit_code, 0) << recovered.err;
+  EXPECT_THAT(what_the_hand_is_told(),
+              HasSubstr("has lost 3 of the 3 events that you were told are kept: its journal was recovered up "
+                        "to event 0; start again to join it as it is now"));
+}
+
+}  // namespace
+}  // namespace osteon::test
