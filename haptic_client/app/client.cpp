@@ -21,6 +21,7 @@
 #include "common/runtime/memory_reserve.hpp"
 #include "common/runtime/periodic.hpp"
 #include "common/runtime/watchdog.hpp"
+#include "haptic_client/app/cut_log.hpp"
 #include "haptic_client/control/guiding.hpp"
 #include "haptic_client/control/mounted_bone.hpp"
 #include "haptic_client/control/patch_builder.hpp"
@@ -175,10 +176,11 @@ class Client {
     outcome_.workspace_scale = session_.loop().mapping().scale();
     outcome_.steps = session_.results();
     outcome_.outside_range = ranges_.uses();
+    outcome_.cuts = cut_log_.rows();
     outcome_.field_hash = replica_.hash();
     outcome_.removed_total_mm3 = replica_.removed_mm3();
     outcome_.room_seq = replica_.room_seq();
-    outcome_.rejected = replica_.rejected();
+    outcome_.rejected += replica_.rejected();
     outcome_.stalls = watchdog_.stalls();
     outcome_.longest_stall_ms = 1e-6 * static_cast<double>(watchdog_.longest().count());
     outcome_.patch_p50_us = patch_times_.percentile_us(50);
@@ -410,7 +412,7 @@ class Client {
       unsent_.push_back(cut);
       const std::int64_t closed_ns =
           tick_times_[static_cast<std::size_t>(piece.closed_tick) % kTickTimes].load(std::memory_order_relaxed);
-      outcome_.cuts.push_back({piece.author_seq, 0, closed_ns, 0});
+      cut_log_.closed(piece.author_seq, closed_ns);
       // Sent before it is felt: the room's answer is what takes longest.
       send_waiting();
       replica_.add_own(cut);
@@ -420,13 +422,6 @@ class Client {
 
   void send_waiting() {
     while (!unsent_.empty() && room_.send(unsent_.front())) unsent_.pop_front();
-  }
-
-  void confirm(std::uint64_t author_seq, RoomSeq place) {
-    if (author_seq == 0 || author_seq > outcome_.cuts.size()) return;
-    CutRow& row = outcome_.cuts[author_seq - 1];
-    row.room_seq = place.value;
-    row.confirmed_mono_ns = ns(Clock::now());
   }
 
   void take(const FieldLeaf& leaf) {
@@ -445,8 +440,7 @@ class Client {
   }
   void renew(const RoomAtJoin& room) {
     replica_.renew(room.contained, room.bodies, renewed_, room.decided_author_seq);
-    for (std::uint64_t seq = 1; seq <= room.decided_author_seq && seq <= outcome_.cuts.size(); ++seq)
-      if (outcome_.cuts[seq - 1].confirmed_mono_ns == 0) confirm(seq, room.contained);
+    outcome_.rejected += cut_log_.confirm(room, ns(Clock::now()));
     follow_lease(room.lease_epoch);
     interrupted_ = false;
     renewed_ = {};
@@ -525,12 +519,12 @@ class Client {
   }
   void take(const Committed& committed) {
     const bool own = committed.cut.author == room_.room().author;
-    if (own) confirm(committed.cut.author_seq, committed.place);
+    if (own) cut_log_.confirm(committed.cut.author_seq, committed.place, ns(Clock::now()));
     if (own) rejected_in_a_row_ = 0;
     replica_.commit(committed.place, committed.cut, own);
   }
   void take(const Rejected& rejected) {
-    confirm(rejected.author_seq, RoomSeq{});
+    cut_log_.confirm(rejected.author_seq, RoomSeq{}, ns(Clock::now()));
     const bool fell = replica_.reject(rejected.place, rejected.author_seq);
     follow_lease(rejected.lease_epoch);
     // An instructor's word that was on its way when this was cut.
@@ -718,6 +712,7 @@ class Client {
   MountedBone mounted_;        // haptic thread
   Replica replica_;            // replica thread, until it is joined
   PatchBuilder builder_;       // replica thread
+  CutLog cut_log_;             // replica thread, until it is joined
   SessionLog log_;             // reporter thread
   Recorder recorder_;          // filled by the reporter thread
   RangeWatch ranges_;          // reporter thread, until it is joined

@@ -30,8 +30,8 @@ struct TickRow {
 };
 
 struct CutRow {
-  std::uint64_t author_seq = 0, room_seq = 0;  // room_seq 0: rejected
-  std::int64_t closed_mono_ns = 0, confirmed_mono_ns = 0;
+  std::uint64_t author_seq = 0, room_seq = 0;              // room_seq 0: rejected, or not confirmed
+  std::int64_t closed_mono_ns = 0, confirmed_mono_ns = 0;  // confirmed_mono_ns 0: the room never said what became of it
 };
 
 [[nodiscard]] const char* name(CuttingPhase phase);

@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,13 @@ struct RoomAtJoin {
   std::vector<BodyId> bodies;
   std::uint64_t lease_epoch = 0;
   std::uint64_t decided_author_seq = 0;  // the caller's cuts up to this one were decided: they are in the leaves or rejected
+  std::vector<RoomSeq> decided_places{};  // of the newest of these, the last that of decided_author_seq; null: rejected
+  // Of one of these cuts; nothing: the room does not say it.
+  [[nodiscard]] std::optional<RoomSeq> place_of(std::uint64_t author_seq) const {
+    const std::uint64_t after = decided_author_seq - author_seq;
+    if (author_seq == 0 || author_seq > decided_author_seq || after >= decided_places.size()) return std::nullopt;
+    return decided_places[decided_places.size() - 1 - after];
+  }
 };
 
 // A part of an event that changed the bone otherwise than by a cut: leaves to set, of bodies to hold.

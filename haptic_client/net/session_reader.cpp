@@ -106,8 +106,9 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
     case v1::SessionResponse::kComplete: {
       const v1::FieldComplete& row = response.complete();
       complete_(row.decided_author_seq());
-      if (events_.complete)
-        events_.complete({RoomSeq{row.room_seq()}, bodies_of(row.bodies()), row.lease_epoch(), row.decided_author_seq()});
+      RoomAtJoin room{RoomSeq{row.room_seq()}, bodies_of(row.bodies()), row.lease_epoch(), row.decided_author_seq()};
+      for (const std::uint64_t place : row.decided_room_seqs()) room.decided_places.push_back(RoomSeq{place});
+      if (events_.complete) events_.complete(room);
       place_ = std::max(place_, RoomSeq{row.room_seq()});
       // Nothing was said of this hand: what held over an earlier stream is over.
       if (!supervised_) supervised({RoomSeq{}, {}, row.lease_epoch(), {}});

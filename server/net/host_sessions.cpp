@@ -13,6 +13,9 @@ namespace {
 
 using Clock = RoomHost::Clock;
 
+// Cuts whose places a session begins with: a haptic client never has more that it knows nothing of.
+constexpr std::size_t kMostToldAgain = 1024;
+
 }  // namespace
 
 Error only_to_be_watched() {
@@ -263,6 +266,8 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, co
     complete.mutable_complete()->set_room_seq(impl_->room.room_seq().value);
     complete.mutable_complete()->set_lease_epoch(lease_epoch);
     complete.mutable_complete()->set_decided_author_seq(impl_->room.decided(sink->author()));
+    for (const RoomSeq place : impl_->room.decided_places(sink->author(), kMostToldAgain))
+      complete.mutable_complete()->add_decided_room_seqs(place.value);
     for (const BodyId body : impl_->room.bodies()) complete.mutable_complete()->add_bodies(body.value);
     const std::lock_guard lock(impl_->sessions_mutex);
     SessionSink*& open = impl_->open_authors[sink->author()];

@@ -107,6 +107,16 @@ std::uint64_t Room::decided(AuthorId author) const {
   return surgeon == surgeons_.end() ? 0 : surgeon->second.decided.size();
 }
 
+std::vector<RoomSeq> Room::decided_places(AuthorId author, std::size_t most) const {
+  std::vector<RoomSeq> places;
+  const auto surgeon = surgeons_.find(author);
+  if (surgeon == surgeons_.end()) return places;
+  const std::vector<Decided>& all = surgeon->second.decided;
+  for (std::size_t i = all.size() - std::min(all.size(), most); i < all.size(); ++i)
+    places.push_back(all[i].rejection == Rejection::none ? all[i].room_seq : RoomSeq{});
+  return places;
+}
+
 Result<Outcome> Room::submit(const Cut& cut) {
   const auto refuse = [&](std::string why) -> Result<Outcome> {
     ++counts_.refused;

@@ -89,6 +89,8 @@ class Room {
   [[nodiscard]] bool proves(AuthorId author, const Digest& secret) const;
   // Newest author_seq that was decided.
   [[nodiscard]] std::uint64_t decided(AuthorId author) const;
+  // Places of the author's newest decided cuts, at most so many, the last that of decided(); null: it was rejected.
+  [[nodiscard]] std::vector<RoomSeq> decided_places(AuthorId author, std::size_t most) const;
   // Rises with every undo and redo that changes the bone: what was seen of it before is of another bone.
   [[nodiscard]] std::uint64_t bone_epoch() const { return bone_epoch_; }
 

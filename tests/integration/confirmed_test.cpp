@@ -2,12 +2,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <csignal>
 #include <fstream>
+#include <map>
 #include <optional>
 #include <thread>
 
+#include "tests/integration/bad_network.hpp"
 #include "tests/integration/stage.hpp"
+#include "tests/support/relay/impair_process.hpp"
 #include "tests/support/scenes/bones.hpp"
 #include "tests/unit/room/members.hpp"
 
@@ -49,6 +53,20 @@ class Confirmed : public ::testing::Test {
     ASSERT_TRUE(stage_.server().wait(10s).has_value());
   }
   void start_again() { stage_.start_server({"--journal", journal(), "--listen", stage_.address()}); }
+  // Places of the hands' cuts by their numbers. One hand has cut.
+  std::map<std::uint64_t, std::uint64_t> places() {
+    const fs::path lines = stage_ / "events.jsonl";
+    const RunResult written = run(program("osteon-server"), {"export", journal(), lines}, 30s);
+    EXPECT_EQ(written.exit_code, 0) << written.err;
+    std::map<std::uint64_t, std::uint64_t> places;
+    std::ifstream in(lines);
+    for (std::string line; std::getline(in, line);) {
+      const json row = json::parse(line);
+      if (row.at("event").contains("cut"))
+        places[std::stoull(row["event"]["cut"]["author_seq"].get<std::string>())] = row["place"].get<std::uint64_t>();
+    }
+    return places;
+  }
   // One sentence ends the program.
   static std::string last_sentence(const Process& process, const std::string& name) {
     const std::string err = process.err();
@@ -59,6 +77,37 @@ class Confirmed : public ::testing::Test {
   TempDir folder_;
   Stage stage_{16.0, {"--journal", journal()}};
 };
+
+// The room takes cuts whose acknowledgements are lost with the line. It says their places when the client comes back.
+TEST_F(Confirmed, TheCutLogHasEachCutsOwnPlace) {
+  ImpairProcess line({"--tcp", stage_.address()});
+  ASSERT_FALSE(line.tcp().empty()) << line.process().err();
+  Process hand = drill("hand", line.tcp(), {"--fast-path", "off", "--patience", "30"});
+  ASSERT_TRUE(events_more(30));
+  ASSERT_EQ(line.command("delay 100"), "ok");
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(events_more(60));
+    ASSERT_EQ(line.command("reset"), "ok");
+  }
+  ASSERT_TRUE(events_more(60));
+  ASSERT_EQ(line.command("good"), "ok");
+  ASSERT_EQ(hand.terminate(60s), 0) << hand.err();
+  const json summary = read_json(stage_ / "hand.json");
+  EXPECT_GE(summary.at("interruptions"), 2);
+  ASSERT_EQ(stage_.server().terminate(), 0);
+  const auto kept = places();
+  const Table cuts = read_table(stage_ / "hand-cuts.csv");
+  ASSERT_GT(cuts.rows(), 150u);
+  int elsewhere = 0, confirmed = 0;
+  for (std::size_t i = 0; i < cuts.rows(); ++i) {
+    if (cuts["confirmed_mono_ns"][i] == 0) continue;
+    ++confirmed;
+    const auto place = kept.find(static_cast<std::uint64_t>(cuts["author_seq"][i]));
+    elsewhere += cuts["room_seq"][i] != (place == kept.end() ? 0.0 : static_cast<double>(place->second));
+  }
+  EXPECT_GT(confirmed, 150);
+  EXPECT_EQ(elsewhere, 0) << "cuts that the log has at another place than the journal";
+}
 
 // As a trainee sees it at the terminal.
 TEST_F(Confirmed, AJournalThatIsGoneIsSaidToItsClients) {

@@ -111,6 +111,16 @@ void Ledger::told_decided(AuthorId author, std::uint64_t author_seq) {
   newest = std::max(newest, author_seq);
 }
 
+void Ledger::told_place(RoomSeq place, AuthorId author, std::uint64_t author_seq) {
+  const std::vector<Cut>& own = made_[author];
+  if (author_seq == 0 || author_seq > own.size())
+    return fault(Invariant::acknowledged, whose(author, author_seq) + " has a place, and was never made");
+  if (place)
+    told_committed(place, own[author_seq - 1]);
+  else
+    rejected_.emplace(author, author_seq);
+}
+
 void Ledger::check_author(const RoomRow& row, AuthorId author, std::uint64_t author_seq, const Digest& bytes,
                           std::map<AuthorId, std::uint64_t>& newest) {
   const std::uint64_t next = ++newest[author];
@@ -184,6 +194,8 @@ void Ledger::check_rows(std::span<const RoomRow> rows) {
       const Digest bytes = cut_digest(cut->cut);
       kept = {EventKind::cut, false, cut->cut.author, cut->cut.author_seq, bytes};
       check_author(row, cut->cut.author, cut->cut.author_seq, bytes, newest);
+      check(!rejected_.contains({cut->cut.author, cut->cut.author_seq}), Invariant::acknowledged,
+            "row " + number(row.place) + " is a cut that was said to be rejected");
       check(cut->cut.lease_epoch == lease_of(cut->cut.author), Invariant::lease,
             "row " + number(row.place) + ", " + whose(cut->cut.author, cut->cut.author_seq) + ", is of lease " +
                 std::to_string(cut->cut.lease_epoch) + " where " + std::to_string(lease_of(cut->cut.author)) + " holds");

@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/room/room.hpp"
@@ -53,6 +55,8 @@ class Ledger {
   void told_event(RoomSeq place, EventKind kind);
   void told_up_to(RoomSeq place);                                    // the room was said to stand there
   void told_decided(AuthorId author, std::uint64_t author_seq);      // up to this one
+  // Where the room has put an author's cut, as it says to whoever comes back; null: it rejected the cut.
+  void told_place(RoomSeq place, AuthorId author, std::uint64_t author_seq);
 
   // Everything that the rows of a journal can be held against.
   void check_rows(std::span<const RoomRow> rows);
@@ -87,6 +91,7 @@ class Ledger {
   std::map<AuthorId, std::vector<std::chrono::nanoseconds>> made_at_;
   std::map<RoomSeq, Told> told_;
   std::map<AuthorId, std::uint64_t> decided_;
+  std::set<std::pair<AuthorId, std::uint64_t>> rejected_;  // that a room said to whoever came back
   RoomSeq furthest_, kept_;
   std::vector<Fault> faults_;
 };

@@ -319,6 +319,11 @@ RoomEvents SimClient::events() {
   events.leaf = [this](const FieldLeaf& leaf) { pass(leaf); };
   events.complete = [this](const RoomAtJoin& room) {
     ledger_.told_up_to(room.contained);
+    const std::size_t places = room.decided_places.size();
+    ledger_.check(places == std::min<std::size_t>(room.decided_author_seq, kMostUnderway), Invariant::served,
+                  "a session begins with the places of " + std::to_string(places) + " cuts");
+    for (std::uint64_t seq = 1; seq <= room.decided_author_seq; ++seq)
+      if (const std::optional<RoomSeq> place = room.place_of(seq)) ledger_.told_place(*place, room_->author, seq);
     pass(room);
   };
   events.committed = [this](RoomSeq place, const Cut& cut) {

@@ -123,6 +123,26 @@ TEST(SessionReader, TakesWhicheverWayIsFirstAndKeepsTheOrder) {
   EXPECT_EQ(heard.reader.taken(), 4u);
 }
 
+// Where the room has put the cuts that a rejoin confirms; what it does not say stays unknown.
+TEST(SessionReader, SaysThePlacesOfTheCutsThatAreDecided) {
+  std::optional<RoomAtJoin> told;
+  SessionReader reader(AuthorId{7}, builtin_tool_box(), {.complete = [&](const RoomAtJoin& room) { told = room; }},
+                       [](std::uint64_t) {}, [](std::uint64_t) {});
+  v1::SessionResponse complete;
+  complete.mutable_complete()->set_room_seq(30);
+  complete.mutable_complete()->set_decided_author_seq(5);
+  for (const std::uint64_t place : {21u, 0u, 28u}) complete.mutable_complete()->add_decided_room_seqs(place);
+  ASSERT_TRUE(reader.take(complete));
+  ASSERT_TRUE(told);
+  EXPECT_EQ(told->place_of(5), RoomSeq{28});
+  EXPECT_EQ(told->place_of(4), RoomSeq{}) << "rejected";
+  EXPECT_EQ(told->place_of(3), RoomSeq{21});
+  for (const std::uint64_t seq : {0u, 1u, 2u, 6u}) EXPECT_EQ(told->place_of(seq), std::nullopt) << seq;
+  complete.mutable_complete()->clear_decided_room_seqs();
+  ASSERT_TRUE(reader.take(complete));
+  EXPECT_EQ(told->place_of(5), std::nullopt) << "a room of before says nothing";
+}
+
 wire::IndexedRow word(std::uint64_t index, std::uint64_t place, bool stopped) {
   wire::IndexedRow row{index, {.room_seq = RoomSeq{place}, .kind = wire::SessionRowKind::supervised, .lease_epoch = place + 1}};
   row.row.supervision.stopped = stopped;

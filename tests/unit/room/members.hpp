@@ -59,6 +59,11 @@ class Surgeon {
                             interrupted_ = false;
                             complete_ = true, seq_ = room.contained, lease_ = room.lease_epoch, bodies_ = room.bodies;
                             own_ = std::max(own_, room.decided_author_seq);
+                            for (std::uint64_t seq = 1; seq <= room.decided_author_seq; ++seq) {
+                              const RoomSeq place = room.place_of(seq).value_or(RoomSeq{});
+                              if (!place) continue;
+                              EXPECT_EQ(acknowledged_.emplace(seq, place).first->second, place) << "another before";
+                            }
                           });
                         },
                     .committed =

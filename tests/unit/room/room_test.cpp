@@ -74,6 +74,10 @@ TEST(Room, AnswersACutSentAgainWithItsFirstOutcome) {
   EXPECT_EQ(room.room_seq().value, 4u);
   EXPECT_EQ(room.field_hash(), hash);
   EXPECT_EQ(room.counts().repeated, 2u);
+  // As whoever comes back is told them.
+  EXPECT_EQ(room.decided_places(cuts[0].author, 8), (std::vector<RoomSeq>{first, RoomSeq{}, RoomSeq{4}}));
+  EXPECT_EQ(room.decided_places(cuts[0].author, 2), (std::vector<RoomSeq>{RoomSeq{}, RoomSeq{4}})) << "the newest";
+  EXPECT_TRUE(room.decided_places(AuthorId{9}, 8).empty());
 }
 
 TEST(Room, RefusesWhatBreaksTheOrderOfAnAuthor) {
