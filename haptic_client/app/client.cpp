@@ -40,7 +40,7 @@ constexpr int kPriority = 80;
 constexpr auto kStall = 4ms;                  // more than three periods: the force is zero by then
 constexpr std::uint64_t kLiveTicks = 1000;    // between two statistics of the haptic loop
 constexpr auto kConfirmPatience = 20s;
-constexpr auto kStopPatience = 2s;            // where being asked to stop is how a session ends
+constexpr auto kStopPatience = 2s;            // once it was asked to stop
 constexpr auto kJoinPatience = 30s;           // without anything from the room
 constexpr std::size_t kMostFromRoom = 4096;   // events that may wait for the replica; the network waits beyond that
 constexpr std::size_t kTickTimes = 8192;  // ticks whose wake-up time is remembered
@@ -162,13 +162,16 @@ class Client {
       outcome_.lost = lost_why_;
     }
     outcome_.stopped = stop_.requested() && !session_.done() && !session_.endless();
-    if (!outcome_.lost && !outcome_.stopped && replica_.unconfirmed() > 0)
+    if (!outcome_.lost && !outcome_.stopped && outcome_.unconfirmed > 0)
       outcome_.lost = Error{ErrorCode::unavailable, "the server has not confirmed the last " +
-                                                        std::to_string(replica_.unconfirmed()) + " cuts within " +
+                                                        std::to_string(outcome_.unconfirmed) + " cuts within " +
                                                         std::to_string(kConfirmPatience.count()) +
                                                         " s; look at the server's log"};
-    outcome_.recording = recorder_.finish(
-        {to_hex(replica_.hash()), replica_.room_seq().value, outcome_.rows_dropped, outcome_.lost.has_value()});
+    // Some of the leaves are no bone that the room ever had.
+    if (joined_ && !changing_) outcome_.field_hash = replica_.hash();
+    const std::string hash = outcome_.field_hash ? to_hex(*outcome_.field_hash) : "";
+    outcome_.recording =
+        recorder_.finish({hash, replica_.room_seq().value, outcome_.rows_dropped, outcome_.lost.has_value()});
     if (const Result<void> written = log_.finish(); !written && !outcome_.lost) outcome_.lost = written.error();
     outcome_.oversight.insert(outcome_.oversight.end(), loop_notes_.begin(), loop_notes_.end());
     std::ranges::stable_sort(outcome_.oversight, {}, &OversightNote::mono_ns);
@@ -177,7 +180,6 @@ class Client {
     outcome_.steps = session_.results();
     outcome_.outside_range = ranges_.uses();
     outcome_.cuts = cut_log_.rows();
-    outcome_.field_hash = replica_.hash();
     outcome_.removed_total_mm3 = replica_.removed_mm3();
     outcome_.room_seq = replica_.room_seq();
     outcome_.rejected += replica_.rejected();
@@ -396,9 +398,10 @@ class Client {
       if (!over) continue;
       if (!waiting_since) waiting_since = Clock::now();
       const bool settled = replica_.unconfirmed() == 0 && unsent_.empty();
-      const auto patience = !stop_.requested() ? kConfirmPatience : session_.endless() ? kStopPatience : 0s;
+      const auto patience = stop_.requested() ? kStopPatience : kConfirmPatience;
       if (settled || !link_ok_ || Clock::now() - *waiting_since >= patience) break;
     }
+    outcome_.unconfirmed = replica_.drop_unconfirmed();
     note_removed(outcome_.removed_mm3.size());
     const std::lock_guard lock(mutex_);
     replica_over_ = true;
@@ -442,7 +445,7 @@ class Client {
     replica_.renew(room.contained, room.bodies, renewed_, room.decided_author_seq);
     outcome_.rejected += cut_log_.confirm(room, ns(Clock::now()));
     follow_lease(room.lease_epoch);
-    interrupted_ = false;
+    changing_ = interrupted_ = false;
     renewed_ = {};
     ++outcome_.interruptions;
     log::info("the line to the server stands again", {{"room_seq", room.contained.value}, {"unconfirmed_cuts", replica_.unconfirmed()}});
@@ -463,6 +466,7 @@ class Client {
   }
   void take(const BonePart& part) {
     replica_.change(part.place, part.bodies, part.leaves);
+    changing_ = !part.last;
     follow_lease(part.lease_epoch);
   }
   // What is on its way was cut on the sight of other bone: the room will reject it.
@@ -772,6 +776,7 @@ class Client {
   Pose built_at_;
   int built_tool_ = -1;
   int rejected_in_a_row_ = 0;
+  bool changing_ = false;             // a change of the bone has come in part
   bool interrupted_ = false;          // since then leaves are gathered here
   std::vector<FieldLeaf> renewed_;
   RoomWatch watch_;

@@ -46,9 +46,11 @@ struct ClientOutcome {
   bool realtime = false;                 // the haptic thread had SCHED_FIFO
   std::uint64_t stalls = 0;              // times that it did not run for more than three periods, as its watchdog saw
   double longest_stall_ms = 0;
-  Digest field_hash;
+  // Of the bone that the room has confirmed up to room_seq; so is what was removed. None: leaves are missing.
+  std::optional<Digest> field_hash;
   RoomSeq room_seq;
   double removed_total_mm3 = 0;
+  std::size_t unconfirmed = 0;           // own cuts that are not in it, since the room never confirmed them
   std::uint64_t rejected = 0, patches = 0, uncovered_ticks = 0, cuts_waiting_ticks = 0, rows_dropped = 0;
   std::uint64_t held_for_room_ticks = 0;  // in which the spindle was held because the room did not follow
   std::vector<OversightNote> oversight;   // as they came

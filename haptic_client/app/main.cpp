@@ -180,7 +180,8 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string
           {"laws_outside_range", outside},
           {"steps", steps},
           {"removed_mm3", outcome.removed_total_mm3},
-          {"field_hash", to_hex(outcome.field_hash)},
+          {"field_hash", outcome.field_hash ? json(to_hex(*outcome.field_hash)) : json(nullptr)},
+          {"unconfirmed", outcome.unconfirmed},
           {"room_seq", outcome.room_seq.value},
           {"stopped", outcome.stopped},
           {"lost", outcome.lost ? json(outcome.lost->message) : json(nullptr)}};
@@ -264,10 +265,14 @@ Result<void> run(Options& options, const StopSignal& stop) {
           ? Result<void>()
           : write_file(options.summary, summary_of(*outcome, plan, hand->device_name(), losses).dump(2) + "\n");
   const auto finished = std::ranges::count_if(outcome->steps, &StepResult::completed);
-  std::printf("%s: %s, %lld of %zu steps done, %zu cuts of its own, %.1f mm3 gone from the bone in all, field %.12s at %llu; "
-              "%llu of %llu ms missed\n",
+  const std::string field = outcome->field_hash ? to_hex(*outcome->field_hash).substr(0, 12) : "unknown";
+  std::string unconfirmed;
+  if (outcome->unconfirmed > 0)
+    unconfirmed = " (" + std::to_string(outcome->unconfirmed) + " of them not confirmed, and not in what follows)";
+  std::printf("%s: %s, %lld of %zu steps done, %zu cuts of its own%s, %.1f mm3 gone from the bone in all, "
+              "field %s at %llu; %llu of %llu ms missed\n",
               kProgram, outcome->lost ? "broken off" : outcome->stopped ? "stopped" : "ended", static_cast<long long>(finished),
-              plan.steps.size(), outcome->cuts.size(), outcome->removed_total_mm3, to_hex(outcome->field_hash).c_str(),
+              plan.steps.size(), outcome->cuts.size(), unconfirmed.c_str(), outcome->removed_total_mm3, field.c_str(),
               static_cast<unsigned long long>(outcome->room_seq.value),
               static_cast<unsigned long long>(outcome->ticks.missed),
               static_cast<unsigned long long>(outcome->ticks.missed + outcome->ticks.work.count()));

@@ -150,6 +150,14 @@ void Replica::settle() {
   }
 }
 
+std::size_t Replica::drop_unconfirmed() {
+  const std::size_t dropped = pending_.size();
+  for (const Pending& pending : pending_) fall(pending);
+  pending_.clear();
+  settle();
+  return dropped;
+}
+
 std::vector<ChangedLeaves> Replica::take_changes() { return std::exchange(changes_, {}); }
 
 std::vector<const CutField*> Replica::bodies() const {

@@ -44,6 +44,8 @@ class Replica {
   // under the tool.
   void renew(RoomSeq contained, std::span<const BodyId> bodies, std::span<const FieldLeaf> leaves, std::uint64_t decided);
   void settle();  // after a batch of the above, before predicted() is asked
+  // At the end of a session: own cuts that the room has not confirmed fall. Gives how many they were.
+  std::size_t drop_unconfirmed();
   // What has changed in predicted bodies since the last call.
   [[nodiscard]] std::vector<ChangedLeaves> take_changes();
 

@@ -109,6 +109,25 @@ TEST_F(Confirmed, TheCutLogHasEachCutsOwnPlace) {
   EXPECT_EQ(elsewhere, 0) << "cuts that the log has at another place than the journal";
 }
 
+// The hand cuts for two seconds more. The server never confirms those cuts.
+TEST_F(Confirmed, WhoGivesUpReportsOnlyWhatIsConfirmed) {
+  Process hand = drill("hand", stage_.address());
+  ASSERT_TRUE(events_more(60));
+  kill_server();
+  ASSERT_EQ(hand.wait(60s), 1) << hand.err();
+  const json summary = read_json(stage_ / "hand.json");
+  const std::string room_seq = std::to_string(summary.at("room_seq").get<std::uint64_t>());
+  const RunResult replayed =
+      run(program("osteon-server"), {"replay", journal(), "--case", stage_ / "case", "--to", room_seq}, 60s);
+  ASSERT_EQ(replayed.exit_code, 0) << replayed.err;
+  EXPECT_THAT(replayed.out, HasSubstr(summary.at("field_hash").get<std::string>())) << "the bone at event " << room_seq;
+  const auto unconfirmed = summary.value("unconfirmed", std::uint64_t{0});
+  EXPECT_GT(unconfirmed, 0u);
+  EXPECT_THAT(hand.out(), HasSubstr(std::to_string(unconfirmed) + " of them not confirmed"));
+  const Table cuts = read_table(stage_ / "hand-cuts.csv");
+  EXPECT_EQ(std::ranges::count(cuts["confirmed_mono_ns"], 0.0), static_cast<std::ptrdiff_t>(unconfirmed));
+}
+
 // As a trainee sees it at the terminal.
 TEST_F(Confirmed, AJournalThatIsGoneIsSaidToItsClients) {
   Process hand = drill("hand", stage_.address());

@@ -654,6 +654,23 @@ TEST(RoomReplica, IsRenewedAfterTheLineWasDown) {
   }
 }
 
+// As where a client gives up: what it says of the bone then is the room's word and nothing else.
+TEST(RoomReplica, IsTheRoomsOnceWhatIsUnconfirmedIsDropped) {
+  Room room(test_block());
+  const AuthorId own = room.join(MemberKind::surgeon);
+  const auto cuts = strokes(own, 12, 43);
+  Replica replica(room.bone(), BodyId{0});
+  for (const Cut& cut : cuts) replica.add_own(cut);
+  for (std::size_t i = 0; i < 5; ++i) replica.commit(commit(room, cuts[i]), cuts[i], true);
+  replica.settle();
+  ASSERT_NE(replica.hash(), room.field_hash());
+  EXPECT_EQ(replica.drop_unconfirmed(), 7u);
+  EXPECT_EQ(replica.unconfirmed(), 0u);
+  EXPECT_EQ(replica.hash(), room.field_hash());
+  EXPECT_EQ(replica.removed_mm3(), room.field().removed_mm3());
+  EXPECT_EQ(replica.drop_unconfirmed(), 0u);
+}
+
 TEST(RoomResume, GoesOnFromWhatWasSaved) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
