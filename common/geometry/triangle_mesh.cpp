@@ -1,31 +1,10 @@
 #include "common/geometry/triangle_mesh.hpp"
 
-#include <algorithm>
-#include <utility>
+#include "common/geometry/mesh_edges.hpp"
 
 namespace osteon {
 
-std::size_t open_edges(const TriangleMesh& mesh) {
-  // (lower vertex, upper vertex) and the direction in which a triangle runs along it.
-  std::vector<std::pair<std::uint64_t, int>> edges;
-  edges.reserve(3 * mesh.triangles.size());
-  for (const auto& t : mesh.triangles)
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint64_t a = t[k], b = t[(k + 1) % 3];
-      edges.emplace_back(std::min(a, b) << 32 | std::max(a, b), a < b ? 1 : -1);
-    }
-  std::ranges::sort(edges);
-  std::size_t open = 0;
-  for (std::size_t i = 0; i < edges.size();) {
-    std::size_t end = i;
-    int balance = 0;
-    for (; end < edges.size() && edges[end].first == edges[i].first; ++end) balance += edges[end].second;
-    // Two solids may touch in an edge, which then has four sides that balance.
-    if (balance != 0) ++open;
-    i = end;
-  }
-  return open;
-}
+std::size_t open_edges(const TriangleMesh& mesh) { return edge_faults(mesh).open; }
 
 double enclosed_mm3(const TriangleMesh& mesh) {
   if (mesh.positions_mm.empty()) return 0.0;

@@ -9,6 +9,7 @@
 #include <limits>
 #include <memory>
 
+#include "common/geometry/mesh_edges.hpp"
 #include "common/geometry/mesh_file.hpp"
 #include "common/mechanics/force_law.hpp"
 #include "common/runtime/files.hpp"
@@ -46,8 +47,8 @@ Result<std::string> write_surface(const CutField& field, const std::string& file
   if (!mesh) return tl::unexpected(mesh.error());
   if (auto written = write_mesh(*mesh, file); !written) return tl::unexpected(written.error());
   char text[320];
-  std::snprintf(text, sizeof text, "%s: %zu triangles, %zu open edges, %.3f cm3 within\n", file.c_str(), mesh->triangles.size(), open_edges(*mesh),
-                enclosed_mm3(*mesh) * 1e-3);
+  std::snprintf(text, sizeof text, "%s: %zu triangles, %s, %.3f cm3 within\n", file.c_str(), mesh->triangles.size(),
+                to_text(edge_faults(*mesh)).c_str(), enclosed_mm3(*mesh) * 1e-3);
   return std::string(text);
 }
 

@@ -2,12 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <utility>
 
+#include "common/geometry/mesh_edges.hpp"
 #include "tests/support/temp_dir.hpp"
 
 namespace osteon {
@@ -41,6 +44,27 @@ TEST(TriangleMesh, ABoxIsClosedAndHasItsVolumeAndArea) {
   TriangleMesh turned = mesh;
   std::swap(turned.triangles[0][0], turned.triangles[0][1]);
   EXPECT_EQ(open_edges(turned), 3u);
+}
+
+// Two boxes that touch in an edge alone: it has four triangles.
+TEST(TriangleMesh, AnEdgeOfFourTrianglesIsClosedAndNotManifold) {
+  TriangleMesh mesh = box_mesh(1, 1, 1);
+  EXPECT_EQ(to_text(edge_faults(mesh)), "0 open edges");
+  // The second box is turned by half about the edge x = y = 1 of the first, whose corners 3 and 7 it shares.
+  const std::array<std::uint32_t, 8> corner = {8, 9, 10, 3, 11, 12, 13, 7};
+  for (const float z : {0.0f, 1.0f})
+    for (const auto& [x, y] : {std::pair(2.0f, 2.0f), std::pair(1.0f, 2.0f), std::pair(2.0f, 1.0f)})
+      mesh.positions_mm.push_back({x, y, z});
+  for (const auto& t : box_mesh(1, 1, 1).triangles) mesh.triangles.push_back({corner[t[0]], corner[t[1]], corner[t[2]]});
+  EXPECT_DOUBLE_EQ(enclosed_mm3(mesh), 2.0);
+  EXPECT_EQ(edge_faults(mesh).open, 0u);
+  EXPECT_EQ(edge_faults(mesh).non_manifold, 1u);
+  EXPECT_EQ(to_text(edge_faults(mesh)), "0 open edges, 1 non-manifold edge");
+  // Without one of the four triangles it is open, and no longer counted as the other.
+  mesh.triangles.erase(mesh.triangles.begin() + 11);
+  EXPECT_EQ(edge_faults(mesh).open, 3u);
+  EXPECT_EQ(edge_faults(mesh).non_manifold, 0u);
+  EXPECT_EQ(to_text({1, 2}), "1 open edge, 2 non-manifold edges");
 }
 
 TEST(MeshFile, BinaryStlComesBackWithItsVerticesShared) {
