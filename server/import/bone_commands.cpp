@@ -190,7 +190,7 @@ Result<std::string> run_carve(const Arguments& a, const StopSignal& stop) {
       if (!report) return tl::unexpected(report.error());
       reports.push_back(*report);
       text += line(i + 1, *report);
-      if (report->removed_mm3 <= 0.0) text += nothing_removed(i + 1, (*steps)[i], *report, carving.field(0).bone());
+      if (report->removed_mm3 <= 0.0) text += nothing_removed(i + 1, (*steps)[i], *report, carving.bone());
     }
   }
   if (stop.requested()) return tl::unexpected(stopped());

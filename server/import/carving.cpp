@@ -7,10 +7,12 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <set>
+#include <utility>
 
 #include "common/field/kernel.hpp"
 #include "common/surface/block_source.hpp"
 #include "common/volume/metal.hpp"
+#include "common/volume/settled.hpp"
 
 namespace osteon::import {
 namespace {
@@ -26,16 +28,6 @@ double quantile(std::vector<double> values, double part) {
   const auto at = values.begin() + std::lround(part * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), at, values.end());
   return *at;
-}
-
-CutField piece_of(const CutField& parent, const Fragment& fragment, BodyId body) {
-  CutField piece(parent.bone(), body, parent.tools());
-  for (FieldLeaf leaf : parent.leaves()) {
-    leaf.body = body;
-    piece.restore(leaf);
-  }
-  for (const FieldLeaf& mask : fragment.left) piece.merge(mask);
-  return piece;
 }
 
 }  // namespace
@@ -82,6 +74,9 @@ Carving::~Carving() = default;
 
 Result<StepReport> Carving::run(const CarveStep& step, const KeepGoing& keep_going) {
   StepReport report;
+  settled_ = false;
+  if (finders_.empty())
+    for (const CutField& body : bodies_) finders_.emplace_back(body);
   const ToolBox::Entry& tool = tools_->add(step.tool);
   report.tool = step.tool.name;
   report.level = std::min(step.level.value_or(step.tool.cut_level), finest_level(bodies_.front().bone().pitch_mm()));
@@ -97,16 +92,19 @@ Result<StepReport> Carving::run(const CarveStep& step, const KeepGoing& keep_goi
     const auto begin = Clock::now();
     const bool metal = meets_metal(cuts[i], tool.body, fields);
     report.metal_refused += metal;
-    std::vector<Coord> of_bone;
+    std::vector<Coord> of_bone, reached;
     for (std::size_t b = 0; b < bodies && !metal; ++b) {
       CutReport done = bodies_[b].apply(cuts[i]);
       report.visited += done.visited;
       report.computed += done.computed;
       report.modified += done.modified;
       changed[b].insert(done.changed_leaves.begin(), done.changed_leaves.end());
-      if (b == 0) of_bone = std::move(done.changed_leaves);
+      if (b > 0) continue;
+      of_bone = std::move(done.changed_leaves);
+      reached = std::move(done.reached_leaves);
     }
     cut_ms.push_back(milliseconds_since(begin));
+    if (!reached.empty()) history_.add(RoomSeq{++events_}, cuts[i], reached);
     mesh_changes(report.level, of_bone, i + 1 == cuts.size(), frame_ms);
   }
   report.cuts = static_cast<int>(cuts.size()) - report.metal_refused;
@@ -140,6 +138,7 @@ void Carving::part(std::size_t body, StepReport& report) {
       bodies_.push_back(piece_of(bodies_[body], fragment, BodyId{static_cast<std::uint32_t>(bodies_.size())}));
       finders_.emplace_back(bodies_.back());
     }
+    if (body == 0) note_taken(fragment.taken);
     std::map<int, std::vector<Coord>> leaves;
     for (const FieldLeaf& mask : fragment.taken)
       if (bodies_[body].merge(mask)) leaves[mask.level].push_back(mask.origin);
@@ -149,6 +148,28 @@ void Carving::part(std::size_t body, StepReport& report) {
       for (const BlockKey& key : surface_.touch(level, origins)) stale_.push_back(key);
     }
   }
+}
+
+void Carving::note_taken(std::vector<FieldLeaf> mask) {
+  taken_.push_back(RoomSeq{++events_});
+  history_.add_mask(taken_.back(), std::move(mask));
+}
+
+// Gives body 0 back what came off it, so that it is the bone with nothing but the cuts, and parts it anew.
+void Carving::settle() {
+  if (std::exchange(settled_, true) || taken_.empty()) return;
+  const auto touch = [&](int level, const std::vector<Coord>& origins) {
+    for (const BlockKey& key : surface_.touch(level, origins)) stale_.push_back(key);
+  };
+  for (const LevelLeaves& changed : history_.undo(bodies_.front(), std::exchange(taken_, {})))
+    touch(changed.level, changed.origins);
+  Settled settled = osteon::settle(std::move(bodies_.front()));
+  for (std::vector<FieldLeaf>& mask : settled.taken) {
+    for (const FieldLeaf& leaf : mask) touch(leaf.level, {leaf.origin});
+    note_taken(std::move(mask));
+  }
+  bodies_ = std::move(settled.bodies);
+  finders_.clear();
 }
 
 double Carving::removed_mm3(std::size_t bodies) const {
@@ -181,7 +202,18 @@ double Carving::field_mb() const {
   return static_cast<double>(leaves) * kLeafVoxels * sizeof(float) / 1e6;
 }
 
-SavedFields Carving::fields() const {
+const CutField& Carving::field(std::size_t body) {
+  settle();
+  return bodies_[body];
+}
+
+std::size_t Carving::bodies() {
+  settle();
+  return bodies_.size();
+}
+
+SavedFields Carving::fields() {
+  settle();
   SavedFields out;
   const Case& bone = bodies_.front().bone();
   out.case_hash = bone.hash();

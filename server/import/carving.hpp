@@ -8,6 +8,7 @@
 
 #include "common/surface/surface_blocks.hpp"
 #include "common/volume/cut_field.hpp"
+#include "common/volume/cut_history.hpp"
 #include "common/volume/field_file.hpp"
 #include "common/volume/fragments.hpp"
 #include "server/import/carve_script.hpp"
@@ -40,20 +41,29 @@ class Carving {
 
   // A path is taken in cuts of at most `cut_mm` of the tip's way and 5 degrees. Error: cancelled.
   Result<StepReport> run(const CarveStep& step, const KeepGoing& keep_going);
-  [[nodiscard]] SavedFields fields() const;
-  [[nodiscard]] const CutField& field(std::size_t body) const { return bodies_[body]; }
-  [[nodiscard]] std::size_t bodies() const { return bodies_.size(); }
+  [[nodiscard]] const Case& bone() const { return bodies_.front().bone(); }
+  // What the steps left of the bone, by common/volume/settled.hpp: the same for any order of the cuts that were made. A
+  // step's report says what came off at that step, and later steps may have cut that up.
+  [[nodiscard]] SavedFields fields();
+  [[nodiscard]] const CutField& field(std::size_t body);
+  [[nodiscard]] std::size_t bodies();
 
  private:
   void mesh_changes(int level, const std::vector<Coord>& leaves, bool last, std::vector<double>& frame_ms);
   void part(std::size_t body, StepReport& report);
+  void note_taken(std::vector<FieldLeaf> mask);
+  void settle();
   [[nodiscard]] double removed_mm3(std::size_t bodies) const;
   [[nodiscard]] double field_mb() const;
 
   double cut_mm_;
   std::shared_ptr<ToolBox> tools_;   // shared with the bodies' fields
   std::vector<CutField> bodies_;     // 0: the bone; others: pieces that came apart
-  std::vector<FragmentFinder> finders_;  // one for each body
+  std::vector<FragmentFinder> finders_;  // one for each body; none after settle()
+  CutHistory history_;               // of body 0
+  std::uint64_t events_ = 0;         // in it
+  std::vector<RoomSeq> taken_;       // of these: what pieces and debris took along
+  bool settled_ = true;
   SurfaceBlocks surface_;
   std::vector<BlockKey> stale_;
   int unmeshed_cuts_ = 0;
