@@ -1,0 +1,55 @@
+// The breaker for half a minute. deploy/test --soak lets it go on, with other seeds.
+#include "tests/integration/breaker.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+
+namespace osteon::test {
+namespace {
+
+constexpr int kLives = 6, kDamages = 4, kOpeners = 2, kErrors = 5;
+
+class BreakerTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { breaker_ = new Breaker(false); }
+  static void TearDownTestSuite() {
+    const BreakerTally& tally = breaker_->tally();
+    std::printf("%lu trials, %lu rows acknowledged: %lu whole, %lu named, %lu refused, %lu silent\n", tally.trials,
+                tally.acknowledged, tally.whole, tally.named, tally.refused, tally.silent);
+    delete breaker_;
+  }
+  void TearDown() override {
+    const std::vector<std::string>& faults = breaker_->tally().faults;
+    for (; told_ < faults.size(); ++told_) ADD_FAILURE() << faults[told_];
+  }
+  static Breaker& breaker() { return *breaker_; }
+
+ private:
+  inline static Breaker* breaker_ = nullptr;
+  inline static std::size_t told_ = 0;
+};
+
+TEST_F(BreakerTest, DamageToOneFileIsHarmlessNamedOrRefused) {
+  for (std::uint64_t seed = 1; seed <= kLives; ++seed) breaker().damage(seed, kDamages);
+  EXPECT_GE(breaker().tally().trials, std::uint64_t{kLives});
+}
+
+TEST_F(BreakerTest, NoSecondProgramChangesTheJournalOfAServerAtWork) {
+  for (std::uint64_t seed = 1; seed <= kOpeners; ++seed) breaker().second_openers(seed);
+}
+
+TEST_F(BreakerTest, ADiskThatFailsLosesNothingThatWasAcknowledged) {
+  for (std::uint64_t seed = 1; seed <= kErrors; ++seed) breaker().write_errors(seed);
+}
+
+TEST_F(BreakerTest, AFullDiskLosesNothingThatWasAcknowledged) {
+  if (!breaker().full_disk(1)) GTEST_SKIP() << "this machine lets nobody mount a disk (unshare -rm)";
+}
+
+TEST_F(BreakerTest, AJournalThatNobodyMayWriteToIsReadAndLeftAsItIs) {
+  if (!breaker().read_only(1)) GTEST_SKIP() << "this machine lets nobody mount a disk (unshare -rm)";
+}
+
+}  // namespace
+}  // namespace osteon::test

@@ -1,0 +1,32 @@
+#include <fstream>
+#include <utility>
+
+#include "tests/support/failing/failing_writes.hpp"
+
+namespace osteon::test {
+
+FailingWrites::FailingWrites(std::filesystem::path folder, std::filesystem::path control)
+    : folder_(std::move(folder)), control_(std::move(control)) {}
+
+ProcessOptions FailingWrites::options() const {
+  ProcessOptions options;
+  const char* sanitizer = std::getenv("ASAN_OPTIONS");
+  options.environment = {{"LD_PRELOAD", OSTEON_FAILING_LIBRARY},
+                         {"OSTEON_FAILING_FOLDER", folder_.string() + "/"},
+                         {"OSTEON_FAILING_CONTROL", control_.string()},
+                         // A sanitizer wants to be the first library; behind this one it works as well.
+                         {"ASAN_OPTIONS", std::string(sanitizer != nullptr ? sanitizer : "") +
+                                              ":verify_asan_link_order=0"}};
+  return options;
+}
+
+// It gets its name when it is whole: somebody may read it at any moment.
+void FailingWrites::begin(int reason, const std::string& kinds, int passed) const {
+  const std::filesystem::path partial = control_.string() + ".partial";
+  std::ofstream(partial) << reason << ' ' << kinds << ' ' << passed << '\n';
+  std::filesystem::rename(partial, control_);
+}
+
+void FailingWrites::end() const { std::filesystem::remove(control_); }
+
+}  // namespace osteon::test
