@@ -44,7 +44,6 @@ class Breaker {
 
  private:
   struct Parts;
-  struct InsideOf;
   std::unique_ptr<Parts> parts_;
 };
 
