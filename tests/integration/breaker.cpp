@@ -61,10 +61,22 @@ struct Breaker::Parts {
   [[nodiscard]] std::string break_one(Random& random, const Life& life, Image& image) const {
     const std::string room = std::string(BreakerStage::kRoom) + ".journal";
     std::vector<std::string> names;
-    for (const auto& [name, bytes] : image) names.push_back(name);
+    for (const auto& [file, bytes] : image) {
+      names.push_back(file);
+      if (file.ends_with("-log") || file.ends_with("-mirror")) names.insert(names.end(), 2, file);  // the newest rows
+    }
     const std::string name = names[random.index(names.size())];
     const std::string kind = name.ends_with(".checkpoint") ? ".checkpoint" : name.substr(room.size());
     const std::string end = kind.empty() ? " database" : " " + kind;
+    // Each file of the log makes good what the other lacks. Without both nobody knows how far the journal went.
+    if ((kind == "-log" || kind == "-mirror") && random.index(4) == 0) {
+      const bool deleted = random.index(2) == 0;
+      for (const char* log : {"-log", "-mirror"}) {
+        if (deleted) image.erase(room + log);
+        else if (image.contains(room + log)) image.at(room + log).resize(random.index(100));
+      }
+      return deleted ? "delete -log and -mirror" : "truncate -log and -mirror";
+    }
     std::string& bytes = image.at(name);
     // Most of a log is zeros that were never written to.
     std::size_t used = bytes.size();
@@ -177,20 +189,64 @@ Breaker::Breaker(bool thorough) : parts_(std::make_unique<Parts>(thorough)) {}
 Breaker::~Breaker() = default;
 const BreakerTally& Breaker::tally() const { return parts_->tally; }
 
-void Breaker::damage(std::uint64_t seed, int damages) {
+void Breaker::damage(std::uint64_t seed, int damages, int more) {
   Random random(seed);
   Life life;
   parts_->stage.live(seed, BreakerStage::kRoom, life);
   const std::uint64_t acknowledged = life.oracle.acknowledged();
   parts_->count(seed, "kill alone", acknowledged, {.fault = life.fault});
-  for (int i = 0; i < damages && life.fault.empty(); ++i) {
+  for (int i = 0; i < damages + more && life.fault.empty(); ++i) {
     Image image = life.image;
     const std::string what = parts_->break_one(random, life, image);
-    const Trial trial{.folder = parts_->stage.new_folder(), .oracle = &life.oracle, .most_rows = life.rows, .member = life.member};
+    const Trial trial{.folder = parts_->stage.new_folder(), .oracle = &life.oracle, .most_rows = life.rows,
+                      .member = life.member, .only_verify = i >= damages};
     put(image, trial.folder);
     parts_->count(seed, what, acknowledged, parts_->judge.judge(random, trial));
     fs::remove_all(trial.folder);
   }
+}
+
+void Breaker::older_copy(std::uint64_t seed) {
+  Random random(seed * 13 + 1);
+  Oracle oracle;
+  const std::string what = "older copy of all files";
+  const fs::path folder = parts_->stage.new_folder();
+  const std::string file = (folder / (std::string(BreakerStage::kRoom) + ".journal")).string();
+  Server server = parts_->stage.start(folder);
+  auto hand = LightHand::come(server.address, "", oracle, seed);
+  if (!hand) return parts_->count(seed, what, 0, {.fault = "no hand is let in: " + hand.error().message});
+  parts_->stage.load(seed, server, **hand, oracle, 100);
+  BreakerStage::freeze(server);
+  const Image then = image_of(folder);
+  server.process->signal(SIGCONT);
+  const std::uint64_t most_then = oracle.most();
+  Verdict verdict;
+  verdict.outcome = Outcome::named;
+  const auto knows_more = [&] { return oracle.kept() && oracle.kept()->room_seq.value > most_then; };
+  if (!wait_until(knows_more, BreakerStage::kPatience)) verdict.fault = "no client is told what is kept";
+  const wire::JoinedRoom member = (*hand)->room();
+  BreakerStage::kill(server);
+  hand->reset();
+  for (const auto& entry : fs::directory_iterator(folder)) fs::remove(entry.path());
+  put(then, folder);
+  // Nothing in the files contradicts them. Who comes back does, and from then on nobody goes on.
+  const Verified found = parts_->stage.verify(file);
+  if (verdict.fault.empty() && !found.sound) verdict.fault = "verify of a whole older copy: " + found.text;
+  server = parts_->stage.start(folder);
+  const auto back = LightHand::come_again(server.address, member, oracle, seed);
+  if (verdict.fault.empty() && (back || !has(back.error().message, "rows were lost")))
+    verdict.fault = "a client that knows more is told: " + (back ? "nothing" : back.error().message);
+  Oracle anew;
+  if (const auto stranger = LightHand::come(server.address, "", anew, seed); verdict.fault.empty() && stranger)
+    if (!wait_until([&] { return (*stranger)->ended() || (*stranger)->decided() > 0; }, BreakerStage::kPatience) ||
+        !(*stranger)->ended())
+      verdict.fault = "a client knows more, and another cuts on";
+  BreakerStage::kill(server);
+  const Verified after = parts_->stage.verify(file);
+  if (verdict.fault.empty() && (after.sound || !has(after.text, "rows were lost")))
+    verdict.fault = "what a client knew is forgotten: " + after.text;
+  parts_->count(seed, what, oracle.acknowledged(), verdict);
+  fs::remove_all(folder);
 }
 
 void Breaker::second_openers(std::uint64_t seed) {

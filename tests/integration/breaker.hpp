@@ -28,8 +28,11 @@ class Breaker {
   ~Breaker();
 
   // A server that works, is stopped and started, and is killed. Then so many times, on a copy of its files: one damage
-  // to one file, commands that read, recovery, and a server on it, to which a client comes back.
-  void damage(std::uint64_t seed, int damages);
+  // to one file, or both files of the log gone; commands that read, recovery, and a server on it, to which a client
+  // comes back. Of `more` only verify and, where that finds nothing, export are asked.
+  void damage(std::uint64_t seed, int damages, int more);
+  // All files as they were at one moment before: only a client that comes back knows of more.
+  void older_copy(std::uint64_t seed);
   // Each command as the second program on the journal of a server at work, also after one of its files was removed.
   void second_openers(std::uint64_t seed);
   // The disk fails while the server is at work [emulated].

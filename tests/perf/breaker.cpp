@@ -40,15 +40,16 @@ int main(int argc, char** argv) {
   const osteon::test::BreakerTally& tally = breaker.tally();
   std::size_t told = 0;
   bool mounts = true;
-  while (stopped == 0 && (minutes <= 0 || Clock::now() < until)) {
-    breaker.damage(seed, 5);
+  do {
+    breaker.damage(seed, 5, 40);
+    if (stopped == 0) breaker.older_copy(seed);
     if (stopped == 0) breaker.second_openers(seed);
     for (std::uint64_t i = 0; i < 3 && stopped == 0; ++i) breaker.write_errors(seed * 3 + i);
     if (mounts && stopped == 0) mounts = breaker.full_disk(seed) && breaker.read_only(seed);
     if (stopped != 0) break;  // what a signal has ended as well proves nothing
     for (; told < tally.faults.size(); ++told) std::printf("\nSILENT: %s\n", tally.faults[told].c_str());
     show(tally, seed++, isatty(STDOUT_FILENO) != 0 ? '\r' : '\n');
-  }
+  } while (stopped == 0 && (minutes <= 0 || Clock::now() < until));
   std::printf("\n");
   for (const auto& [what, times] : tally.done)
     std::printf("%6llu  %s\n", static_cast<unsigned long long>(times), what.c_str());
