@@ -48,7 +48,8 @@ struct Breaker::Parts {
     tally.acknowledged += acknowledged;
     if (!verdict.fault.empty()) {
       ++tally.silent;
-      if (tally.faults.size() < kFaultsKept) tally.faults.push_back("seed " + std::to_string(seed) + ", " + what + ": " + verdict.fault);
+      if (tally.faults.size() < kFaultsKept)
+        tally.faults.push_back("seed " + std::to_string(seed) + ", " + what + ": " + verdict.fault);
       return;
     }
     if (verdict.outcome == Outcome::whole) ++tally.whole;
@@ -72,8 +73,10 @@ struct Breaker::Parts {
     if ((kind == "-log" || kind == "-mirror") && random.index(4) == 0) {
       const bool deleted = random.index(2) == 0;
       for (const char* log : {"-log", "-mirror"}) {
-        if (deleted) image.erase(room + log);
-        else if (image.contains(room + log)) image.at(room + log).resize(random.index(100));
+        if (deleted)
+          image.erase(room + log);
+        else if (image.contains(room + log))
+          image.at(room + log).resize(random.index(100));
       }
       return deleted ? "delete -log and -mirror" : "truncate -log and -mirror";
     }
@@ -91,9 +94,15 @@ struct Breaker::Parts {
         if (bytes.empty()) break;
         bytes[at] = static_cast<char>(bytes[at] ^ (1 << random.index(8)));
         return "flip" + end;
-      case 1: bytes.resize(at); return "truncate" + end;
-      case 2: bytes.replace(at, length, std::string(length, '\0')); return "zero" + end;
-      case 3: image.erase(name); return "delete" + end;
+      case 1:
+        bytes.resize(at);
+        return "truncate" + end;
+      case 2:
+        bytes.replace(at, length, std::string(length, '\0'));
+        return "zero" + end;
+      case 3:
+        image.erase(name);
+        return "delete" + end;
       case 4:
         for (const auto& [theirs, foreign] : other.image)
           if (theirs == "other.journal" + kind || (kind == ".checkpoint" && theirs.ends_with(kind))) {
@@ -198,8 +207,11 @@ void Breaker::damage(std::uint64_t seed, int damages, int more) {
   for (int i = 0; i < damages + more && life.fault.empty(); ++i) {
     Image image = life.image;
     const std::string what = parts_->break_one(random, life, image);
-    const Trial trial{.folder = parts_->stage.new_folder(), .oracle = &life.oracle, .most_rows = life.rows,
-                      .member = life.member, .only_verify = i >= damages};
+    const Trial trial{.folder = parts_->stage.new_folder(),
+                      .oracle = &life.oracle,
+                      .most_rows = life.rows,
+                      .member = life.member,
+                      .only_verify = i >= damages};
     put(image, trial.folder);
     parts_->count(seed, what, acknowledged, parts_->judge.judge(random, trial));
     fs::remove_all(trial.folder);
@@ -259,7 +271,8 @@ void Breaker::second_openers(std::uint64_t seed) {
     auto hand = LightHand::come(server.address, "", oracle, seed);
     Verdict verdict;
     std::string what = "second openers";
-    if (const std::string untried = parts_->find_untried(); !untried.empty()) verdict.fault = "nobody tries the command " + untried;
+    if (const std::string untried = parts_->find_untried(); !untried.empty())
+      verdict.fault = "nobody tries the command " + untried;
     if (!hand) {
       parts_->count(seed, what, 0, {.fault = "no hand is let in: " + hand.error().message});
       return;
@@ -278,14 +291,18 @@ void Breaker::second_openers(std::uint64_t seed) {
     } else {
       if (verdict.fault.empty()) verdict.fault = parts_->try_second(random, folder, server, 99, std::nullopt);
       const std::uint64_t before = oracle.acknowledged();
-      if (!wait_until([&] { return oracle.acknowledged() > before || (*hand)->ended(); }, BreakerStage::kPatience) || (*hand)->ended())
+      if (!wait_until([&] { return oracle.acknowledged() > before || (*hand)->ended(); }, BreakerStage::kPatience) ||
+          (*hand)->ended())
         verdict.fault += "the server does not go on";
     }
     const wire::JoinedRoom member = (*hand)->room();
     BreakerStage::kill(server);
     hand->reset();
     if (verdict.fault.empty()) {
-      const Trial trial{.folder = folder, .oracle = &oracle, .most_rows = oracle.most(), .member = member,
+      const Trial trial{.folder = folder,
+                        .oracle = &oracle,
+                        .most_rows = oracle.most(),
+                        .member = member,
                         .loses_nothing = fs::exists(file)};
       verdict = parts_->judge.judge(random, trial);
     }
@@ -294,8 +311,11 @@ void Breaker::second_openers(std::uint64_t seed) {
   }
 }
 
-void Breaker::write_errors(std::uint64_t seed) {
-  Random random(seed * 5 + 1);
+void Breaker::write_errors(std::uint64_t seed, int times) {
+  for (int i = 0; i < times; ++i) write_error(seed, Random(seed * 100 + static_cast<std::uint64_t>(i)));
+}
+
+void Breaker::write_error(std::uint64_t seed, Random random) {
   constexpr std::array<std::pair<int, const char*>, 3> kReasons{{{EIO, "EIO"}, {ENOSPC, "ENOSPC"}, {EROFS, "EROFS"}}};
   constexpr std::array kKinds{"wsn", "w", "s"};
   const auto [reason, name] = kReasons[random.index(kReasons.size())];
@@ -308,7 +328,9 @@ void Breaker::write_errors(std::uint64_t seed) {
   const FailingWrites failing(folder, parts_->stage.new_name());
   Server server = parts_->stage.start(folder, BreakerStage::kRoom, failing.options());
   auto hand = LightHand::come(server.address, "", oracle, seed);
-  if (!hand) return parts_->count(seed, what, 0, {.fault = "no hand is let in: " + hand.error().message + server.process->err()});
+  if (!hand)
+    return parts_->count(seed, what, 0,
+                         {.fault = "no hand is let in: " + hand.error().message + server.process->err()});
   parts_->stage.load(seed, server, **hand, oracle, 150);
   life.earlier.push_back(image_of(folder));
   failing.begin(reason, kinds, static_cast<int>(random.index(20)));
@@ -317,7 +339,8 @@ void Breaker::write_errors(std::uint64_t seed) {
   Verdict verdict;
   verdict.fault = BreakerJudge::unsaid_failure(server, **hand, file);
   const std::string why = (*hand)->ended().value_or("");
-  if (verdict.fault.empty() && reason == ENOSPC && !has(why, "make room on the disk")) verdict.fault = "no remedy: " + why;
+  if (verdict.fault.empty() && reason == ENOSPC && !has(why, "make room on the disk"))
+    verdict.fault = "no remedy: " + why;
   // A disk that works again makes no difference to a server that has seen it fail.
   const bool again = random.index(2) == 0;
   if (again) failing.end();
@@ -332,7 +355,8 @@ void Breaker::write_errors(std::uint64_t seed) {
   failing.end();
   hand->reset();
   if (verdict.fault.empty()) {
-    Trial trial{.folder = folder, .oracle = &oracle, .most_rows = oracle.most(), .member = member, .loses_nothing = true};
+    Trial trial{
+        .folder = folder, .oracle = &oracle, .most_rows = oracle.most(), .member = member, .loses_nothing = true};
     // What the failure has left may be damaged too.
     if (random.index(3) == 0) {
       Image image = image_of(folder);
@@ -379,7 +403,8 @@ bool Breaker::full_disk(std::uint64_t seed) {
   hand->reset();
   fs::remove(parts_->stage.seen(folder) / "filler");
   if (verdict.fault.empty()) {
-    const Trial trial{.folder = folder, .oracle = &oracle, .most_rows = oracle.most() + 50, .member = member, .loses_nothing = true};
+    const Trial trial{
+        .folder = folder, .oracle = &oracle, .most_rows = oracle.most() + 50, .member = member, .loses_nothing = true};
     verdict = parts_->judge.judge(random, trial);
   }
   parts_->count(seed, what, oracle.acknowledged(), verdict);
@@ -401,9 +426,11 @@ bool Breaker::read_only(std::uint64_t seed) {
     const fs::path to = parts_->stage.new_folder();
     const RunResult copied = parts_->stage.command({"backup", trial.file(), (to / "copy").string()});
     if (verdict.fault.empty() && copied.exit_code != 0) verdict.fault = "backup: " + said(copied);
-    if (verdict.fault.empty()) verdict.fault = parts_->stage.check_export((to / "copy").string(), life.oracle, life.rows);
+    if (verdict.fault.empty())
+      verdict.fault = parts_->stage.check_export((to / "copy").string(), life.oracle, life.rows);
     const RunResult served = parts_->stage.command({"--case", parts_->stage.bone(), "--journal", trial.file()}, 10s);
-    if (verdict.fault.empty() && (served.exit_code == 0 || served.timed_out)) verdict.fault = "a server: " + said(served);
+    if (verdict.fault.empty() && (served.exit_code == 0 || served.timed_out))
+      verdict.fault = "a server: " + said(served);
     if (verdict.fault.empty()) verdict.fault = BreakerJudge::refusal("a server", served, trial.file());
     if (verdict.fault.empty()) verdict.fault = difference(life.image, image_of(parts_->stage.seen(folder)));
     parts_->count(seed, what, life.oracle.acknowledged(), verdict);

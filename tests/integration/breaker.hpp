@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/scenes/random.hpp"
+
 namespace osteon::test {
 
 struct BreakerTally {
@@ -35,8 +37,8 @@ class Breaker {
   void older_copy(std::uint64_t seed);
   // Each command as the second program on the journal of a server at work, also after one of its files was removed.
   void second_openers(std::uint64_t seed);
-  // The disk fails while the server is at work [emulated].
-  void write_errors(std::uint64_t seed);
+  // So often: the disk fails while a server is at work [emulated].
+  void write_errors(std::uint64_t seed, int times);
   // A small disk that fills while the server is at work. False: this machine lets nobody mount one.
   [[nodiscard]] bool full_disk(std::uint64_t seed);
   // Commands that read, on a journal that nobody may write to: by its permissions, and on a medium. False: the medium
@@ -47,6 +49,7 @@ class Breaker {
 
  private:
   struct Parts;
+  void write_error(std::uint64_t seed, Random random);
   std::unique_ptr<Parts> parts_;
 };
 

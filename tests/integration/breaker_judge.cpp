@@ -23,16 +23,17 @@ std::optional<std::uint64_t> number_after(const std::string& text, const std::st
 }  // namespace
 
 std::string BreakerJudge::unsaid(const std::string& what, const std::string& text, std::uint64_t events,
-                                        std::uint64_t witnessed, const Trial& trial, bool* without_number) {
+                                 std::uint64_t witnessed, const Trial& trial, bool* without_number) {
   const std::uint64_t acknowledged = trial.oracle->acknowledged();
   if (events >= acknowledged) return {};
-  const std::string numbers = what + " goes to " + std::to_string(events) + " and knows of " + std::to_string(witnessed) +
-                              ", acknowledged were " + std::to_string(acknowledged) + ": " + text;
+  const std::string numbers = what + " goes to " + std::to_string(events) + " and knows of " +
+                              std::to_string(witnessed) + ", acknowledged were " + std::to_string(acknowledged) + ": " +
+                              text;
   if (trial.loses_nothing) return "rows are lost: " + numbers;
   if (std::max(events, witnessed) >= acknowledged && witnessed <= trial.most_rows) return {};
   if (without_number != nullptr) *without_number = true;
-  for (const char* named : {"cannot be told", "is damaged", "malformed", "does not fit the chain", "belongs to another journal",
-                            "another history", "does not say what it says"})
+  for (const char* named : {"cannot be told", "is damaged", "malformed", "does not fit the chain",
+                            "belongs to another journal", "another history", "does not say what it says"})
     if (has(text, named)) return {};
   return "the wrong number: " + numbers;
 }
@@ -75,13 +76,15 @@ std::string BreakerJudge::try_copy(const Trial& trial, const std::string& how) c
   return fault;
 }
 
-std::string BreakerJudge::try_recover(const Trial& trial, const Verified& found, bool serve, bool* without_number) const {
+std::string BreakerJudge::try_recover(const Trial& trial, const Verified& found, bool serve,
+                                      bool* without_number) const {
   const fs::path folder = stage_->new_folder();
   const std::string to = (folder / (trial.name + ".journal")).string();
   const RunResult result = stage_->command({"recover", trial.file(), to});
   std::string fault;
   if (result.exit_code != 0) {
-    fault = found.read ? "verify reads it, and recover does not: " + said(result) : refusal("recover", result, trial.file());
+    fault = found.read ? "verify reads it, and recover does not: " + said(result)
+                       : refusal("recover", result, trial.file());
   } else {
     const std::uint64_t events = number_after(result.out, "recovered").value_or(0);
     const std::uint64_t lost = number_after(result.out, "lost").value_or(0);
@@ -89,7 +92,8 @@ std::string BreakerJudge::try_recover(const Trial& trial, const Verified& found,
     if (fault.empty()) fault = unsaid("recover", said(result), events, events + lost, trial, without_number);
     const bool own = !has(result.out, "belongs to another journal") && !has(result.out, "another history");
     if (fault.empty() && own)
-      if (const std::string lacks = stage_->check_export(to, *trial.oracle, events); !lacks.empty()) fault = "recovered: " + lacks;
+      if (const std::string lacks = stage_->check_export(to, *trial.oracle, events); !lacks.empty())
+        fault = "recovered: " + lacks;
     // A database that is another room's is recovered as that.
     if (fault.empty() && serve && own && events > 0) {
       Server server = stage_->start(folder, trial.name);
@@ -122,8 +126,10 @@ std::string BreakerJudge::try_serve(const Trial& trial, const Verified& found, O
   std::string fault;
   if (!hand) {
     *outcome = Outcome::named;
-    if (found.sound) fault = "verify finds it sound, and it lets nobody come back: " + hand.error().message;
-    else if (hand.error().message.empty()) fault = "a client is refused without a word";
+    if (found.sound)
+      fault = "verify finds it sound, and it lets nobody come back: " + hand.error().message;
+    else if (hand.error().message.empty())
+      fault = "a client is refused without a word";
     // Whoever comes anew must not go on either.
     Oracle anew;
     if (auto stranger = LightHand::come(server.address, "", anew, 1); fault.empty() && stranger)
@@ -197,7 +203,8 @@ std::string BreakerJudge::unsaid_failure(Server& server, LightHand& hand, const 
   const auto stranger = LightHand::come(server.address, "", later, 1);
   if (!has(why, "the room takes no more cuts") || !has(why, file) || !has(why, "recover"))
     return "a client is told no reason, file or remedy: " + why;
-  if (!stranger) return has(stranger.error().message, "takes no more") ? "" : "who comes is told: " + stranger.error().message;
+  if (!stranger)
+    return has(stranger.error().message, "takes no more") ? "" : "who comes is told: " + stranger.error().message;
   (void)wait_until([&] { return (*stranger)->ended() || (*stranger)->decided() > 0; }, BreakerStage::kPatience);
   if ((*stranger)->decided() > 0) return "the room has failed and takes cuts";
   const std::string told = (*stranger)->ended().value_or("");

@@ -12,10 +12,10 @@ namespace osteon::test {
 struct Trial {
   std::filesystem::path folder;
   const Oracle* oracle;
-  std::uint64_t most_rows;             // that there can be
+  std::uint64_t most_rows;  // that there can be
   wire::JoinedRoom member;
-  bool loses_nothing = false;          // whatever is said, every acknowledged row must be there
-  bool only_verify = false;            // and export, where that finds nothing
+  bool loses_nothing = false;  // whatever is said, every acknowledged row must be there
+  bool only_verify = false;    // and export, where that finds nothing
   std::string name = BreakerStage::kRoom;
   [[nodiscard]] std::string file() const { return (folder / (name + ".journal")).string(); }
 };
@@ -48,7 +48,8 @@ class BreakerJudge {
   [[nodiscard]] std::string try_replay(const Trial& trial) const;
   [[nodiscard]] std::string try_copy(const Trial& trial, const std::string& how) const;  // backup and branch
   // `serve`: what was recovered takes cuts again.
-  [[nodiscard]] std::string try_recover(const Trial& trial, const Verified& found, bool serve, bool* without_number) const;
+  [[nodiscard]] std::string try_recover(const Trial& trial, const Verified& found, bool serve,
+                                        bool* without_number) const;
   // A client comes back with what it was told, cuts, and the server is killed once more.
   [[nodiscard]] std::string try_serve(const Trial& trial, const Verified& found, Outcome* outcome) const;
 

@@ -83,7 +83,9 @@ bool Mounter::run(const std::string& line) {
   return shell_.read_line(10s) == "done";
 }
 
-bool Mounter::mount(const std::string& size) { return run("mount -t tmpfs -o size=" + size + " none " + place_.string()); }
+bool Mounter::mount(const std::string& size) {
+  return run("mount -t tmpfs -o size=" + size + " none " + place_.string());
+}
 bool Mounter::make_read_only() { return run("mount -o remount,ro " + place_.string()); }
 
 std::vector<std::string> Mounter::prefix() const {
@@ -93,8 +95,9 @@ std::vector<std::string> Mounter::prefix() const {
 fs::path Mounter::root() const { return "/proc/" + std::to_string(shell_.pid()) + "/root"; }
 
 BreakerStage::BreakerStage(bool longer) : longer_(longer), bone_((temp_ / "case").string()) {
-  const RunResult made = run(program("osteon-import"), {"phantom", "block", "--layers", "5:1.9,20:0.3,5:1.9", "--width",
-                                                        "12", "--pitch", "0.5", "--out", bone_}, 120s);
+  const RunResult made = run(
+      program("osteon-import"),
+      {"phantom", "block", "--layers", "5:1.9,20:0.3,5:1.9", "--width", "12", "--pitch", "0.5", "--out", bone_}, 120s);
   if (made.exit_code != 0) throw std::runtime_error("osteon-import failed: " + made.err);
 }
 
@@ -116,19 +119,18 @@ std::vector<std::string> BreakerStage::with_prefix(std::vector<std::string> argu
 
 fs::path BreakerStage::first() const { return prefix_.empty() ? program("osteon-server") : fs::path(prefix_.front()); }
 
-RunResult BreakerStage::command(const std::vector<std::string>& arguments,
-                                std::chrono::milliseconds patience) const {
+RunResult BreakerStage::command(const std::vector<std::string>& arguments, std::chrono::milliseconds patience) const {
   return run(first(), with_prefix(arguments), patience);
 }
 
 Server BreakerStage::start(const fs::path& folder, const std::string& name, ProcessOptions options) const {
   const fs::path address = new_name();
   Server server;
-  server.process = std::make_unique<Process>(
-      first(),
-      with_prefix({"--case", bone_, "--journal", (folder / (name + ".journal")).string(), "--address-file",
-                   address.string(), "--drain-seconds", "0"}),
-      std::move(options));
+  server.process =
+      std::make_unique<Process>(first(),
+                                with_prefix({"--case", bone_, "--journal", (folder / (name + ".journal")).string(),
+                                             "--address-file", address.string(), "--drain-seconds", "0"}),
+                                std::move(options));
   std::optional<std::string> line;
   (void)wait_until([&] { return (line = wait_for_address(address, 1ms)) || !server.process->running(); }, kPatience);
   server.address = line.value_or("");
@@ -143,16 +145,18 @@ void BreakerStage::kill(Server& server) {
 
 void BreakerStage::freeze(Server& server) {
   server.process->signal(SIGSTOP);
-  (void)wait_until([&] {
-    std::error_code error;
-    for (fs::directory_iterator task("/proc/" + std::to_string(server.process->pid()) + "/task", error), end;
-         !error && task != end; task.increment(error)) {
-      const std::string stat = read_bytes(task->path() / "stat");
-      const std::size_t name_ends = stat.rfind(')');
-      if (name_ends == stat.npos || stat.size() < name_ends + 3 || stat[name_ends + 2] != 'T') return false;
-    }
-    return true;
-  }, kPatience);
+  (void)wait_until(
+      [&] {
+        std::error_code error;
+        for (fs::directory_iterator task("/proc/" + std::to_string(server.process->pid()) + "/task", error), end;
+             !error && task != end; task.increment(error)) {
+          const std::string stat = read_bytes(task->path() / "stat");
+          const std::size_t name_ends = stat.rfind(')');
+          if (name_ends == stat.npos || stat.size() < name_ends + 3 || stat[name_ends + 2] != 'T') return false;
+        }
+        return true;
+      },
+      kPatience);
 }
 
 void BreakerStage::load(std::uint64_t seed, const Server& server, LightHand& hand, Oracle& oracle,

@@ -36,9 +36,9 @@ struct Life {
   Image image;
   std::vector<Image> earlier;  // of moments before
   Oracle oracle;
-  wire::JoinedRoom member;     // of a client that may come back
-  std::uint64_t rows = 0;      // that the journal has, as the killed server left it
-  std::string fault;           // in what needed no damage
+  wire::JoinedRoom member;  // of a client that may come back
+  std::uint64_t rows = 0;   // that the journal has, as the killed server left it
+  std::string fault;        // in what needed no damage
 };
 
 // What `verify` says.
@@ -82,10 +82,14 @@ class BreakerStage {
   [[nodiscard]] std::filesystem::path new_folder() const;
   [[nodiscard]] std::filesystem::path new_name() const;  // of a file that is not there
   // As seen from here, of a folder as servers and commands see it.
-  [[nodiscard]] std::filesystem::path seen(const std::filesystem::path& folder) const { return root_ / folder.relative_path(); }
-  [[nodiscard]] RunResult command(const std::vector<std::string>& arguments, std::chrono::milliseconds patience = kPatience) const;
+  [[nodiscard]] std::filesystem::path seen(const std::filesystem::path& folder) const {
+    return root_ / folder.relative_path();
+  }
+  [[nodiscard]] RunResult command(const std::vector<std::string>& arguments,
+                                  std::chrono::milliseconds patience = kPatience) const;
   // On FOLDER/NAME.journal.
-  [[nodiscard]] Server start(const std::filesystem::path& folder, const std::string& name = kRoom, ProcessOptions options = {}) const;
+  [[nodiscard]] Server start(const std::filesystem::path& folder, const std::string& name = kRoom,
+                             ProcessOptions options = {}) const;
   static void kill(Server& server);
   // Stops a server in the middle of whatever it does. What it has asked of the disk is over when this returns.
   static void freeze(Server& server);
@@ -111,7 +115,8 @@ class BreakerStage {
   std::filesystem::path root_ = "/";
 };
 
-// For as long as it lives, servers and commands of a stage run behind a prefix, and see under / what is under `root` here.
+// For as long as it lives, servers and commands of a stage run behind a prefix, and see under / what is under `root`
+// here.
 class Behind {
  public:
   Behind(BreakerStage& stage, std::vector<std::string> prefix, std::filesystem::path root);

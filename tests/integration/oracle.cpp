@@ -138,7 +138,10 @@ Result<std::unique_ptr<LightHand>> LightHand::come_again(const std::string& addr
 }
 
 LightHand::LightHand(wire::JoinedRoom room, Oracle& oracle, std::uint64_t seed)
-    : room_(std::move(room)), oracle_(&oracle), seed_(seed), stream_(std::make_unique<Stream>()),
+    : room_(std::move(room)),
+      oracle_(&oracle),
+      seed_(seed),
+      stream_(std::make_unique<Stream>()),
       lease_(room_.lease_epoch) {
   stream_->calls = v1::CuttingService::NewStub(room_.channel)->Session(&stream_->context);
   v1::SessionRequest request;
@@ -202,13 +205,17 @@ void LightHand::read() {
         decided_ = message.rejected().author_seq();
         break;
       }
-      case v1::SessionResponse::kNoted: oracle_->heard(RoomSeq{message.noted().room_seq()}); break;
+      case v1::SessionResponse::kNoted:
+        oracle_->heard(RoomSeq{message.noted().room_seq()});
+        break;
       case v1::SessionResponse::kKept: {
-        const auto chain = wire::digest_from_wire(message.kept().chain()), seal = wire::digest_from_wire(message.kept().seal());
+        const auto chain = wire::digest_from_wire(message.kept().chain()),
+                   seal = wire::digest_from_wire(message.kept().seal());
         if (chain && seal) oracle_->heard_kept({RoomSeq{message.kept().room_seq()}, *chain, *seal});
         break;
       }
-      default: break;
+      default:
+        break;
     }
   }
   over_ = true;

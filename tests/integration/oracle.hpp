@@ -23,15 +23,15 @@ class Oracle {
   Oracle(const Oracle& other);
   Oracle& operator=(const Oracle&) = delete;
 
-  void asked();                                     // for something that becomes a row at most
-  void heard(RoomSeq place);                        // of any event
+  void asked();                                      // for something that becomes a row at most
+  void heard(RoomSeq place);                         // of any event
   void heard_cut(RoomSeq place, std::string bytes);  // of a v1::Cut
   void heard_mark(RoomSeq place, std::string label);
-  void heard_join(AuthorId author);                 // its place is not told
+  void heard_join(AuthorId author);  // its place is not told
   void heard_kept(const wire::KeptEvents& kept);
 
-  [[nodiscard]] std::uint64_t acknowledged() const;      // the furthest place that anybody heard of
-  [[nodiscard]] std::uint64_t most() const;              // rows that there can be
+  [[nodiscard]] std::uint64_t acknowledged() const;            // the furthest place that anybody heard of
+  [[nodiscard]] std::uint64_t most() const;                    // rows that there can be
   [[nodiscard]] std::optional<wire::KeptEvents> kept() const;  // the newest witness
   // What the lines of an export lack or have otherwise, up to a place. Empty: nothing.
   [[nodiscard]] std::string lacks(std::string_view lines, std::uint64_t up_to) const;
@@ -44,7 +44,8 @@ class Oracle {
   std::optional<wire::KeptEvents> kept_;
 };
 
-// A haptic client without a bone: it cuts without end, as fast as its room takes it, and tells the oracle what it hears.
+// A haptic client without a bone: it cuts without end, as fast as its room takes it, and tells the oracle what it
+// hears.
 class LightHand {
  public:
   // Errors: those of wire::join_room.

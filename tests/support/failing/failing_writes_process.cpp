@@ -11,12 +11,12 @@ FailingWrites::FailingWrites(std::filesystem::path folder, std::filesystem::path
 ProcessOptions FailingWrites::options() const {
   ProcessOptions options;
   const char* sanitizer = std::getenv("ASAN_OPTIONS");
-  options.environment = {{"LD_PRELOAD", OSTEON_FAILING_LIBRARY},
-                         {"OSTEON_FAILING_FOLDER", folder_.string() + "/"},
-                         {"OSTEON_FAILING_CONTROL", control_.string()},
-                         // A sanitizer wants to be the first library; behind this one it works as well.
-                         {"ASAN_OPTIONS", std::string(sanitizer != nullptr ? sanitizer : "") +
-                                              ":verify_asan_link_order=0"}};
+  options.environment = {
+      {"LD_PRELOAD", OSTEON_FAILING_LIBRARY},
+      {"OSTEON_FAILING_FOLDER", folder_.string() + "/"},
+      {"OSTEON_FAILING_CONTROL", control_.string()},
+      // A sanitizer wants to be the first library; behind this one it works as well.
+      {"ASAN_OPTIONS", std::string(sanitizer != nullptr ? sanitizer : "") + ":verify_asan_link_order=0"}};
   return options;
 }
 
