@@ -43,7 +43,7 @@ class BreakerJudge {
  private:
   // What `said` leaves unsaid of what is lost; empty: nothing.
   [[nodiscard]] static std::string unsaid(const std::string& what, const std::string& text, std::uint64_t events,
-                                          std::uint64_t witnessed, const Trial& trial, bool* without_number);
+                                          std::uint64_t lost, const Trial& trial, bool* without_number);
   [[nodiscard]] std::string try_export(const Trial& trial) const;
   [[nodiscard]] std::string try_replay(const Trial& trial) const;
   [[nodiscard]] std::string try_copy(const Trial& trial, const std::string& how) const;  // backup and branch
