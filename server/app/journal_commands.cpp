@@ -43,6 +43,9 @@ struct Arguments {
 };
 
 void say(const std::string& what, const std::string& value) { std::printf("%-12s %s\n", (what + ":").c_str(), value.c_str()); }
+void say_unsigned() {
+  say("note", "not signed: there is no signing.key beside the journal; give --signing-key FILE");
+}
 
 std::string text_of(const JournalHead& head) { return std::to_string(head.place.value) + ", chain " + to_hex(head.chain).substr(0, 16); }
 
@@ -207,16 +210,15 @@ Result<PublicKey> public_key_of(const std::string& given) {
 Result<void> check_signatures(const VerifyReport& report, const Arguments& given, const PublicKey& key) {
   const Vouched vouched = vouched_by(key, report);
   const auto by = [&](const PublicKey& who) {
-    return "by " + to_hex(who).substr(0, 16) + (who == key ? "" : ", of the same line of keys");
+    return "by " + to_hex(who).substr(0, 16) + (who == key ? "" : ", an earlier or later key of this server");
   };
   for (const SignedRange& one : vouched.rows) say("signed", rows_text(one.from, one.to) + " " + by(one.key));
   for (const SignedRange& one : vouched.by_others)
     say("not signed", rows_text(one.from, one.to) + " by this key, but by " + to_hex(one.key));
   for (const auto& [from, to] : vouched.by_nobody) say("not signed", rows_text(from, to) + " by anybody");
-  for (const std::string& entry : vouched.entries_unsigned) say("not signed", entry + " by this key");
-  if (report.closed_cleanly)
-    say("footer", report.footer_by ? "signed by " + to_hex(*report.footer_by).substr(0, 16) : "not signed");
+  for (const std::string& entry : vouched.other_entries) say("not signed", entry + " by this server");
   if (vouched.all()) return {};
+  if (vouched.rows.empty() && vouched.entries == 0) say("not signed", "anything by this server");
   return failure(ErrorCode::invalid_input,
                  given.file.string() + " fits together, but the key " + to_hex(key).substr(0, 16) +
                      " does not vouch for all of it; give the key of the server that wrote it, or "
@@ -248,19 +250,26 @@ Result<void> verify(const Arguments& given) {
     if (const Result<void> vouched = check_signatures(*report, given, **key); !vouched) return vouched;
     say("verdict", "sound");
   } else {
-    say("verdict", "unsigned (it fits together; with --key, who signed it is checked too)");
+    say("verdict", "unsigned: it fits together, but no signature was checked; give --key");
   }
   return {};
 }
 
 Result<void> recover(const Arguments& given) {
-  const Result<RecoverReport> report = recover_journal(given.file, given.to);
+  const Result<std::shared_ptr<const SigningKeys>> keys = keys_for(given);
+  if (!keys) return tl::unexpected(keys.error());
+  const Result<RecoverReport> report = recover_journal(given.file, given.to, nullptr, {}, RoomSeq{given.at}, *keys);
   if (!report) return tl::unexpected(report.error());
   for (const std::string& fault : report->faults) say("fault", fault);
+  if (!*keys) say_unsigned();
   say("recovered", text_of(report->head));
   if (report->lost() > 0) say("lost", std::to_string(report->lost()) + " events that were vouched for");
   say("new journal", given.to.string());
   return {};
+}
+
+Result<void> copy(const Arguments& given, decltype(backup_journal)* make) {
+  return keys_for(given).and_then([&](const auto& keys) { return make(given.file, given.to, nullptr, keys); });
 }
 
 // Only earlier fields are replaced. Asked before what takes long, and again before they are written.
@@ -413,6 +422,7 @@ Result<void> rename_room(const Arguments& given) {
     if (!before) return tl::unexpected(before.error());
     if (const Result<void> named = journal.set_register(kNameRegister, given.name); !named) return named;
     say("renamed", *before + " to " + given.name);
+    if (!journal.is_signed()) say_unsigned();
     return {};
   });
 }
@@ -441,11 +451,13 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
   check->add_option("--case", given->case_folder, "Folder of the case: makes the room again, too, and says its hashes");
   check->add_option(
       "--key", given->key,
-      "Public key of the server, as \"key show\" prints it: says who signed the events up to which, and which "
-      "nobody signed");
-  copies("recover", "Copies what can be confirmed of a damaged journal into a new one", recover);
-  copies("backup", "Copies a sound journal", [](const Arguments& a) { return backup_journal(a.file, a.to); });
-  copies("migrate", "Copies a journal of an earlier version into one of today's", [](const Arguments& a) { return migrate_journal(a.file, a.to); });
+      "Public key of the server, as \"key show\" prints it: says which events were signed, and by whom");
+  CLI::App* recovered = copies("recover", "Copies what can be confirmed of a damaged journal into a new one", recover);
+  recovered->add_option("--to", given->at, "room_seq of the last event; all by default");
+  signs(recovered);
+  signs(copies("backup", "Copies a sound journal", [](const Arguments& a) { return copy(a, backup_journal); }));
+  signs(copies("migrate", "Copies a journal of an earlier version into one of today's",
+               [](const Arguments& a) { return copy(a, migrate_journal); }));
   copies("branch", "Makes a room of its own from what another was at a place", branch)
       ->add_option("--at", given->at, "room_seq of the last event that it takes over; all by default");
   CLI::App* again = command("replay", "Makes the room again and says its hashes, marks and time", replay);

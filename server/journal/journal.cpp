@@ -222,10 +222,16 @@ Result<void> Journal::begin_signing() {
   if (head.value == 0) return {};
   const RoomSeq signed_to = any ? last->head.place : RoomSeq{};
   const std::string rows = "rows " + std::to_string(signed_to.value + 1) + " to " + std::to_string(head.value);
-  if (any && head > state.recovered_to.value_or(RoomSeq{}))
-    return failure(ErrorCode::unavailable, state.path.string() + ": this server's key signed the rows up to " +
-                                               std::to_string(signed_to.value) + ", but not " + rows +
-                                               ": somebody else wrote them; recover it into a new journal");
+  // Whoever recovered it with the key has accepted them.
+  const Result<bool> accepted = is_vouched_for(kRecoveredRegister);
+  if (!accepted) return tl::unexpected(accepted.error());
+  if (any && (!*accepted || head > state.recovered_to.value_or(RoomSeq{})))
+    return failure(
+        ErrorCode::unavailable,
+        state.path.string() + ": this server's key signed the rows up to " + std::to_string(signed_to.value) +
+            ", but not " + rows +
+            ": somebody else wrote them; recover the signed ones into a new journal: osteon-server recover " +
+            state.path.string() + " NEW --to " + std::to_string(signed_to.value) + " --signing-key KEY");
   state.notes.push_back(rows + " were not signed by this server's key, which signs those after them");
   return {};
 }
@@ -238,6 +244,14 @@ Result<bool> Journal::is_vouched_for(std::string_view name) {
   if (!*found) return true;
   const auto signer = state_->file.signer_of(**found);
   return signer && keys->trusts(*signer);
+}
+
+bool Journal::is_signed() const { return state_->options.keys != nullptr; }
+
+bool Journal::is_vouched_for(const Checkpoint& checkpoint) const {
+  const SigningKeys* keys = state_->options.keys.get();
+  const auto signer = state_->file.signer_of(checkpoint);
+  return keys == nullptr || (signer && keys->trusts(*signer));
 }
 
 Result<void> Journal::keep_signature() {

@@ -118,6 +118,8 @@ class Journal {
   [[nodiscard]] const std::vector<std::string>& notes() const;
   // Whether one of JournalOptions::keys signed a register that is there; without keys, whatever is there.
   [[nodiscard]] Result<bool> is_vouched_for(std::string_view name);
+  [[nodiscard]] bool is_signed() const;  // whether what is written from now on is
+  [[nodiscard]] bool is_vouched_for(const Checkpoint& checkpoint) const;  // one of checkpoints()
   // Vouches for the head in a footer, with which the log is needed no more and goes; of a journal that is closed to
   // rows, nothing. The journal must not be used afterwards.
   [[nodiscard]] Result<void> close();

@@ -429,7 +429,7 @@ Result<std::vector<Checkpoint>> JournalFile::checkpoints() {
   }
 }
 
-Result<std::vector<Person>> JournalFile::people() {
+Result<std::vector<Person>> JournalFile::people(std::vector<std::optional<PublicKey>>* signers) {
   std::vector<Person> all;
   auto statement = database_.prepare("SELECT pseudonym, label, joined_day, seal FROM people ORDER BY pseudonym");
   if (!statement) return tl::unexpected(statement.error());
@@ -439,8 +439,9 @@ Result<std::vector<Person>> JournalFile::people() {
     if (!*more) return all;
     Person person{std::string(statement->bytes(0)), std::string(statement->bytes(1)),
                   static_cast<std::int32_t>(statement->integer(2))};
-    if (statement->bytes(3) != as_text(seal_of(person)))
-      return damaged("an entry of its people");
+    const auto seal = check_seal(statement->bytes(3), seal_of(person), first_head(genesis_).chain);
+    if (!seal) return damaged("an entry of its people");
+    if (signers != nullptr) signers->push_back(seal->key);
     all.push_back(std::move(person));
   }
 }
@@ -535,7 +536,7 @@ void JournalFile::inspect_signatures(Inspection& found) {
   }
   for (const SignedRows& one : *all) {
     const std::string what = "the signature at place " + std::to_string(one.head.place.value);
-    if (!verifies(one) || one.since.value == 0 || one.since > one.head.place)
+    if (!fits(one))
       found.faults.push_back(damaged(what).value().message);
     else
       check_witness(one.head, what, found);
@@ -593,17 +594,16 @@ void JournalFile::inspect_log(Inspection& found) {
   for (const std::string& foreign : log_.foreign)
     found.faults.push_back(foreign + "; put the files of one moment together again, or recover it into a new journal");
   if (!needs_log_) return;
+  const std::string untold = "how many rows are missing after place " + std::to_string(found.head.place.value) +
+                             " cannot be told" + std::string(kRemedy);
   for (const std::string& fault : log_.faults) found.faults.push_back(fault + std::string(kRemedy));
+  if (!log_.faults.empty()) found.faults.push_back(file_.string() + ": " + untold);
   if (log_.doubtful)
     found.faults.push_back(file_.string() +
-                           ": a write to one file of its log was cut short, and the other is damaged: how many "
-                           "rows are missing after place " + std::to_string(found.head.place.value) +
-                           " cannot be told" + std::string(kRemedy));
+                           ": a write to one file of its log was cut short, and the other is damaged: " + untold);
   if (log_.generation < generation_ && log_.faults.empty())
     found.faults.push_back(file_.string() + " was not closed, and its log " +
-                           (log_.generation == 0 ? "is missing" : "is an older copy") +
-                           ": how many rows are missing after place " + std::to_string(found.head.place.value) +
-                           " cannot be told" + std::string(kRemedy));
+                           (log_.generation == 0 ? "is missing" : "is an older copy") + ": " + untold);
 }
 
 void JournalFile::inspect_beside(bool files, Inspection& found) {
@@ -747,8 +747,8 @@ Result<void> JournalFile::add_checkpoint(const Checkpoint& checkpoint) {
 Result<void> JournalFile::add_person(const Person& person) {
   auto statement = database_.prepare("INSERT OR REPLACE INTO people(pseudonym, label, joined_day, seal) VALUES(?, ?, ?, ?)");
   if (!statement) return tl::unexpected(statement.error());
-  const Digest seal = seal_of(person);
-  return statement->text(0, person.pseudonym).text(1, person.label).integer(2, person.joined_day).blob(3, as_text(seal)).run();
+  const std::string seal = make_seal(seal_of(person), first_head(genesis_).chain, key_);
+  return statement->text(0, person.pseudonym).text(1, person.label).integer(2, person.joined_day).blob(3, seal).run();
 }
 
 }  // namespace osteon

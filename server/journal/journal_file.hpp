@@ -90,7 +90,7 @@ class JournalFile {
                           const std::function<bool(const JournalRow&, const JournalHead&)>& take);
   [[nodiscard]] Result<std::optional<Digest>> chain_at(RoomSeq place);  // as stored
   [[nodiscard]] Result<std::vector<Checkpoint>> checkpoints();          // newest first
-  [[nodiscard]] Result<std::vector<Person>> people();
+  [[nodiscard]] Result<std::vector<Person>> people(std::vector<std::optional<PublicKey>>* signers = nullptr);
   [[nodiscard]] Result<std::vector<std::string>> registers();           // their names, the journal's own not
   [[nodiscard]] Result<std::optional<std::string>> find_register(std::string_view name);
   [[nodiscard]] Result<std::optional<SealedRegister>> find_sealed(std::string_view name);

@@ -15,12 +15,15 @@ namespace fs = std::filesystem;
 
 // A file is a first sector, which says what it belongs to, and entries one after the other. An entry is as long as it
 // needs to be: a torn write may spoil the sector in which the last one ends, and then the other file has that one.
-// Where the generation has a signer, its key and its first row stand in the first sector, and a signature behind the
-// rows of each entry.
-constexpr std::string_view kMagic = "OsteonL1", kSignedMagic = "OsteonL2";
+// Where the generation has a signer, a signature stands behind the rows of each entry. Journals of version 3 have logs
+// without length and signer.
+constexpr std::string_view kMagic = "OsteonL2", kMagicOfVersion3 = "OsteonL1";
 constexpr std::size_t kFirstSector = 4096, kSaltBytes = 16, kChainBytes = 32, kChecksumBytes = 16;
-constexpr std::size_t kStartBytes = kMagic.size() + kChainBytes + 2 * 8 + kChainBytes + kSaltBytes;
-constexpr std::size_t kSignerBytes = sizeof(PublicKey) + 8, kSignatureBytes = sizeof(Signature);
+constexpr std::size_t kSaltEnd = kMagic.size() + kChainBytes + 2 * 8 + kChainBytes + kSaltBytes;
+constexpr std::size_t kStartBytes = kSaltEnd + 8 + sizeof(PublicKey) + 8;  // length, key, first signed row
+constexpr std::size_t kSignatureBytes = sizeof(Signature);
+// No log gets as long: it is carried into the database once it is full, and a commit has few rows.
+constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 30;
 constexpr const char* kForeign = "belongs to another journal";
 constexpr std::size_t kEntryHead = kSaltBytes + 3 * 8 + kChainBytes;  // salt, bytes of rows, count, first place, chain
 
@@ -36,17 +39,17 @@ std::string_view text_of(const Array& bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-std::string encode_start(const LogStart& start, std::string_view salt) {
-  std::string bytes(start.signer ? kSignedMagic : kMagic);
+std::string encode_start(const LogStart& start, std::string_view salt, std::uint64_t length) {
+  std::string bytes(kMagic);
   bytes += as_text(start.journal);
   put_integer(bytes, start.generation);
   put_integer(bytes, start.base.place.value);
   bytes += as_text(start.base.chain);
   bytes += salt;
-  if (start.signer) {
-    bytes += text_of(start.signer->key.bytes);
-    put_integer(bytes, start.signer->since.value);
-  }
+  put_integer(bytes, length);
+  const LogStart::Signer signer = start.signer.value_or(LogStart::Signer{});
+  bytes += text_of(signer.key.bytes);
+  put_integer(bytes, signer.since.value);  // 0: there is none
   return bytes + checksum(bytes);
 }
 
@@ -109,6 +112,7 @@ struct FoundFile {
   std::vector<Entry> entries;
   bool is_there = false;
   bool damaged = false;           // something that cannot be read lies between entries
+  bool is_cut = false;            // shorter than it was made
   bool ends_in_part = false;      // of an entry
   [[nodiscard]] RoomSeq last() const { return entries.empty() ? start.base.place : entries.back().head.place; }
 };
@@ -144,12 +148,16 @@ Result<FoundFile> read_member(const fs::path& path, const Digest& journal, Disk&
     return file;
   }
   file.is_there = true;
+  if (**size > kMostBytes) {
+    file.unreadable = "is longer than any log";
+    return file;
+  }
   const auto read = disk.read(path, 0, **size);
   if (!read) return tl::unexpected(read.error());
   const std::string_view bytes(*read);
-  const bool is_signed = bytes.starts_with(kSignedMagic);
-  const std::string_view first = bytes.substr(0, kStartBytes + (is_signed ? kSignerBytes : 0));
-  if ((!is_signed && !bytes.starts_with(kMagic)) || bytes.size() < first.size() + kChecksumBytes ||
+  const bool of_version_3 = bytes.starts_with(kMagicOfVersion3);
+  const std::string_view first = bytes.substr(0, of_version_3 ? kSaltEnd : kStartBytes);
+  if ((!of_version_3 && !bytes.starts_with(kMagic)) || bytes.size() < first.size() + kChecksumBytes ||
       bytes.substr(first.size(), kChecksumBytes) != checksum(first)) {
     file.unreadable = "is damaged";
     return file;
@@ -164,12 +172,14 @@ Result<FoundFile> read_member(const fs::path& path, const Digest& journal, Disk&
     file.unreadable = kForeign;
     return file;
   }
-  if (is_signed) {
-    LogStart::Signer& signer = file.start.signer.emplace();
-    std::ranges::copy(first.substr(kStartBytes, signer.key.bytes.size()), signer.key.bytes.begin());
-    signer.since.value = integer_at(first, kStartBytes + signer.key.bytes.size());
+  if (!of_version_3) {
+    file.is_cut = bytes.size() < integer_at(first, kSaltEnd);
+    LogStart::Signer signer;
+    std::ranges::copy(first.substr(kSaltEnd + 8, signer.key.bytes.size()), signer.key.bytes.begin());
+    signer.since.value = integer_at(first, kSaltEnd + 8 + signer.key.bytes.size());
+    if (signer.since) file.start.signer = signer;
   }
-  read_entries(bytes, first.substr(kStartBytes - kSaltBytes, kSaltBytes), file);
+  read_entries(bytes, first.substr(kSaltEnd - kSaltBytes, kSaltBytes), file);
   return file;
 }
 
@@ -216,6 +226,9 @@ void note_differences(const FoundFile& log, const FoundFile& mirror, LogContents
   if (!log.unreadable.empty() && !mirror.unreadable.empty()) return;
   if (!log.unreadable.empty()) return note(log, mirror, log.unreadable);
   if (!mirror.unreadable.empty()) return note(mirror, log, mirror.unreadable);
+  if (log.is_cut && mirror.is_cut) return;
+  if (log.is_cut) return note(log, mirror, "was cut");
+  if (mirror.is_cut) return note(mirror, log, "was cut");
   for (const FoundFile* file : {&log, &mirror})
     if (file->ends_in_part)
       found.notes.push_back(file->path.string() + " ends in a write that is not whole");
@@ -268,11 +281,16 @@ Result<LogContents> read_log(const fs::path& journal, const Digest& identity, co
   const bool any = members[0].is_there || members[1].is_there;
   if (any && !members[0].unreadable.empty() && !members[1].unreadable.empty())
     for (const FoundFile& file : members) found.faults.push_back(file.path.string() + " " + file.unreadable);
+  const auto is_lost = [](const FoundFile& file) { return !file.unreadable.empty() || file.is_cut; };
+  if (found.faults.empty() && is_lost(members[0]) && is_lost(members[1]))
+    for (const FoundFile& file : members)
+      if (file.is_cut)
+        found.faults.push_back(file.path.string() + " was cut, and the other file of the log, too, is not whole");
   if (any) note_differences(members[0], members[1], found);
   const auto &log = members[0], &mirror = members[1];
   const auto cut_short = [](const FoundFile& file) { return file.ends_in_part || file.damaged; };
-  if (log.unreadable.empty() != mirror.unreadable.empty())
-    found.doubtful = cut_short(log.unreadable.empty() ? log : mirror);
+  if (is_lost(log) != is_lost(mirror))
+    found.doubtful = cut_short(is_lost(log) ? mirror : log);
   else
     found.doubtful = log.unreadable.empty() && log.start.generation == mirror.start.generation &&
                      ((log.ends_in_part && mirror.last() < log.last()) ||
@@ -333,8 +351,9 @@ Result<void> MirroredLog::begin(Member& member, const LogStart& start) {
   member.salt.assign(salt.begin(), salt.end());
   member.end = kFirstSector;
   member.is_signed = start.signer.has_value();
+  const std::string first = encode_start(start, member.salt, capacity_);
   return check_named(member)
-      .and_then([&] { return member.file->write_at(0, encode_start(start, member.salt)); })
+      .and_then([&] { return member.file->write_at(0, first); })
       .and_then([&] { return sync(member); });
 }
 

@@ -259,7 +259,10 @@ Result<std::shared_ptr<const SigningKeys>> load_signing_keys(const fs::path& fil
                        "; name the one that the server made at its first start, or start it once");
   if ((found.st_mode & 077) != 0)
     return failure(ErrorCode::invalid_input, "others may read the signing key " + file.string() + "; chmod 600 " +
-                                                 file.string() + ", and rotate it if anybody may have read it");
+                                                 file.string() + ", or move it away if anybody may have read it");
+  if (found.st_uid != ::geteuid() && found.st_uid != 0)
+    return failure(ErrorCode::invalid_input, "the signing key " + file.string() +
+                                                 " belongs to another user; chown it to the one who runs the server");
   const Result<std::string> content = read_file(file);
   if (!content) return tl::unexpected(content.error());
   return parse(file, *content);
@@ -295,7 +298,10 @@ SignedRows sign_rows(const SigningKey& key, RoomSeq since, const JournalHead& he
   return {since, head, key.public_key(), key.sign(message_of(since, head))};
 }
 
-bool verifies(const SignedRows& rows) { return verifies(rows.key, message_of(rows.since, rows.head), rows.signature); }
+bool fits(const SignedRows& rows) {
+  return rows.since && rows.since <= rows.head.place &&
+         verifies(rows.key, message_of(rows.since, rows.head), rows.signature);
+}
 
 std::string make_seal(const Digest& entry, const Digest& genesis, const SigningKey* key) {
   if (key == nullptr) return std::string(as_text(entry));

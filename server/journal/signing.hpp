@@ -96,7 +96,8 @@ struct SignedRows {
   Signature signature;
 };
 [[nodiscard]] SignedRows sign_rows(const SigningKey& key, RoomSeq since, const JournalHead& head);
-[[nodiscard]] bool verifies(const SignedRows& rows);
+// Whether the key made the signature, and of rows that can be.
+[[nodiscard]] bool fits(const SignedRows& rows);
 
 // What stands beside each entry that the chain does not confirm: its hash, or the key that signed the hash and its
 // signature. `genesis`: chain_0 of the journal, so that it counts in no other.

@@ -67,8 +67,12 @@ VerifyReport report_of(JournalFile& file) {
       if (const auto one = file.find_sealed(name); one && *one)
         report.entries.emplace_back("the register \"" + name + "\"", file.signer_of(**one));
     }
-  if (const auto footer = file.find_sealed(kFooterRegister); footer && *footer)
-    report.footer_by = file.signer_of(**footer);
+  std::vector<std::optional<PublicKey>> signers;
+  if (const auto people = file.people(&signers))
+    for (std::size_t i = 0; i < people->size(); ++i)
+      report.entries.emplace_back("the name of person " + (*people)[i].pseudonym, signers[i]);
+  if (const auto footer = file.find_sealed(kFooterRegister); footer && *footer && report.closed_cleanly)
+    report.entries.emplace_back("the footer", file.signer_of(**footer));
   return report;
 }
 
@@ -81,37 +85,33 @@ Result<VerifyReport> verify_journal(const fs::path& file, Disk* disk) {
 }
 
 Vouched vouched_by(const PublicKey& key, const VerifyReport& report) {
-  const std::set<PublicKey> line = keys_of_line(key, report.successions);
-  // For each place the key that signed it, one of the line where there is one; cut at every end of a range.
-  std::set<std::uint64_t> cuts{0, report.head.place.value};
-  for (const SignedRange& range : report.signed_rows) {
-    cuts.insert(range.from.value - 1);
-    cuts.insert(range.to.value);
-  }
+  const std::set<PublicKey> own = keys_of_line(key, report.successions);
   Vouched vouched;
-  const auto add = [](std::vector<SignedRange>& to, const SignedRange& range) {
-    if (!to.empty() && to.back().key == range.key && to.back().to.value + 1 == range.from.value)
-      to.back().to = range.to;
-    else to.push_back(range);
-  };
-  for (auto before = cuts.begin(), after = std::next(before); after != cuts.end(); before = after++) {
-    const RoomSeq from{*before + 1}, to{*after};
-    if (to > report.head.place) break;
+  // Rows between two of these places are all signed by the same keys.
+  std::set<std::uint64_t> ends{report.head.place.value};
+  for (const SignedRange& range : report.signed_rows) ends.insert({range.from.value - 1, range.to.value});
+  RoomSeq from{1};
+  for (const std::uint64_t end : ends) {
+    const RoomSeq to{end};
+    if (to < from || to > report.head.place) continue;
     const SignedRange* by = nullptr;
     for (const SignedRange& range : report.signed_rows)
-      if (range.from <= from && to <= range.to &&
-          (by == nullptr || (line.contains(range.key) && !line.contains(by->key))))
-        by = &range;
+      if (range.from <= from && to <= range.to && (by == nullptr || own.contains(range.key))) by = &range;
     if (by == nullptr) {
       auto& none = vouched.by_nobody;
       if (!none.empty() && none.back().second.value + 1 == from.value) none.back().second = to;
       else none.emplace_back(from, to);
     } else {
-      add(line.contains(by->key) ? vouched.rows : vouched.by_others, {from, to, by->key});
+      auto& some = own.contains(by->key) ? vouched.rows : vouched.by_others;
+      if (!some.empty() && some.back().key == by->key && some.back().to.value + 1 == from.value) some.back().to = to;
+      else some.push_back({from, to, by->key});
     }
+    from.value = end + 1;
   }
-  for (const auto& [what, signer] : report.entries)
-    if (!signer || !line.contains(*signer)) vouched.entries_unsigned.push_back(what);
+  for (const auto& [what, signer] : report.entries) {
+    if (signer && own.contains(*signer)) ++vouched.entries;
+    else vouched.other_entries.push_back(what);
+  }
   return vouched;
 }
 
@@ -144,7 +144,8 @@ struct JournalCopy::State {
   std::optional<std::vector<std::string>> only = {};  // a branch: these registers, and nobody
   bool damaged = false;                               // what cannot be read is left out
   std::optional<std::uint64_t> epochs = {};           // recovered: openings that the lost part cannot have counted
-  std::shared_ptr<const SigningKeys> keys = {};       // a branch's; a copy keeps the signatures that are there
+  std::shared_ptr<const SigningKeys> keys = {};       // sign what is not copied as it is
+  bool signs_rows = false;                            // those of a branch, which has another chain
   std::optional<Journal> target = {};
   // Taken from the source and not yet put into the target.
   std::vector<JournalRow> rows = {};
@@ -171,7 +172,8 @@ struct JournalCopying {
     if (!nobody && nobody.error().code != ErrorCode::not_found) return tl::unexpected(nobody.error());
     state.begun = true;
     if (Result<void> cleared = clear_growing(state); !cleared) return cleared;
-    auto target = Journal::create(state.growing, state.genesis, {.disk = state.disk, .keys = state.keys});
+    auto target = Journal::create(state.growing, state.genesis,
+                                  {.disk = state.disk, .keys = state.signs_rows ? state.keys : nullptr});
     if (!target) return tl::unexpected(target.error());
     state.target = std::move(*target);
     return {};
@@ -224,7 +226,9 @@ struct JournalCopying {
         if (Result<void> on = left_out(state, signatures.error()); !on) return on;
       } else {
         for (const SignedRows& one : *signatures)
-          if (one.head.place <= state.copied.place && verifies(one)) state.signed_rows.push_back(one);
+          if (const auto chain = state.source->chain_at(one.head.place);
+              one.head.place <= state.copied.place && fits(one) && chain && *chain == one.head.chain)
+            state.signed_rows.push_back(one);
       }
       auto people = state.source->people();
       if (people) state.people = std::move(*people);
@@ -277,6 +281,7 @@ struct JournalCopying {
   static Result<void> put_beside(JournalCopy::State& state) {
     return JournalInside::write_through(*state.target, [&](JournalFile& file) {
       Result<void> done;
+      if (state.keys) file.sign_with(&state.keys->key());
       // Another genesis needs other seals.
       for (const SealedRegister& one : state.registers)
         if (done) done = state.only ? file.set_register(one.name, one.value) : file.add_register(one);
@@ -336,7 +341,11 @@ JournalCopy::~JournalCopy() {
 
 Result<JournalCopy> JournalCopy::begin(Journal& source, const fs::path& to) {
   auto& state = JournalInside::of(source);
-  return JournalCopying::begin(state.path, state.file, state.head.place, to, *state.disk);
+  // The newest rows' signature goes to where the copy takes it from. Where that fails, the copy has an earlier one.
+  if (state.signed_since) static_cast<void>(JournalInside::carry(source));
+  auto copy = JournalCopying::begin(state.path, state.file, state.head.place, to, *state.disk);
+  if (copy) copy->state_->keys = state.options.keys;
+  return copy;
 }
 
 Result<JournalCopy> JournalCopy::begin_branch(Journal& source, const fs::path& to, RoomSeq last, std::string genesis,
@@ -348,6 +357,7 @@ Result<JournalCopy> JournalCopy::begin_branch(Journal& source, const fs::path& t
   copy->state_->genesis = std::move(genesis);
   copy->state_->only = std::move(registers);
   copy->state_->keys = state.options.keys;
+  copy->state_->signs_rows = state.signed_since == RoomSeq{1};  // the server vouches for all that it copies
   return copy;
 }
 
@@ -374,29 +384,33 @@ Result<void> copy_all(JournalCopy& copy) {
   return {};
 }
 
-Result<void> copy_sound(const fs::path& file, JournalFile& source, const fs::path& to, Disk& disk) {
+Result<void> copy_sound(const fs::path& file, JournalFile& source, const fs::path& to, Disk& disk,
+                        std::shared_ptr<const SigningKeys> keys) {
   const Inspection found = source.inspect(true);
   if (!found.faults.empty()) return failure(ErrorCode::invalid_input, found.faults.front());
   auto copy = JournalCopying::begin(file, source, found.head.place, to, disk);
   if (!copy) return tl::unexpected(copy.error());
+  JournalCopying::state(*copy).keys = std::move(keys);
   return copy_all(*copy);
 }
 
 }  // namespace
 
-Result<void> backup_journal(const fs::path& file, const fs::path& to, Disk* disk) {
+Result<void> backup_journal(const fs::path& file, const fs::path& to, Disk* disk,
+                            std::shared_ptr<const SigningKeys> keys) {
   auto source = Source::open(file, or_system(disk));
   if (!source) return tl::unexpected(source.error());
-  return copy_sound(file, **source, to, or_system(disk));
+  return copy_sound(file, **source, to, or_system(disk), std::move(keys));
 }
 
-Result<void> migrate_journal(const fs::path& file, const fs::path& to, Disk* disk) {
+Result<void> migrate_journal(const fs::path& file, const fs::path& to, Disk* disk,
+                             std::shared_ptr<const SigningKeys> keys) {
   auto source = Source::open(file, or_system(disk));
   if (!source) return tl::unexpected(source.error());
   if ((*source)->version() == kJournalVersion)
     return failure(ErrorCode::exists,
                    file.string() + " is of version " + std::to_string(kJournalVersion) + " already; open it as it is");
-  return copy_sound(file, **source, to, or_system(disk));
+  return copy_sound(file, **source, to, or_system(disk), std::move(keys));
 }
 
 Result<bool> has_head(const fs::path& file, const JournalHead& head, Disk* disk) {
@@ -455,16 +469,19 @@ Result<void> delete_journals(const std::vector<fs::path>& files, Disk* given) {
 }
 
 Result<RecoverReport> recover_journal(const fs::path& file, const fs::path& to, Disk* disk,
-                                      const std::vector<JournalHead>& known) {
+                                      const std::vector<JournalHead>& known, RoomSeq last,
+                                      std::shared_ptr<const SigningKeys> keys) {
   auto source = Source::open(file, or_system(disk));
   if (!source) return tl::unexpected(source.error());
   Inspection found = (*source)->inspect(true);
   RecoverReport report{found.head, found.witnessed, std::move(found.faults)};
   for (const JournalHead& head : known) report.witnessed = std::max(report.witnessed, head.place);
 
-  auto copy = JournalCopying::begin(file, **source, found.head.place, to, or_system(disk));
+  const RoomSeq end = last ? std::min(last, found.head.place) : found.head.place;
+  auto copy = JournalCopying::begin(file, **source, end, to, or_system(disk));
   if (!copy) return tl::unexpected(copy.error());
   auto& state = JournalCopying::state(*copy);
+  state.keys = std::move(keys);
   state.damaged = true;
   const std::uint64_t epoch = (*source)
                                   ->find_register(kEpochRegister)

@@ -27,20 +27,23 @@ struct VerifyReport {
   std::vector<std::string> faults;   // one sentence each
   std::vector<std::string> notes;    // of its log: what one file lacks and the other has, a write that is not whole
   std::vector<SignedRange> signed_rows = {};  // in order of their ends; they may overlap
-  // Checkpoints and registers, and who signed each. Not what the journal notes for itself.
+  // Checkpoints, registers, people and the footer of a journal that was closed, and who signed each. Not what the
+  // journal notes for itself.
   std::vector<std::pair<std::string, std::optional<PublicKey>>> entries = {};
-  std::optional<PublicKey> footer_by = {};    // who signed the footer
   std::vector<Succession> successions = {};   // that it keeps of its server's keys
   [[nodiscard]] bool sound() const { return faults.empty(); }
 };
 
-// What a key and the keys of its line vouch for in a report that is sound.
+// What a server vouches for in a report that is sound: with a key, and the keys that it had before and after it.
 struct Vouched {
-  std::vector<SignedRange> rows;            // by this line of keys, one after the other
-  std::vector<SignedRange> by_others;       // rows that another key signed, and none of this line
+  std::vector<SignedRange> rows;                       // one after the other
+  std::vector<SignedRange> by_others;                  // rows that another key signed, and none of this server
   std::vector<std::pair<RoomSeq, RoomSeq>> by_nobody;  // both ends included
-  std::vector<std::string> entries_unsigned;  // of VerifyReport::entries: no key of this line signed them
-  [[nodiscard]] bool all() const { return by_others.empty() && by_nobody.empty() && entries_unsigned.empty(); }
+  std::size_t entries = 0;                             // of VerifyReport::entries, signed by this server
+  std::vector<std::string> other_entries;              // not signed by this server
+  [[nodiscard]] bool all() const {
+    return (!rows.empty() || entries > 0) && by_others.empty() && by_nobody.empty() && other_entries.empty();
+  }
 };
 [[nodiscard]] Vouched vouched_by(const PublicKey& key, const VerifyReport& report);
 
@@ -84,13 +87,14 @@ class JournalCopy {
   std::unique_ptr<State> state_;
 };
 
-// In one go, of a journal that is not in use. Error invalid_input: it is not sound.
+// In one go, of a journal that is not in use. `keys` sign the copy's footer and people; what else is signed stays so.
+// Error invalid_input: it is not sound.
 [[nodiscard]] Result<void> backup_journal(const std::filesystem::path& file, const std::filesystem::path& to,
-                                          Disk* disk = nullptr);
+                                          Disk* disk = nullptr, std::shared_ptr<const SigningKeys> keys = nullptr);
 
 // Into the current version. Errors: exists (it is of that already, or `to` is there); invalid_input (it is not sound).
 [[nodiscard]] Result<void> migrate_journal(const std::filesystem::path& file, const std::filesystem::path& to,
-                                           Disk* disk = nullptr);
+                                           Disk* disk = nullptr, std::shared_ptr<const SigningKeys> keys = nullptr);
 
 // Whether a journal has this head in its history, as stored: then whoever names it has continued this one. Of a journal that
 // is in use it is looked for in what has been carried from the log into the file. Errors: those of verify_journal; exists
@@ -110,8 +114,11 @@ struct RecoverReport {
   [[nodiscard]] std::uint64_t lost() const { return witnessed > head.place ? witnessed.value - head.place.value : 0; }
 };
 // Every row up to the last that the chain confirms, in a new journal that takes rows. `known`: what clients say they were
-// told, to count as witnesses. Error invalid_input: not even its genesis can be read.
+// told, to count as witnesses. `last`: no row after it; null: all. `keys` sign that it was recovered: else a server
+// with keys takes no rows behind those that it did not sign. Error invalid_input: not even its genesis can be read.
 [[nodiscard]] Result<RecoverReport> recover_journal(const std::filesystem::path& file, const std::filesystem::path& to,
-                                                    Disk* disk = nullptr, const std::vector<JournalHead>& known = {});
+                                                    Disk* disk = nullptr, const std::vector<JournalHead>& known = {},
+                                                    RoomSeq last = {},
+                                                    std::shared_ptr<const SigningKeys> keys = nullptr);
 
 }  // namespace osteon

@@ -58,8 +58,8 @@ Result<void> check_room_name(Journal& journal, const fs::path& file, const std::
     return failure(
         ErrorCode::invalid_input,
         file.string() + " was given the name " + name +
-            " without this server's signing key; if that is meant, give it with the key: osteon-server rename-room " +
-            file.string() + " " + name + " --signing-key KEY");
+            " without this server's signing key; start the server again if its key was changed, or give the name with "
+            "the key: osteon-server rename-room " + file.string() + " " + name + " --signing-key KEY");
   }
   return failure(ErrorCode::invalid_input,
                  file.string() + " holds the room " + *own + ", not " + name +

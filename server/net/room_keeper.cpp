@@ -137,7 +137,7 @@ RoomKeeper::Fields RoomKeeper::newest_fields() {
   const Result<std::vector<Checkpoint>> checkpoints = journal_->checkpoints();
   if (!checkpoints) return {};
   for (const Checkpoint& one : *checkpoints) {
-    if (one.at.place > journal_->head().place) continue;
+    if (one.at.place > journal_->head().place || !journal_->is_vouched_for(one)) continue;
     const Result<std::string> bytes = journal_->read_checkpoint(one);
     if (!bytes) continue;
     if (Result<std::vector<FieldLeaf>> leaves = fields_of(one, *bytes)) return {one.at.place, std::move(*leaves)};

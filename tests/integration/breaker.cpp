@@ -76,7 +76,7 @@ struct Breaker::Parts {
         if (deleted)
           image.erase(room + log);
         else if (image.contains(room + log))
-          image.at(room + log).resize(random.index(100));
+          image.at(room + log).resize(random.index(random.index(2) == 0 ? 100 : image.at(room + log).size()));
       }
       return deleted ? "delete -log and -mirror" : "truncate -log and -mirror";
     }
@@ -143,13 +143,13 @@ struct Breaker::Parts {
             {"rename-room", file, "other"},
             {"delete", file, "--alone"},
             {"delete", file, "--branches"},
-            {"--case", stage.bone(), "--journal", file}};
+            {"--case", stage.bone(), "--journal", file, "--signing-key", stage.key()}};
   }
 
   // A command of osteon-server that nobody tries here; empty: there is none.
   [[nodiscard]] std::string find_untried() const {
     std::istringstream help(stage.command({"--help"}).out);
-    std::vector<std::string> known{"rooms", "cases", "ticket"};  // which take no journal
+    std::vector<std::string> known{"rooms", "cases", "ticket", "key"};  // which take no journal
     for (const std::vector<std::string>& one : commands("", "")) known.push_back(one.front());
     bool listed = false;
     std::size_t found = 0;
@@ -246,7 +246,7 @@ void Breaker::older_copy(std::uint64_t seed) {
   if (verdict.fault.empty() && !found.sound) verdict.fault = "verify of a whole older copy: " + found.text;
   server = parts_->stage.start(folder);
   const auto back = LightHand::come_again(server.address, member, oracle, seed);
-  if (verdict.fault.empty() && (back || !has(back.error().message, "rows were lost")))
+  if (verdict.fault.empty() && (back || !has(back.error().message, "has lost")))
     verdict.fault = "a client that knows more is told: " + (back ? "nothing" : back.error().message);
   Oracle anew;
   if (const auto stranger = LightHand::come(server.address, "", anew, seed); verdict.fault.empty() && stranger)
@@ -434,7 +434,8 @@ bool Breaker::read_only(std::uint64_t seed) {
     if (verdict.fault.empty() && copied.exit_code != 0) verdict.fault = "backup: " + said(copied);
     if (verdict.fault.empty())
       verdict.fault = parts_->stage.check_export((to / "copy").string(), life.oracle, life.rows);
-    const RunResult served = parts_->stage.command({"--case", parts_->stage.bone(), "--journal", trial.file()}, 10s);
+    const RunResult served = parts_->stage.command(
+        {"--case", parts_->stage.bone(), "--journal", trial.file(), "--signing-key", parts_->stage.key()}, 10s);
     if (verdict.fault.empty() && (served.exit_code == 0 || served.timed_out))
       verdict.fault = "a server: " + said(served);
     if (verdict.fault.empty()) verdict.fault = BreakerJudge::refusal("a server", served, trial.file());

@@ -126,11 +126,11 @@ RunResult BreakerStage::command(const std::vector<std::string>& arguments, std::
 Server BreakerStage::start(const fs::path& folder, const std::string& name, ProcessOptions options) const {
   const fs::path address = new_name();
   Server server;
-  server.process =
-      std::make_unique<Process>(first(),
-                                with_prefix({"--case", bone_, "--journal", (folder / (name + ".journal")).string(),
-                                             "--address-file", address.string(), "--drain-seconds", "0"}),
-                                std::move(options));
+  server.process = std::make_unique<Process>(
+      first(),
+      with_prefix({"--case", bone_, "--journal", (folder / (name + ".journal")).string(), "--signing-key", key(),
+                   "--address-file", address.string(), "--drain-seconds", "0"}),
+      std::move(options));
   std::optional<std::string> line;
   (void)wait_until([&] { return (line = wait_for_address(address, 1ms)) || !server.process->running(); }, kPatience);
   server.address = line.value_or("");

@@ -78,6 +78,8 @@ class BreakerStage {
   // `longer`: servers work longer before they are killed.
   explicit BreakerStage(bool longer);
 
+  // Of all servers here; not among the files that are damaged.
+  [[nodiscard]] std::string key() const { return (temp_ / "signing.key").string(); }
   [[nodiscard]] const std::string& bone() const { return bone_; }
   [[nodiscard]] std::filesystem::path new_folder() const;
   [[nodiscard]] std::filesystem::path new_name() const;  // of a file that is not there

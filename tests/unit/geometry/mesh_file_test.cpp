@@ -55,7 +55,8 @@ TEST(TriangleMesh, AnEdgeOfFourTrianglesIsClosedAndNotManifold) {
   for (const float z : {0.0f, 1.0f})
     for (const auto& [x, y] : {std::pair(2.0f, 2.0f), std::pair(1.0f, 2.0f), std::pair(2.0f, 1.0f)})
       mesh.positions_mm.push_back({x, y, z});
-  for (const auto& t : box_mesh(1, 1, 1).triangles) mesh.triangles.push_back({corner[t[0]], corner[t[1]], corner[t[2]]});
+  for (const auto& t : box_mesh(1, 1, 1).triangles)
+    mesh.triangles.push_back({corner[t[0]], corner[t[1]], corner[t[2]]});
   EXPECT_DOUBLE_EQ(enclosed_mm3(mesh), 2.0);
   EXPECT_EQ(edge_faults(mesh).open, 0u);
   EXPECT_EQ(edge_faults(mesh).non_manifold, 1u);

@@ -19,6 +19,7 @@ namespace fs = std::filesystem;
 
 using test::MemoryDisk;
 using test::plain_head;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -96,8 +97,7 @@ TEST_F(LogTest, DamageToOneOfItsFilesIsReadFromTheOther) {
     EXPECT_THAT(expect_whole(), ElementsAre(with("is damaged")));
     disk_.load(killed);
     disk_.cut(file, killed.at(file).find(rows_[56].bytes));
-    EXPECT_THAT(expect_whole(),
-                ElementsAre(std::string(file) + " ends in a write that is not whole", with("is damaged")));
+    EXPECT_THAT(expect_whole(), ElementsAre(with("was cut")));
     disk_.load(killed);
     disk_.cut(file, 0);
     EXPECT_THAT(expect_whole(), ElementsAre(with("is damaged")));
@@ -131,6 +131,42 @@ TEST_F(LogTest, ItsLossIsNamed) {
   disk_.load(killed);
   for (const char* file : {kLog, kMirror}) disk_.cut(file, 0);
   EXPECT_THAT(expect_closed(40), HasSubstr("is damaged"));
+  EXPECT_THAT(verify_journal(kFile, &disk_)->faults, Contains(HasSubstr("after place 40 cannot be told")));
+  // Behind the first sector, and where an entry ends: what is left looks like a log with fewer rows.
+  for (const std::size_t row : {40, 50}) {
+    disk_.load(killed);
+    for (const char* file : {kLog, kMirror})
+      disk_.cut(file, row == 40 ? 4096 : killed.at(file).find(rows_[row - 1].bytes) + rows_[row - 1].bytes.size() + 16);
+    EXPECT_THAT(expect_closed(row), HasSubstr("was cut"));
+    EXPECT_THAT(verify_journal(kFile, &disk_)->faults,
+                Contains(HasSubstr("after place " + std::to_string(row) + " cannot be told")));
+  }
+}
+
+TEST_F(LogTest, IsNotReadWhereItIsLongerThanAnyLog) {
+  const test::TempDir folder;
+  const fs::path file = folder / "journal";
+  ASSERT_TRUE(Journal::create(file, "bone")->append(std::span(rows_).first(5)));
+  fs::resize_file(log_of(file), std::uintmax_t{8} << 40);
+  const auto report = verify_journal(file);
+  ASSERT_TRUE(report && report->sound());
+  EXPECT_THAT(report->notes, ElementsAre(HasSubstr("journal-log is longer than any log; its rows were read from")));
+}
+
+// Their first sector said neither how long they are nor who signs.
+TEST_F(LogTest, ReadsTheFilesOfVersion3) {
+  make_killed();
+  constexpr std::size_t kEnd = 104, kChecksum = 16;
+  for (const char* file : {kLog, kMirror}) {
+    std::string bytes = disk_.image().at(file);
+    bytes.replace(0, 8, "OsteonL1");
+    Hasher hasher;
+    hasher.bytes(std::as_bytes(std::span(bytes).first(kEnd)));
+    const Digest digest = hasher.finish();
+    bytes.replace(kEnd, kChecksum, std::string(digest.bytes.begin(), digest.bytes.begin() + kChecksum));
+    disk_.put(file, bytes);
+  }
+  EXPECT_THAT(expect_whole(), IsEmpty());
 }
 
 TEST_F(LogTest, AnOlderDatabaseBesideANewerLogIsNamed) {

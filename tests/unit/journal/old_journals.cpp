@@ -24,7 +24,8 @@ std::string hex(const auto& bytes) {
 
 }  // namespace
 
-void make_old_journal(const std::filesystem::path& file, int version, const std::vector<JournalRow>& rows, RowsIn where) {
+void make_old_journal(const std::filesystem::path& file, int version, const std::vector<JournalRow>& rows,
+                      RowsIn where) {
   const bool timed = version > 1;
   sqlite3* database = nullptr;
   ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);

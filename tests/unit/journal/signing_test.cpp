@@ -149,7 +149,9 @@ class SignedJournal : public ::testing::Test {
     Journal journal =
         fs::exists(file_) ? open(keys) : std::move(Journal::create(file_, "bone", {.keys = keys}).value());
     for (std::size_t i = from; i < to; ++i) append(journal, rows_, i, i + 1);
-    if (close) ASSERT_TRUE(journal.close());
+    if (close) {
+      ASSERT_TRUE(journal.close());
+    }
   }
   Vouched vouched(const PublicKey& key) { return vouched(key, file_); }
   Vouched vouched(const PublicKey& key, const fs::path& file) {
@@ -191,7 +193,7 @@ TEST_F(SignedJournal, IsVouchedForToItsEndHoweverItsServerEnded) {
     write(keys_, 0, 20, close);
     write(keys_, 20, 45, !close);
     const Vouched found = vouched(key_);
-    EXPECT_TRUE(found.all()) << ::testing::PrintToString(found.entries_unsigned);
+    EXPECT_TRUE(found.all()) << ::testing::PrintToString(found.other_entries);
     EXPECT_THAT(text_of(found.rows), ElementsAre("1-45"));
     const Vouched by_another = vouched(SigningKey::make().public_key());
     EXPECT_THAT(by_another.rows, IsEmpty());
@@ -222,14 +224,74 @@ TEST_F(SignedJournal, NamesRowsThatAScriptAppended) {
     ASSERT_NE(journal.closed_because(), nullptr) << "it takes rows behind invented ones";
     EXPECT_THAT(journal.closed_because()->message, HasSubstr("signed the rows up to 20, but not rows 21 to 50"));
   }
-  // Taken over on purpose, they still are not vouched for.
-  ASSERT_TRUE(recover_journal(file_, folder_ / "recovered"));
-  file_ = folder_ / "recovered";
+  // Without the key nobody makes the server take them.
+  ASSERT_TRUE(recover_journal(file_, folder_ / "by a script"));
+  EXPECT_NE(std::move(Journal::open(folder_ / "by a script", {.keys = keys_}).value()).closed_because(), nullptr);
+  EXPECT_THAT(vouched(key_, folder_ / "by a script").other_entries, Contains("the register \"recovered\""));
+  // Only the signed rows.
+  ASSERT_TRUE(recover_journal(file_, folder_ / "signed", nullptr, {}, RoomSeq{20}, keys_));
+  EXPECT_TRUE(vouched(key_, folder_ / "signed").all());
+  // All rows, on purpose: they still are not vouched for.
+  ASSERT_TRUE(recover_journal(file_, folder_ / "all", nullptr, {}, {}, keys_));
+  file_ = folder_ / "all";
   write(keys_, 50, 60, true);
   const Vouched recovered = vouched(key_);
   EXPECT_THAT(text_of(recovered.rows), ElementsAre("1-20", "51-60"));
   EXPECT_THAT(text_of(recovered.by_nobody), ElementsAre("21-50"));
-  EXPECT_THAT(recovered.entries_unsigned, Contains("the register \"recovered\"")) << "nobody signed that it was";
+  EXPECT_THAT(recovered.other_entries, IsEmpty());
+}
+
+// Whoever cuts it back to an earlier signature has no footer for that place.
+TEST_F(SignedJournal, NamesAFooterThatAScriptWrote) {
+  write(keys_, 0, 20, true);
+  write(keys_, 20, 30, true);
+  run_sql("DELETE FROM rows WHERE place > 20; DELETE FROM signatures WHERE place > 20;"
+          "DELETE FROM registers WHERE name IN ('footer', 'log generation')");
+  write(nullptr, 0, 0, true);
+  EXPECT_THAT(vouched(key_).other_entries, Contains("the footer"));
+}
+
+TEST_F(SignedJournal, IsNotVouchedForWhereNothingIsSigned) {
+  ASSERT_TRUE(Journal::create(file_, "whatever")->close());
+  EXPECT_FALSE(vouched(key_).all());
+  ASSERT_TRUE(Journal::create(folder_ / "other", "whatever", {.keys = keys_})->close());
+  EXPECT_TRUE(vouched(key_, folder_ / "other").all());
+}
+
+TEST_F(SignedJournal, NamesAPersonWhoWasExchanged) {
+  write(keys_, 0, 5, false);
+  {
+    Journal journal = open(keys_);
+    ASSERT_TRUE(journal.set_person({"1", "Anna", 20000}) && journal.set_person({"2", "Berta", 20000}) &&
+                journal.close());
+  }
+  EXPECT_TRUE(vouched(key_).all());
+  run_sql("UPDATE people SET label = 'Berta' WHERE pseudonym = '1'");
+  EXPECT_THAT(verify_journal(file_)->faults, Contains(HasSubstr("an entry of its people is damaged")));
+  run_sql("UPDATE people SET label = 'Anna' WHERE pseudonym = '1'");
+  ASSERT_TRUE(open(nullptr).set_person({"1", "Berta", 20000}));
+  EXPECT_THAT(vouched(key_).other_entries, ElementsAre("the name of person 1"));
+}
+
+// A signature of the attacker's own key, for rows that there are not.
+TEST_F(SignedJournal, IsRecoveredWithoutSignaturesThatDoNotFit) {
+  write(keys_, 0, 20, true);
+  const SigningKey theirs = SigningKey::make();
+  const SignedRows bogus = sign_rows(theirs, RoomSeq{1}, {RoomSeq{10}, Digest{}});
+  const auto hex = [](const auto& bytes) {
+    std::string text;
+    for (const std::uint8_t byte : bytes) {
+      char digits[3];
+      std::snprintf(digits, sizeof digits, "%02x", byte);
+      text += digits;
+    }
+    return "x'" + text + "'";
+  };
+  run_sql("INSERT INTO signatures VALUES(10, 1, " + hex(bogus.head.chain.bytes) + ", " + hex(bogus.key.bytes) + ", " +
+          hex(bogus.signature.bytes) + ")");
+  EXPECT_FALSE(verify_journal(file_)->sound());
+  ASSERT_TRUE(recover_journal(file_, folder_ / "recovered", nullptr, {}, {}, keys_));
+  EXPECT_TRUE(vouched(key_, folder_ / "recovered").all());
 }
 
 TEST_F(SignedJournal, NamesRowsThatAnotherKeySigned) {
@@ -264,10 +326,35 @@ TEST_F(SignedJournal, KeepsItsSignaturesInABackup) {
     ASSERT_TRUE(journal.set_register("room name", "hip"));
     append(journal, rows_, 20, 30);
   }
-  ASSERT_TRUE(backup_journal(file_, folder_ / "backup"));
+  ASSERT_TRUE(backup_journal(file_, folder_ / "without key"));
+  EXPECT_THAT(vouched(key_, folder_ / "without key").other_entries, ElementsAre("the footer"));
+  ASSERT_TRUE(backup_journal(file_, folder_ / "backup", nullptr, keys_));
   const Vouched found = vouched(key_, folder_ / "backup");
-  EXPECT_TRUE(found.all()) << ::testing::PrintToString(found.entries_unsigned);
+  EXPECT_TRUE(found.all()) << ::testing::PrintToString(found.other_entries);
   EXPECT_THAT(text_of(found.rows), ElementsAre("1-30"));
+}
+
+TEST_F(SignedJournal, KeepsItsSignaturesInACopyThatItsServerMakes) {
+  write(keys_, 0, 20, false);
+  Journal journal = open(keys_);
+  append(journal, rows_, 20, 30);
+  auto copy = JournalCopy::begin(journal, folder_ / "copy");
+  ASSERT_TRUE(copy);
+  while (!copy->step().value()) {}
+  const Vouched found = vouched(key_, folder_ / "copy");
+  EXPECT_TRUE(found.all()) << ::testing::PrintToString(found.other_entries);
+  EXPECT_THAT(text_of(found.rows), ElementsAre("1-30"));
+}
+
+// A branch would turn rows of nobody into rows of the server.
+TEST_F(SignedJournal, SignsNoBranchOfRowsThatItFound) {
+  write(nullptr, 0, 20, true);
+  Journal journal = open(keys_);
+  append(journal, rows_, 20, 30);
+  auto copy = JournalCopy::begin_branch(journal, folder_ / "branch", RoomSeq{30}, "another bone", {});
+  ASSERT_TRUE(copy);
+  while (!copy->step().value()) {}
+  EXPECT_THAT(text_of(vouched(key_, folder_ / "branch").by_nobody), ElementsAre("1-30"));
 }
 
 TEST_F(SignedJournal, SignsABranchThatItsServerMakes) {
@@ -314,9 +401,13 @@ TEST_F(SignedJournal, VouchesForItsRegistersAndCheckpoints) {
     auto file = journal.begin_checkpoint(journal.head(), "meta");
     ASSERT_TRUE(file && file->finish() && journal.add_checkpoint(std::move(*file)));
   }
-  EXPECT_FALSE(open(keys_).is_vouched_for("room name").value());
+  {
+    Journal journal = open(keys_);
+    EXPECT_FALSE(journal.is_vouched_for("room name").value());
+    EXPECT_FALSE(journal.is_vouched_for(journal.checkpoints()->front())) << "whose bone the server would serve";
+  }
   EXPECT_FALSE(open(new_keys()).is_vouched_for("room name").value());
-  EXPECT_THAT(vouched(key_).entries_unsigned, ElementsAre("the checkpoint at place 20", "the register \"room name\""));
+  EXPECT_THAT(vouched(key_).other_entries, ElementsAre("the checkpoint at place 20", "the register \"room name\""));
 }
 
 // Of another genesis, a register's signature is none.
