@@ -292,6 +292,25 @@ TEST_F(KeeperTest, AVerifyFindsCheckpointsThatWereSpoiledOrMadeOfAnotherBone) {
   EXPECT_EQ(files_of("/else/"), 0u);
 }
 
+// Nobody makes the bone of a checkpoint again before it is served.
+TEST_F(KeeperTest, ServesTheBoneOfNoCheckpointThatItsKeyDidNotSign) {
+  KeptCuts kept(kFile, &disk_, "femur");
+  const auto reopen = [&](const std::shared_ptr<const SigningKeys>& keys) {
+    ASSERT_TRUE(kept.keeper->close());
+    kept.keeper.reset();
+    kept.options.journal.keys = keys;
+    kept.open(kFile);
+  };
+  const std::vector<FieldLeaf> uncut = kept.room->all_leaves();
+  kept.cut(10);
+  const Digest cut = kept.room->field_hash();
+  ASSERT_TRUE(kept.keeper->checkpoint(kept.room->room_seq(), uncut));
+  reopen(nullptr);
+  ASSERT_NE(kept.room->field_hash(), cut) << "without a key it is taken for the server's";
+  reopen(std::make_shared<const SigningKeys>(SigningKey::make()));
+  EXPECT_EQ(kept.room->field_hash(), cut);
+}
+
 // On the disk, under a journal that is open: beyond what SQLite still has in memory.
 TEST_F(KeeperTest, DamageUnderAnOpenJournalIsFound) {
   KeptCuts kept(kFile, &disk_, "femur");
