@@ -298,6 +298,13 @@ std::vector<Motion> motions() {
 }
 
 // Everything that is passed over without being evaluated (sweeps, leaves, edges, planes, rows) must not matter.
+// A kernel without optimisation takes ten times as long for each leaf. The optimised builds look at all of them.
+#ifdef OSTEON_KERNEL_IS_SLOW
+constexpr std::int32_t kEveryLeaf = 5;
+#else
+constexpr std::int32_t kEveryLeaf = 1;
+#endif
+
 TEST(Kernel, WhatIsPassedOverChangesNothing) {
   for (const Motion& motion : motions()) {
     const SweptTool swept(cut_along(motion.path), motion.body, kPitch);
@@ -309,6 +316,7 @@ TEST(Kernel, WhatIsPassedOverChangesNothing) {
     for (std::int32_t x = -8; x < 8; ++x)
       for (std::int32_t y = -8; y < 8; ++y)
         for (std::int32_t z = -8; z < 8; ++z) {
+          if ((x + 3 * y + 9 * z + 104) % kEveryLeaf != 0) continue;
           const Coord origin{8 * x, 8 * y, 8 * z};
           std::array<float, kLeafVoxels> values, after_others;
           values.fill(band);

@@ -20,7 +20,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr int kKills = 100, kDamages = 200;
+constexpr int kKills = 100, kDamages = 80;
 constexpr int kKillsPerJournal = 20;
 
 // The place in the last whole line of what it printed.
