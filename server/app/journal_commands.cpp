@@ -38,7 +38,7 @@ struct Arguments {
   fs::path signing_key;
   std::uint64_t at = 0;
   std::uint32_t person = 0;
-  int days = 0;
+  std::optional<int> days;
   bool branches = false, alone = false;
 };
 
@@ -112,7 +112,7 @@ class NewFile {
   static Result<NewFile> begin(const fs::path& file) {
     NewFile made(file);
     if (made.is_taken()) return made.taken();
-    const int fd = ::open(made.partial_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+    const int fd = ::open(made.partial_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (fd < 0 && errno == EEXIST)
       return failure(ErrorCode::exists, "there is " + made.partial_.string() + ", which an export that was cut short may have "
                                             "left; remove it, or give another name than " + file.string());
@@ -396,14 +396,14 @@ Result<void> list_people(const Arguments& given) {
 }
 
 Result<void> forget(const Arguments& given) {
-  if ((given.person == 0) == (given.days == 0))
+  if ((given.person == 0) == !given.days)
     return failure(ErrorCode::invalid_input, "forget needs either --person NUMBER, as \"people\" lists it, or --older-than DAYS");
   const auto today = std::chrono::duration_cast<std::chrono::days>(std::chrono::system_clock::now().time_since_epoch());
   return change_journal(given, [&](Journal& journal) -> Result<void> {
     // Also where nobody was to be forgotten: a name may be in what cannot be read.
     if (const Error* closed = journal.closed_because()) return tl::unexpected(*closed);
     const Result<std::size_t> forgotten =
-        given.person == 0 ? journal.forget_people_before(static_cast<std::int32_t>(today.count()) - given.days)
+        given.person == 0 ? journal.forget_people_before(static_cast<std::int32_t>(today.count()) - *given.days)
                           : journal.forget_person(std::to_string(given.person));
     if (!forgotten) return tl::unexpected(forgotten.error());
     if (given.person != 0 && *forgotten == 0)
@@ -471,7 +471,7 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
   command("people", "Lists the people whose numbers the events have", list_people);
   CLI::App* gone = command("forget", "Forgets who people were; what they did stays", forget);
   gone->add_option("--person", given->person, "Number of one, as \"people\" lists it");
-  gone->add_option("--older-than", given->days, "All who came more than so many days ago");
+  gone->add_option("--older-than", given->days, "All who came more than so many days ago; 0: all who came before today");
   signs(gone);
   CLI::App* renamed =
       command("rename-room", "Gives a room another name, which its file must have to be served", rename_room);

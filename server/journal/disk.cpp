@@ -141,13 +141,13 @@ Result<bool> keeps_others_out(const fs::path& file) {
 class SystemDisk final : public Disk {
  public:
   Result<std::unique_ptr<DiskFile>> create(const fs::path& file) override {
-    const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
     if (fd < 0) return cannot_make("create", file, errno);
     return std::make_unique<SystemFile>(file, fd);
   }
 
   Result<std::unique_ptr<DiskFile>> open(const fs::path& file) override {
-    const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
+    const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
     if (fd < 0) return cannot_make("open", file, errno);
     auto opened = std::make_unique<SystemFile>(file, fd);
     if (::lseek(fd, 0, SEEK_END) < 0) return cannot("open", file, errno);  // where write() goes on

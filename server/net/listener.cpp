@@ -11,6 +11,7 @@
 
 #include <cerrno>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <system_error>
 
@@ -143,26 +144,36 @@ void Listener::accept_from(int listening) {
     }
     const auto inode = inode_of(descriptor);
     // Only when it matters is looked which of the others are still there.
-    if (!inode || (taken_.size() >= most_ && still_open() >= most_)) {
+    if (!inode || is_full()) {
       ++refused_;
       ::close(descriptor);
       continue;
     }
     const int yes = 1;
     ::setsockopt(descriptor, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
-    taken_.emplace(descriptor, *inode);
-    open_ = taken_.size();
+    {
+      const std::lock_guard lock(mutex_);
+      taken_.emplace(descriptor, *inode);
+    }
     ++accepted_;
     take_(listening, descriptor);
   }
 }
 
-std::size_t Listener::still_open() {
+std::size_t Listener::still_open() const {
+  const std::lock_guard lock(mutex_);
   std::erase_if(taken_, [](const auto& connection) { return inode_of(connection.first) != connection.second; });
-  open_ = taken_.size();
   return taken_.size();
 }
 
-ListenerCounts Listener::counts() const { return {open_, accepted_, refused_, failed_}; }
+bool Listener::is_full() const {
+  {
+    const std::lock_guard lock(mutex_);
+    if (taken_.size() < most_) return false;
+  }
+  return still_open() >= most_;
+}
+
+ListenerCounts Listener::counts() const { return {still_open(), accepted_, refused_, failed_}; }
 
 }  // namespace osteon

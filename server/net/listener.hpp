@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <set>
 #include <string>
 #include <thread>
@@ -17,7 +18,7 @@
 namespace osteon {
 
 struct ListenerCounts {
-  std::size_t open = 0;                      // connections, as far as was looked
+  std::size_t open = 0;                      // connections now
   std::uint64_t accepted = 0, refused = 0;   // beyond the limit: closed at once
   std::uint64_t failed = 0;                  // accept() could not, as without descriptors
 };
@@ -38,13 +39,14 @@ class Listener {
   // From now on `take(listening, descriptor)` is called with every connection, which it owns; on a thread of the listener's own.
   void start(std::function<void(int listening, int descriptor)> take);
   void stop();  // accepts no more; once
-  [[nodiscard]] ListenerCounts counts() const;
+  [[nodiscard]] ListenerCounts counts() const;  // any thread
 
  private:
   explicit Listener(std::size_t most) : most_(most) {}
   void run();
   void accept_from(int listening);
-  [[nodiscard]] std::size_t still_open();
+  [[nodiscard]] bool is_full() const;
+  [[nodiscard]] std::size_t still_open() const;
 
   const std::size_t most_;
   std::vector<int> sockets_;
@@ -52,9 +54,9 @@ class Listener {
   int port_ = 0;
   std::string address_;
   std::function<void(int, int)> take_;
-  // [thread] Connections handed on: descriptor and inode, by which one that was closed is told from another with its number.
-  std::set<std::pair<int, std::uint64_t>> taken_;
-  std::atomic<std::size_t> open_ = 0;
+  // Connections handed on: descriptor and inode, by which one that was closed is told from another with its number.
+  mutable std::mutex mutex_;
+  mutable std::set<std::pair<int, std::uint64_t>> taken_;  // under mutex_
   std::atomic<std::uint64_t> accepted_ = 0, refused_ = 0, failed_ = 0;
   std::thread thread_;
 };

@@ -149,7 +149,8 @@ TEST(Ticket, IsRefusedWhenItsSignedContentsMakeNoSense) {
 }
 
 TEST(Ticket, SaysWhatIsWrongInOneSentence) {
-  for (const char* text : {"", "nonsense", "osteon1.", "osteon1.AAAA", "osteon1.AAAA.AAAA", "osteon2.AAAA.AAAA"}) {
+  for (const char* text : {"", "nonsense", "osteon1.", "osteon1.AAAA", "osteon1.AAAA.AAAA", "osteon2.AAAA.AAAA",
+                           "osteon1.aAeon1.", "osteon1..AAAA", "osteon1.."}) {
     const Result<Ticket> ticket = open_ticket(text, check_key());
     ASSERT_FALSE(ticket);
     EXPECT_EQ(ticket.error().code, ErrorCode::invalid_input);

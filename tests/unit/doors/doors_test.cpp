@@ -617,6 +617,8 @@ TEST_F(DoorsAtWork, RefuseFurtherConnectionsAndLetThemInAgain) {
   EXPECT_LE(server_->door_health().connections.open, kMostConnections);
   expect_undisturbed();
   strangers.clear();
+  EXPECT_TRUE(test::wait_until([&] { return server_->door_health().connections.open <= before.open; }, test::kPatience))
+      << "connections that are gone are counted";
   EXPECT_TRUE(test::wait_until([&] { return refusal(people_.door("ben", Role::observer, "ward")).empty(); }, test::kPatience));
 }
 

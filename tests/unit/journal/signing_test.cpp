@@ -128,6 +128,27 @@ TEST(SigningKeyFile, KeepsTheLineOfItsKeys) {
   EXPECT_EQ(keys_of_line(first, (*third)->successions()).size(), 3u);
 }
 
+// What people did is nobody else's, whatever the umask.
+TEST(JournalFiles, AreForTheirOwnerAlone) {
+  const test::TempDir folder;
+  const auto before = ::umask(0);
+  {
+    Journal journal = std::move(Journal::create(folder / "journal", "bone").value());
+    append(journal, some_rows(1, 5), 0, 5);
+    auto file = journal.begin_checkpoint(journal.head(), "meta");
+    EXPECT_TRUE(file && file->finish() && journal.add_checkpoint(std::move(*file)));
+    EXPECT_TRUE(load_or_make_signing_keys(folder / "signing.key"));
+  }
+  EXPECT_TRUE(backup_journal(folder / "journal", folder / "backup"));
+  ::umask(before);
+  int files = 0;
+  for (const auto& entry : fs::directory_iterator(folder.path())) {
+    EXPECT_EQ(mode_of(entry.path()), 0600u) << entry.path();
+    ++files;
+  }
+  EXPECT_EQ(files, 8) << "journal, log, mirror, write-ahead log, checkpoint, key, backup and its checkpoint";
+}
+
 // Whoever makes a key of their own before or after another's has only one of the two signatures.
 TEST(Succession, NeedsBothItsKeys) {
   const SigningKey ours = SigningKey::make(), theirs = SigningKey::make();

@@ -174,6 +174,9 @@ TEST_F(JournalCommands, NobodyIsForgottenWhomNobodyKnows) {
   EXPECT_THAT(server("people", {}).out, Not(HasSubstr("Anna")));
   refused("forget", {"--person", "1"}, {"has the number 1"});
   done("forget", {"--older-than", "1"});
+  done("forget", {"--older-than", "0"});  // all who came before today: nobody here
+  refused("forget", {}, {"either --person", "or --older-than"});
+  refused("forget", {"--person", "2", "--older-than", "0"}, {"either --person", "or --older-than"});
 }
 
 TEST_F(JournalCommands, ASecondBackupNamesTheFirst) {
