@@ -7,7 +7,6 @@ namespace osteon {
 namespace {
 
 constexpr RoleSet kInRoom{Role::observer, Role::trainee, Role::collaborator, Role::instructor};
-constexpr RoleSet kEverybody{Role::observer, Role::trainee, Role::collaborator, Role::instructor, Role::operator_};
 constexpr RoleSet kHands{Role::trainee, Role::collaborator, Role::instructor};
 constexpr RoleSet kPartners{Role::collaborator, Role::instructor};
 constexpr RoleSet kInstructor{Role::instructor};
@@ -50,8 +49,6 @@ constexpr std::array kCalls{
     CallRow{"/osteon.v1.RoomsService/ReplayRoom", kOversight},
     CallRow{"/osteon.v1.CaseService/UploadCase", kOperator},
     CallRow{"/osteon.v1.CaseService/ListCases", kOversight},
-    // How the server and its rooms fare. Its Watch is a stream that nobody could end again: it is not offered.
-    CallRow{"/grpc.health.v1.Health/Check", kEverybody},
 };
 
 // In the order of the enumerations.

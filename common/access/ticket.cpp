@@ -86,8 +86,8 @@ std::optional<Ticket> parse_contents(std::span<const std::uint8_t> bytes) {
 }
 
 Bytes signed_bytes(std::span<const std::uint8_t> contents) {
-  Bytes all(kPurpose.begin(), kPurpose.end());
-  all.insert(all.end(), contents.begin(), contents.end());
+  Bytes all(kPurpose.size() + contents.size());
+  std::ranges::copy(contents, std::ranges::copy(kPurpose, all.begin()).out);
   return all;
 }
 

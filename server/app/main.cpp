@@ -277,7 +277,9 @@ Result<void> run(const ServerConfig& options, const StopSignal& stop) {
     std::error_code ignored;
     std::filesystem::remove(options.address_file, ignored);
   }
-  const DoorOptions doors{.certificates = options.certificates, .most_connections = static_cast<std::size_t>(options.most_connections)};
+  const DoorOptions doors{.certificates = options.certificates,
+                          .most_connections = static_cast<std::size_t>(options.most_connections),
+                          .proxy_socket = options.proxy_socket};
   if (Result<void> usable = RoomServer::check_listen(options.listen, doors); !usable) return usable;
   if (Result<void> usable = check_writable(options.save_file, "the fields", "--save"); !usable) return usable;
   Result<std::unique_ptr<Rooms>> rooms = open_rooms(options);
@@ -343,6 +345,8 @@ int main(int argc, char** argv) {
   app.add_option("--listen", options.listen, "HOST:PORT on this machine; port 0 lets the system choose")->capture_default_str();
   app.add_option("--certificates", options.certificates,
                  "Folder with ca.pem, server.pem, server.key and tickets.pub, as deploy/certs makes it: clients come with a certificate and a ticket");
+  app.add_option("--proxy-socket", options.proxy_socket,
+                 "Unix socket at which a proxy on this machine brings calls; deploy/front-proxy.md");
   app.add_flag("--plain", options.plain, "Plain text, without certificates and tickets, for clients on this machine alone");
   app.add_option("--most-connections", options.most_connections, "Of everybody together; further ones are closed at once")
       ->check(CLI::Range(1, 65535))

@@ -122,6 +122,7 @@ const std::vector<Field>& fields() {
       {"most_rooms", [](const Value& v, Config& c) { c.most_rooms = whole(v, 1, 65536); }},
       {"mount", [](const Value& v, Config& c) { c.mount = yes_or_no(v); }},
       {"plain", [](const Value& v, Config& c) { c.plain = yes_or_no(v); }},
+      {"proxy_socket", [](const Value& v, Config& c) { c.proxy_socket = path(v); }},
       {"resume", [](const Value& v, Config& c) { c.resume_file = path(v); }},
       {"retention_days", [](const Value& v, Config& c) { c.retention_days = whole(v, 1, 36500); }},
       {"rooms", [](const Value& v, Config& c) { c.rooms_folder = path(v); }},
@@ -257,6 +258,8 @@ Result<void> check_server_config(const ServerConfig& config) {
     return wrong("--signing-key signs journals, and none is kept; give --rooms FOLDER or --journal FILE too");
   if (ways[0].second && !config.save_file.empty())
     return wrong("--rooms excludes --save, on the command line as in a --config file; leave one");
+  if (config.plain && !config.proxy_socket.empty())
+    return wrong("--proxy-socket needs --certificates DIR: a proxy brings calls of people");
   if (config.plain == !config.certificates.empty())
     return wrong(config.plain ? "--plain excludes --certificates, on the command line as in a --config file; leave one"
                               : "say how clients come in: --certificates DIR, which deploy/certs makes, or --plain for plain text on this machine alone");

@@ -23,6 +23,7 @@ struct ServerConfig {
   std::vector<std::filesystem::path> case_folders;
   std::string listen = "127.0.0.1:0";   // HOST:PORT
   std::filesystem::path certificates;   // folder, as Gate::open has it
+  std::filesystem::path proxy_socket;   // Unix socket for a proxy of this machine; empty: none
   bool plain = false;                   // without: plain text, on this machine alone
   int most_connections = 512;           // of everybody together
   int most_rooms = kMostRooms;          // open and closed ones together

@@ -1,36 +1,109 @@
 // Which room a call is to. For the sources of the services alone: gRPC stays out of headers.
 #include <grpcpp/grpcpp.h>
 
+#include <algorithm>
+#include <array>
 #include <functional>
+#include <iterator>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 
+#include "common/access/role_table.hpp"
+#include "common/core/check.hpp"
 #include "server/net/gate.hpp"
 #include "server/net/out_stream.inl"
+#include "server/net/peer_claims.hpp"
+#include "server/net/refused_calls.hpp"
 #include "server/net/rooms.hpp"
 
 namespace osteon {
 
-inline std::string metadata_of(const grpc::CallbackServerContext& context, const char* key) {
-  const auto named = context.client_metadata().find(key);
-  return named == context.client_metadata().end() ? std::string() : std::string(named->second.data(), named->second.size());
+// A header that comes once or not at all; nothing where it came twice: two readers might take different ones.
+inline std::optional<std::string> metadata_of(const grpc::CallbackServerContext& context, const char* key) {
+  const auto [first, last] = context.client_metadata().equal_range(key);
+  if (first == last) return std::string();
+  if (std::next(first) != last) return {};
+  return std::string(first->second.data(), first->second.size());
+}
+
+// The headers that a call may have beside those of HTTP/2 and gRPC, which gRPC keeps to itself.
+inline bool is_known_header(std::string_view name, bool by_proxy) {
+  static constexpr std::array<std::string_view, 6> kKnown{"osteon-ticket",        "osteon-room-bin", "user-agent",
+                                                          "grpc-accept-encoding", "accept-encoding", "grpc-trace-bin"};
+  if (by_proxy && (name == kCertificateHeader || name == kAddressHeader)) return true;
+  return std::ranges::find(kKnown, name) != kKnown.end();
 }
 
 inline tl::expected<Caller, Refusal> judged(Gate& gate, const grpc::CallbackServerContext& context, const std::string& room,
                                             std::string_view method) {
-  const auto pem = context.auth_context()->FindPropertyValues(GRPC_X509_PEM_CERT_PROPERTY_NAME);
-  const std::string ticket = metadata_of(context, "osteon-ticket");
-  const std::string_view certificate = pem.empty() ? std::string_view() : std::string_view(pem[0].data(), pem[0].size());
-  return gate.judge({.certificate_pem = certificate, .ticket = ticket, .room = room, .method = method});
+  const PeerClaims peer = peer_claims(context);
+  const std::string ticket = metadata_of(context, "osteon-ticket").value_or("");
+  return gate.judge({.peer = peer, .ticket = ticket, .room = room, .method = method});
+}
+
+// Authorizes a call at its beginning: certificate, ticket, role, headers and how often. Null: it may go on. The one
+// place where calls are counted as admitted or refused; every handler begins with it.
+inline std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServerContext& context,
+                                        std::string_view method) {
+  if (!rooms.gate) return {};
+  const PeerClaims peer = peer_claims(context);
+  // Tells programs the reason, and refused_call_notes() that it was noted.
+  const auto tell = [&](std::string_view reason) {
+    context.AddTrailingMetadata(kRefusalTrailer, std::string(reason));
+  };
+  const auto wrong = [&](std::string sentence) {
+    tell("request");
+    rooms.gate->note_refused("request", sentence, peer.address);
+    return Status(StatusCode::INVALID_ARGUMENT, short_words(std::move(sentence)));
+  };
+  for (const auto& [key, value] : context.client_metadata())
+    if (!is_known_header({key.data(), key.size()}, peer.by_proxy))
+      return wrong("the call has a header that this server does not know; leave out " + std::string(key.data(), key.size()));
+  const std::optional<std::string> room = metadata_of(context, "osteon-room-bin"),
+                                   ticket = metadata_of(context, "osteon-ticket");
+  if (!room || !ticket) return wrong("the call says twice which ticket or room is meant");
+  const auto caller = rooms.gate->admit({.peer = peer, .ticket = *ticket, .room = *room, .method = method});
+  if (caller) return {};
+  tell(caller.error().reason);
+  return status_of(caller.error());
+}
+
+// The call that a request is of: of v1::UndoRequest "/osteon.v1.RoomService/Undo". The names of requests follow those
+// of their calls, and a test holds the protocol to it.
+template <class Request>
+std::string_view method_of() {
+  static const CallRow* const row = [] {
+    const std::string_view request = Request::descriptor()->name();
+    const std::string end = "/" + std::string(request.substr(0, request.size() - std::string_view("Request").size()));
+    const auto found = std::ranges::find_if(call_rows(), [&](const CallRow& one) { return one.method.ends_with(end); });
+    OSTEON_CHECK(found != call_rows().end());
+    return &*found;
+  }();
+  return row->method;
+}
+
+// The same for the call of that request.
+template <class Request>
+std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServerContext& context) {
+  return refusal_of(rooms, context, method_of<Request>());
+}
+
+// The same of a call that has one answer. False: it was answered with the refusal.
+template <class Request>
+bool admitted(const Rooms& rooms, grpc::CallbackServerContext& context, grpc::ServerUnaryReactor* reactor) {
+  std::optional<Status> refusal = refusal_of<Request>(rooms, context);
+  if (refusal) reactor->Finish(std::move(*refusal));
+  return !refusal;
 }
 
 // Who calls. Over plain text nobody says so: `user` is empty then, and the caller may do anything. Error denied: the caller's
 // right has ended since the call was let in.
 inline Result<Caller> caller_of(const Rooms& rooms, const grpc::CallbackServerContext& context) {
   if (!rooms.gate) return Caller{};
-  auto caller = judged(*rooms.gate, context, metadata_of(context, "osteon-room-bin"), {});
+  auto caller = judged(*rooms.gate, context, metadata_of(context, "osteon-room-bin").value_or(""), {});
   if (!caller) return failure(ErrorCode::denied, caller.error().sentence);
   return std::move(*caller);
 }
@@ -49,7 +122,7 @@ inline Result<Caller> caller_in(const Rooms& rooms, const grpc::CallbackServerCo
 inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const grpc::CallbackServerContext& context) {
   const Result<Caller> caller = caller_of(rooms, context);
   if (!caller) return tl::unexpected(caller.error());
-  std::string named = metadata_of(context, "osteon-room-bin");
+  std::string named = metadata_of(context, "osteon-room-bin").value_or("");
   if (named.empty() && caller->ticket_room != kAnyRoom) named = caller->ticket_room;
   return rooms.find(named);
 }

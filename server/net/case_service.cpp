@@ -54,6 +54,13 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
     return stream.get();
   }
 
+  // A stream that only ends.
+  static UploadStream* refuse(const std::shared_ptr<UploadStream>& stream, Status why) {
+    stream->self_ = stream;
+    stream->end(std::move(why));
+    return stream.get();
+  }
+
   void OnReadDone(bool ok) override {
     std::unique_lock lock(mutex_);
     if (finished_ || !upload_) return;
@@ -182,11 +189,15 @@ class CaseServiceImpl final : public v1::CaseService::CallbackService {
 
   grpc::ServerReadReactor<v1::UploadCaseRequest>* UploadCase(grpc::CallbackServerContext* context,
                                                              v1::UploadCaseResponse* response) override {
-    return UploadStream::launch(std::make_shared<UploadStream>(rooms_, response), caller_of(rooms_, *context));
+    auto stream = std::make_shared<UploadStream>(rooms_, response);  // see launch()
+    if (auto why = refusal_of<v1::UploadCaseRequest>(rooms_, *context))
+      return UploadStream::refuse(stream, std::move(*why));
+    return UploadStream::launch(stream, caller_of(rooms_, *context));
   }
   grpc::ServerUnaryReactor* ListCases(grpc::CallbackServerContext* context, const v1::ListCasesRequest*,
                                       v1::ListCasesResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::ListCasesRequest>(rooms_, *context, reactor)) return reactor;
     rooms_.files.run([this, reactor, response] {
       for (const KnownCase& one : rooms_.cases()) *response->add_cases() = to_wire(one.hash, one.title, bytes_of(one.folder));
       reactor->Finish(Status::OK);

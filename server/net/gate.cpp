@@ -1,9 +1,9 @@
 #include "server/net/gate.hpp"
 
 #include <grpcpp/grpcpp.h>
-#include <grpcpp/security/auth_metadata_processor.h>
 #include <grpcpp/security/server_credentials.h>
 #include <grpcpp/security/tls_certificate_provider.h>
+#include <grpcpp/security/tls_certificate_verifier.h>
 #include <grpcpp/security/tls_credentials_options.h>
 
 #include <algorithm>
@@ -19,7 +19,6 @@ namespace {
 
 constexpr std::size_t kMostRemembered = 4096;  // certificates, and tickets
 constexpr unsigned kCertificatesEverySeconds = 1;
-constexpr std::string_view kTooOften = "rate";
 
 UnixTime system_now() { return std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now()); }
 
@@ -48,36 +47,24 @@ void make_space(Map& map) {
   if (map.size() >= kMostRemembered) map.clear();
 }
 
-// What comes once or not at all; nothing where it came twice: two readers might take different ones.
-std::optional<std::string_view> only(const grpc::AuthMetadataProcessor::InputMetadata& metadata, const char* key) {
-  const auto [first, last] = metadata.equal_range(key);
-  if (first == last) return std::string_view();
-  if (std::next(first) != last) return {};
-  return std::string_view(first->second.data(), first->second.size());
-}
-
-// gRPC asks it before every call, known or not, and before anything of the call's message is read.
-class Doorkeeper final : public grpc::AuthMetadataProcessor {
+// gRPC asks it once in every handshake, after the client has shown that it holds the key of its certificate. gRPC
+// itself accepts any certificate there: it says of none why it was refused, and knows no revocation that begins at
+// once.
+class HandshakeCheck final : public grpc::experimental::ExternalCertificateVerifier {
  public:
-  explicit Doorkeeper(Gate& gate) : gate_(gate) {}
-  bool IsBlocking() const override { return false; }
-  grpc::Status Process(const InputMetadata& metadata, grpc::AuthContext* context, OutputMetadata*, OutputMetadata*) override {
-    const auto pem = context->FindPropertyValues(GRPC_X509_PEM_CERT_PROPERTY_NAME);
-    const auto ticket = only(metadata, "osteon-ticket"), room = only(metadata, "osteon-room-bin"), path = only(metadata, ":path");
-    if (pem.size() != 1) return refused(grpc::StatusCode::UNAUTHENTICATED, "certificate", "no certificate came with the connection; give one with --certificates");
-    if (!ticket || !room || !path || path->empty())
-      return refused(grpc::StatusCode::INVALID_ARGUMENT, "request", "the call says twice which ticket or room is meant");
-    const auto caller = gate_.admit({{pem[0].data(), pem[0].size()}, *ticket, *room, *path});
-    if (caller) return grpc::Status::OK;
-    if (caller.error().reason == kTooOften) return {grpc::StatusCode::RESOURCE_EXHAUSTED, caller.error().sentence};
-    return {caller.error().is_known ? grpc::StatusCode::PERMISSION_DENIED : grpc::StatusCode::UNAUTHENTICATED, caller.error().sentence};
+  explicit HandshakeCheck(Gate& gate) : gate_(gate) {}
+  bool Verify(grpc::experimental::TlsCustomVerificationCheckRequest* request, std::function<void(grpc::Status)>,
+              grpc::Status* at_once) override {
+    // At a server OpenSSL has the client's own certificate apart from the others of its chain.
+    const grpc::string_ref own = request->peer_cert(), others = request->peer_cert_full_chain();
+    const std::string chain = std::string(own.data(), own.size()) + std::string(others.data(), others.size());
+    const std::optional<Refusal> why = gate_.judge_handshake(chain);
+    if (why) *at_once = {grpc::StatusCode::UNAUTHENTICATED, why->sentence};
+    return true;
   }
+  void Cancel(grpc::experimental::TlsCustomVerificationCheckRequest*) override {}
 
  private:
-  grpc::Status refused(grpc::StatusCode code, const char* reason, const char* sentence) {
-    gate_.note_refused(reason, sentence);
-    return {code, sentence};
-  }
   Gate& gate_;
 };
 
@@ -139,6 +126,7 @@ Result<std::unique_ptr<Gate>> Gate::open(const std::filesystem::path& folder, Re
   // A list that is wrong at the start would let in whom it is to keep out.
   if (const Result<bool> read = gate->access_.refresh(); !read) return tl::unexpected(read.error());
   gate->access_list_ = gate->access_.list();
+  if (const Result<bool> read = gate->read_authorities(); !read) return tl::unexpected(read.error());
   gate->thread_ = std::thread([raw = gate.get()] { raw->run(); });
   return gate;
 }
@@ -150,10 +138,40 @@ std::shared_ptr<grpc::ServerCredentials> Gate::credentials() {
   grpc::experimental::TlsServerCredentialsOptions options(files);
   options.watch_root_certs();
   options.watch_identity_key_cert_pairs();
-  options.set_cert_request_type(GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY);
-  auto credentials = grpc::experimental::TlsServerCredentials(options);
-  credentials->SetAuthMetadataProcessor(std::make_shared<Doorkeeper>(*this));  // shared with gRPC
-  return credentials;
+  // HandshakeCheck verifies the whole chain.
+  options.set_cert_request_type(GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_BUT_DONT_VERIFY);
+  options.set_certificate_verifier(grpc::experimental::ExternalCertificateVerifier::Create<HandshakeCheck>(*this));
+  return grpc::experimental::TlsServerCredentials(options);
+}
+
+std::optional<Refusal> Gate::judge_handshake(std::string_view chain_pem) {
+  std::shared_ptr<const Authorities> authorities;
+  {
+    const std::lock_guard lock(mutex_);
+    authorities = authorities_;
+  }
+  std::optional<Refusal> refusal;
+  const auto chain = check_client_chain(chain_pem, *authorities, now_());
+  const Result<PersonCertificate> certificate = read_person_certificate(chain_pem);
+  if (!chain) {
+    const bool is_revoked = chain.error().fault == ChainFault::revoked;
+    refusal = Refusal{is_revoked ? "revoked" : "certificate", false, chain.error().sentence};
+  } else if (!certificate) {
+    refusal = Refusal{"certificate", false, certificate.error().message};
+  } else {
+    const std::lock_guard lock(mutex_);
+    if (const auto why = revoked(certificate->serial, certificate->user, {}))
+      refusal = Refusal{"revoked", false, *why};
+    else if (is_paused(certificate->user))
+      refusal = Refusal{"flood", true, "too many calls came from you; wait ten seconds"};
+  }
+  if (!refusal) return {};
+  // The name in a chain that does not hold is only what somebody says.
+  std::string who =
+      certificate ? certificate->user + ", certificate " + certificate->serial : "a certificate without a name";
+  if (!chain && certificate) who = "a stranger who says to be " + who;
+  refusals_.note(refusal->reason, who, refusal->sentence, connections_ ? some_addresses(*connections_) : "");
+  return refusal;
 }
 
 Result<PersonCertificate> Gate::certificate_of(std::string_view pem) {
@@ -162,6 +180,17 @@ Result<PersonCertificate> Gate::certificate_of(std::string_view pem) {
   if (!read) return read;
   make_space(certificates_);
   return certificates_.emplace(pem, std::move(*read)).first->second;
+}
+
+// The handshake checked what came over TLS. What a proxy shows is checked here: a mistake in its configuration opens
+// nothing.
+Result<void> Gate::check_shown(const PeerClaims& peer) {
+  if (!peer.by_proxy || checked_.contains(peer.certificate_pem)) return {};
+  const auto chain = check_client_chain(peer.certificate_pem, *authorities_, now_());
+  if (!chain) return failure(ErrorCode::denied, chain.error().sentence);
+  make_space(checked_);
+  checked_.insert(peer.certificate_pem);
+  return {};
 }
 
 Result<Ticket> Gate::ticket_of(std::string_view text) {
@@ -175,7 +204,7 @@ Result<Ticket> Gate::ticket_of(std::string_view text) {
 std::optional<Refusal> Gate::judge_again(Caller& caller, const std::string& room, std::string_view method) const {
   const UnixTime now = now_();
   if (now >= caller.certificate_ends) return Refusal{"certificate", false, "the certificate has expired; ask for a new one"};
-  if (const auto revoked = access_list_.refuses(caller.serial, caller.user, caller.ticket_id)) return Refusal{"revoked", false, *revoked};
+  if (const auto why = revoked(caller.serial, caller.user, caller.ticket_id)) return Refusal{"revoked", false, *why};
   Ticket ticket;
   ticket.expires = caller.ends;
   if (const Result<void> in_time = check_time(ticket, now); !in_time)
@@ -187,12 +216,25 @@ std::optional<Refusal> Gate::judge_again(Caller& caller, const std::string& room
                                    "; ask whoever runs the server for a ticket of another role"};
 }
 
+std::optional<std::string> Gate::revoked(const std::string& serial, const std::string& user,
+                                         const std::string& ticket_id) const {
+  if (listed_serials_.contains(serial)) return "the certificate was revoked; ask for a new one";
+  return access_list_.refuses(serial, user, ticket_id);
+}
+
+bool Gate::is_paused(const std::string& user) const {
+  const auto found = paused_.find(user);
+  return found != paused_.end() && std::chrono::steady_clock::now() < found->second;
+}
+
 tl::expected<Caller, Refusal> Gate::judge(const CallClaims& call) {
   const std::lock_guard lock(mutex_);
   const auto refused = [](std::string_view reason, bool is_known, std::string sentence) {
     return tl::unexpected(Refusal{reason, is_known, std::move(sentence)});
   };
-  const Result<PersonCertificate> certificate = certificate_of(call.certificate_pem);
+  if (const Result<void> shown = check_shown(call.peer); !shown)
+    return refused("certificate", false, shown.error().message);
+  const Result<PersonCertificate> certificate = certificate_of(call.peer.certificate_pem);
   if (!certificate) return refused("certificate", false, certificate.error().message);
   if (call.ticket.empty()) return refused("ticket", false, "no ticket came with the call; give one with --ticket FILE");
   const Result<Ticket> ticket = ticket_of(call.ticket);
@@ -208,7 +250,8 @@ tl::expected<Caller, Refusal> Gate::judge(const CallClaims& call) {
                 .ticket_role = ticket->role,
                 .role = ticket->role,
                 .ends = ticket->expires,
-                .certificate_ends = certificate->ends};
+                .certificate_ends = certificate->ends,
+                .address = call.peer.address};
   // A role may hold in one room alone: that room has to be known here, however the call names it.
   std::string room(call.room.empty() ? std::string_view(ticket->room) : call.room);
   if (room == kAnyRoom && only_room_) room = only_room_();
@@ -222,22 +265,43 @@ tl::expected<Caller, Refusal> Gate::admit(const CallClaims& call) {
   std::string who = "a certificate without a name";
   {
     const std::lock_guard lock(mutex_);
-    if (caller && !rates_.take(caller->user, call.method, std::chrono::steady_clock::now()))
-      caller = tl::unexpected(Refusal{kTooOften, true, "that is called too often; wait a moment and try again"});
+    if (const Result<PersonCertificate> certificate = certificate_of(call.peer.certificate_pem)) {
+      who = certificate->user;
+      if (connections_ && !call.peer.by_proxy)
+        connections_->identify(call.peer.peer, certificate->user, certificate->serial);
+    }
+    if (caller &&
+        (is_paused(caller->user) || !rates_.take(caller->user, call.method, std::chrono::steady_clock::now())))
+      caller = tl::unexpected(Refusal{"rate", true, "that is called too often; wait a moment and try again", true});
     ++(caller ? counts_.admitted : counts_.refused);
     if (caller) return caller;
-    if (const Result<PersonCertificate> certificate = certificate_of(call.certificate_pem)) who = certificate->user;
   }
-  refusals_.note(caller.error().reason, who, caller.error().sentence);
+  refusals_.note(caller.error().reason, who, caller.error().sentence, call.peer.address);
   return caller;
 }
 
-void Gate::note_refused(std::string_view reason, std::string_view sentence) {
+void Gate::note_refused(std::string_view reason, std::string_view sentence, std::string_view address) {
   {
     const std::lock_guard lock(mutex_);
     ++counts_.refused;
   }
-  refusals_.note(reason, "a stranger", sentence);
+  refusals_.note(reason, "a stranger", sentence, address);
+}
+
+void Gate::note_flood(const PeerClaims& peer) {
+  std::string who = "a stranger";
+  {
+    const std::lock_guard lock(mutex_);
+    if (const Result<PersonCertificate> certificate = certificate_of(peer.certificate_pem)) {
+      who = certificate->user;
+      const auto now = std::chrono::steady_clock::now();
+      std::erase_if(paused_, [now](const auto& entry) { return entry.second < now; });
+      paused_[who] = now + kPause;
+    }
+  }
+  refusals_.note("flood", who, "more calls than a connection may begin; it was closed", peer.address);
+  if (connections_)
+    connections_->close_if([&](const Connection& one) { return one.peer == peer.peer || one.user == who; });
 }
 
 Result<void> Gate::check_resume(const Caller& caller, const std::string& room, int kind, AuthorId author) const {
@@ -321,23 +385,65 @@ GateCounts Gate::counts() const {
   return counts;
 }
 
-// A disk that is slow lets no call wait: only the list that was read is put in under the lock that calls take.
+Result<bool> Gate::read_authorities() {
+  Result<std::string> certificates = read_all(folder_ / "ca.pem");
+  if (!certificates) return tl::unexpected(certificates.error());
+  Authorities now{.certificates = std::move(*certificates), .revocation_lists = {}};
+  if (std::filesystem::exists(folder_ / "crl.pem")) {
+    Result<std::string> lists = read_all(folder_ / "crl.pem");
+    if (!lists) return tl::unexpected(lists.error());
+    now.revocation_lists = std::move(*lists);
+  } else if (authorities_ && !authorities_->revocation_lists.empty()) {
+    return failure(ErrorCode::not_found, (folder_ / "crl.pem").string() + " is gone; its last content holds on");
+  }
+  if (authorities_ && *authorities_ == now) return false;
+  const Result<std::set<std::string>> serials = listed_serials(now);
+  if (!serials)
+    return failure(ErrorCode::invalid_input, (folder_ / "ca.pem").string() + " and crl.pem: " +
+                                                 serials.error().message + "; make them with deploy/certs");
+  const std::lock_guard lock(mutex_);
+  authorities_ = std::make_shared<const Authorities>(std::move(now));  // shared with handshakes that are under way
+  listed_serials_ = *serials;
+  checked_.clear();
+  return true;
+}
+
+// A disk that is slow lets no call wait: only what was read is put in under the lock that calls take.
 void Gate::refresh() {
   const std::lock_guard reading(reading_);
-  const Result<bool> read = access_.refresh();
-  const std::string fault = read ? std::string() : read.error().message;
-  if (read && *read) {
+  const auto tell = [](std::string_view what, const Result<bool>& read, std::string& told) {
+    const std::string fault = read ? std::string() : read.error().message;
+    if (!fault.empty() && fault != told) log::error(what, {{"fault", fault}});
+    told = fault;
+  };
+  const Result<bool> list = access_.refresh();
+  if (list && *list) {
     log::info("access list", {{"entries", access_.list().size()}});
     const std::lock_guard lock(mutex_);
     access_list_ = access_.list();
   }
-  if (!fault.empty() && fault != access_fault_) log::error("access list", {{"fault", fault}});
-  access_fault_ = fault;
+  tell("access list", list, access_fault_);
+  const Result<bool> authorities = read_authorities();
+  if (authorities && *authorities) log::info("authorities", {{"revoked_certificates", listed_serials_.size()}});
+  tell("authorities", authorities, authorities_fault_);
+  revoked_anew_ = (list && *list) || (authorities && *authorities);
+}
+
+void Gate::close_revoked() {
+  if (!connections_) return;
+  const std::lock_guard lock(mutex_);
+  // Whose connection has made no call may have come with a certificate that is revoked now. Who may come does so again.
+  const std::size_t closed = connections_->close_if(
+      [this](const Connection& one) { return one.serial.empty() || revoked(one.serial, one.user, {}); });
+  if (closed > 0)
+    log::info("connections closed", {{"of", "revoked certificates and before a first call"}, {"count", closed}});
 }
 
 void Gate::look() {
   std::vector<std::pair<std::shared_ptr<Watched>, Refusal>> ending;
   std::vector<std::shared_ptr<Watched>> held;  // let go of without the lock, which their end takes
+  // One look later than their streams end: so the clients still hear why.
+  if (revoked_anew_.exchange(false)) close_revoked();
   refresh();
   {
     const std::lock_guard lock(mutex_);

@@ -1,6 +1,8 @@
-// Who is let in: looks at the certificate, the ticket and the list of who was revoked before every call, and again several
-// times a second for as long as a stream is open. The one place where a call is refused for who makes it.
+// Who is let in: looks at the certificate in the handshake, at certificate, ticket and the list of who was revoked at
+// the beginning of every call, and at all of it again several times a second for as long as a stream is open. The one
+// place where a connection or a call is refused for who makes it.
 #pragma once
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -14,6 +16,7 @@
 #include <string>
 #include <string_view>
 #include <thread>
+#include <set>
 #include <tuple>
 #include <unordered_map>
 #include <vector>
@@ -23,6 +26,8 @@
 #include "common/access/ticket.hpp"
 #include "common/core/id.hpp"
 #include "server/net/call_rates.hpp"
+#include "server/net/connections.hpp"
+#include "server/net/peer_claims.hpp"
 #include "server/net/person_certificate.hpp"
 #include "server/net/refusals.hpp"
 
@@ -42,6 +47,7 @@ struct Caller {
   UnixTime ends{};                   // of the ticket
   UnixTime certificate_ends{};
   std::string room{};                // that the call named or meant, where the role holds
+  std::string address{};             // from where the call came, as address_of() has it
 };
 
 // Why somebody was not.
@@ -49,14 +55,15 @@ struct Refusal {
   std::string_view reason;    // a fixed word, for counting
   bool is_known = false;      // it is clear who it is, but that person may not do this
   std::string sentence;       // for the caller
+  bool is_for_now = false;    // the same call may be made later
 };
 
 // What is looked at of a call.
 struct CallClaims {
-  std::string_view certificate_pem;  // of the connection
-  std::string_view ticket;           // metadata osteon-ticket; empty: none came
-  std::string_view room;             // metadata osteon-room-bin; empty: none came
-  std::string_view method;           // full name; empty: whatever it is
+  PeerClaims peer{};          // of the connection
+  std::string_view ticket{};  // metadata osteon-ticket; empty: none came
+  std::string_view room{};    // metadata osteon-room-bin; empty: none came
+  std::string_view method{};  // full name; empty: whatever it is
 };
 
 // A stream that is open. Its end is heard of, or it is told to end, whatever comes first.
@@ -77,8 +84,9 @@ class Gate {
   static constexpr std::chrono::milliseconds kLookEvery{250};
   using Now = std::function<UnixTime()>;
 
-  // `folder`: ca.pem, server.pem, server.key, tickets.pub, and access.txt where somebody was revoked. The first three are read
-  // again when they change. `counts` outlives it. Errors: not_found, invalid_input; the sentence names the file.
+  // `folder`: ca.pem, server.pem, server.key, tickets.pub; access.txt and crl.pem where somebody was revoked. All but
+  // tickets.pub are read again when they change. `counts` outlives it. Errors: not_found, invalid_input; the sentence
+  // names the file.
   [[nodiscard]] static Result<std::unique_ptr<Gate>> open(const std::filesystem::path& folder, RefusalCounts& counts, Now now = {});
   ~Gate();
   Gate(const Gate&) = delete;
@@ -87,14 +95,23 @@ class Gate {
   // Which room a call is to that names none, with a ticket for every room; empty: there is no such. Before the first call.
   void set_only_room(std::function<std::string()> name) { only_room_ = std::move(name); }
 
-  // Mutual TLS, with this gate before every call. It outlives the server.
+  // Through which connections are closed whose certificate is revoked; they outlive the gate. Before the first call.
+  void set_connections(Connections& connections) { connections_ = &connections; }
+
+  // Mutual TLS, with this gate in every handshake. It outlives the server.
   [[nodiscard]] std::shared_ptr<grpc::ServerCredentials> credentials();
 
+  // Of a connection: whether its certificates, the client's first, are of the authority and let somebody in. Counted
+  // and logged.
+  [[nodiscard]] std::optional<Refusal> judge_handshake(std::string_view chain_pem);
   [[nodiscard]] tl::expected<Caller, Refusal> judge(const CallClaims& call);
   // The same, counted, and logged once for each person and reason.
   [[nodiscard]] tl::expected<Caller, Refusal> admit(const CallClaims& call);
   // A call with which something is wrong before it can be judged: counted and logged likewise.
-  void note_refused(std::string_view reason, std::string_view sentence);
+  void note_refused(std::string_view reason, std::string_view sentence, std::string_view address);
+  // A connection began more calls than it may: it is closed, and who holds its certificate comes again kPause later.
+  static constexpr std::chrono::seconds kPause{10};
+  void note_flood(const PeerClaims& peer);
 
   // Who may be who in a room. `kind`: of client. Errors denied: the identity is another person's or of another role, or a newer
   // one of the same person took its place.
@@ -120,11 +137,19 @@ class Gate {
  private:
   class Watched;
   Gate(std::filesystem::path folder, TicketCheckKey key, RefusalCounts& counts, Now now);
+  // Reads ca.pem and crl.pem. True: they are other ones now. Under reading_.
+  [[nodiscard]] Result<bool> read_authorities();
+  // Closes the connections whose certificate is revoked, and those of which nobody knows yet whose they are.
+  void close_revoked();
+  [[nodiscard]] std::optional<std::string> revoked(const std::string& serial, const std::string& user,
+                                                   const std::string& ticket_id) const;  // under mutex_
+  [[nodiscard]] bool is_paused(const std::string& user) const;                           // under mutex_
   // Under mutex_. What changes while somebody is in: revocations, ends and roles. Sets the role that holds.
   [[nodiscard]] std::optional<Refusal> judge_again(Caller& caller, const std::string& room, std::string_view method) const;
   [[nodiscard]] std::optional<Refusal> judge_author(const Caller& caller, const std::string& room, AuthorId author) const;
   [[nodiscard]] Result<void> check_resume_locked(const Caller& caller, const std::string& room, int kind, AuthorId author) const;
-  [[nodiscard]] Result<PersonCertificate> certificate_of(std::string_view pem);  // under mutex_, as the next two
+  [[nodiscard]] Result<PersonCertificate> certificate_of(std::string_view pem);  // under mutex_, as the next three
+  [[nodiscard]] Result<void> check_shown(const PeerClaims& peer);
   [[nodiscard]] Result<Ticket> ticket_of(std::string_view text);
   void refresh();
   void run();
@@ -134,11 +159,17 @@ class Gate {
   RefusalCounts& refusals_;
   const Now now_;
   std::function<std::string()> only_room_;
+  Connections* connections_ = nullptr;  // null: of a gate without a server
   std::mutex reading_;         // taken before mutex_, never within it
   AccessFile access_;          // under reading_, as the next
-  std::string access_fault_;   // that was logged last
+  std::string access_fault_, authorities_fault_;  // that was logged last
+  std::atomic<bool> revoked_anew_ = false;  // at the last look
   mutable std::mutex mutex_;
   AccessList access_list_;
+  std::shared_ptr<const Authorities> authorities_;  // shared with handshakes that are under way
+  std::set<std::string> listed_serials_;            // on the revocation lists
+  std::set<std::string> checked_;  // certificates in PEM that a proxy showed and these authorities signed
+  std::map<std::string, std::chrono::steady_clock::time_point> paused_;  // until when, by user
   std::unordered_map<std::string, PersonCertificate> certificates_;  // by PEM, of those seen lately
   CallRates rates_;
   std::unordered_map<std::string, Ticket> tickets_;            // by text, of those seen lately

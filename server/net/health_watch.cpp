@@ -13,7 +13,8 @@ constexpr std::chrono::milliseconds kLookEvery{200};
 
 }  // namespace
 
-HealthWatch::HealthWatch(const Rooms& rooms, grpc::HealthCheckServiceInterface& service) : rooms_(rooms), service_(service) {
+HealthWatch::HealthWatch(const Rooms& rooms, grpc::HealthCheckServiceInterface& service, Of of)
+    : rooms_(rooms), service_(service), of_(of) {
   look();
   thread_ = std::thread([this] {
     std::unique_lock lock(mutex_);
@@ -41,7 +42,8 @@ void HealthWatch::look() {
   // What was there once is known as gone; a name that never was is unknown to the service.
   for (const auto& [name, serving] : told_) now[name] = false;
   now[""] = open;
-  for (const std::shared_ptr<OpenRoom>& room : rooms_.open_rooms()) now[room->name] = open && !room->host().stopped();
+  if (of_ == Of::server_and_rooms)
+    for (const std::shared_ptr<OpenRoom>& room : rooms_.open_rooms()) now[room->name] = open && !room->host().stopped();
   for (const auto& [name, serving] : now)
     if (const auto before = told_.find(name); before == told_.end() || before->second != serving)
       service_.SetServingStatus(name, serving);

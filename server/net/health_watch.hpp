@@ -18,8 +18,11 @@ class Rooms;
 // all is being drained. Looks several times a second, and at once when asked.
 class HealthWatch {
  public:
+  // Whoever has a certificate may ask grpc.health.v1, without a ticket. So a server with certificates names no room
+  // there.
+  enum class Of { server, server_and_rooms };
   // Both outlive it.
-  HealthWatch(const Rooms& rooms, grpc::HealthCheckServiceInterface& service);
+  HealthWatch(const Rooms& rooms, grpc::HealthCheckServiceInterface& service, Of of = Of::server_and_rooms);
   ~HealthWatch();
   HealthWatch(const HealthWatch&) = delete;
   HealthWatch& operator=(const HealthWatch&) = delete;
@@ -29,6 +32,7 @@ class HealthWatch {
  private:
   const Rooms& rooms_;
   grpc::HealthCheckServiceInterface& service_;
+  const Of of_;
   std::mutex mutex_;
   std::condition_variable wake_;
   std::map<std::string, bool> told_;  // serving or not, by name

@@ -7,12 +7,12 @@
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <memory>
-#include <mutex>
-#include <optional>
 #include <system_error>
 
 namespace osteon {
@@ -57,10 +57,17 @@ std::string numeric(const addrinfo& address) {
   return text;
 }
 
-std::optional<std::uint64_t> inode_of(int descriptor) {
-  struct stat about {};
-  if (::fstat(descriptor, &about) != 0) return {};
-  return about.st_ino;
+// Over a Unix socket only programs of this process's user and of root may connect, whatever became of the socket's
+// rights.
+bool may_connect(int descriptor) {
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  int family = 0;
+  socklen_t family_size = sizeof family;
+  if (::getsockopt(descriptor, SOL_SOCKET, SO_DOMAIN, &family, &family_size) != 0) return false;
+  if (family != AF_UNIX) return true;
+  if (::getsockopt(descriptor, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) return false;
+  return peer.uid == ::geteuid() || peer.uid == 0;
 }
 
 }  // namespace
@@ -98,6 +105,37 @@ Result<std::unique_ptr<Listener>> Listener::open(const std::string& host, int po
   return listener;
 }
 
+Result<std::unique_ptr<Listener>> Listener::open_at(const std::filesystem::path& path, std::size_t most) {
+  sockaddr_un at{};
+  at.sun_family = AF_UNIX;
+  if (path.native().size() >= sizeof at.sun_path)
+    return failure(ErrorCode::unavailable,
+                   "a path of a Unix socket has at most " + std::to_string(sizeof at.sun_path - 1) + " bytes");
+  std::ranges::copy(path.native(), at.sun_path);
+  const auto* address = reinterpret_cast<const sockaddr*>(&at);
+  std::unique_ptr<Listener> listener(new Listener(most));
+  const int socket = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (socket < 0) return refused_by_system(errno);
+  listener->sockets_.push_back(socket);
+  std::error_code unknown;
+  if (std::filesystem::is_socket(path, unknown)) {
+    // Nobody listens at the socket of a process that was killed.
+    if (::connect(socket, address, sizeof at) == 0) return failure(ErrorCode::exists, "another program listens there");
+    std::filesystem::remove(path, unknown);
+  }
+  // The rights are those with which it comes into being: there is no moment at which others can open it.
+  const mode_t before = ::umask(0177);
+  const int bound = ::bind(socket, address, sizeof at);
+  const int reason = errno;
+  ::umask(before);
+  if (bound != 0) return refused_by_system(reason);
+  listener->path_ = path;
+  if (::listen(socket, kWaiting) != 0) return refused_by_system(errno);
+  listener->wake_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  if (listener->wake_ < 0) return refused_by_system(errno);
+  return listener;
+}
+
 Listener::~Listener() {
   stop();
   if (wake_ >= 0) ::close(wake_);
@@ -116,6 +154,7 @@ void Listener::stop() {
   }
   for (const int socket : sockets_) ::close(socket);
   sockets_.clear();
+  if (!path_.empty()) ::unlink(path_.c_str());
 }
 
 void Listener::run() {
@@ -142,38 +181,18 @@ void Listener::accept_from(int listening) {
       (void)::poll(&end, 1, kPauseMs);
       return;
     }
-    const auto inode = inode_of(descriptor);
-    // Only when it matters is looked which of the others are still there.
-    if (!inode || is_full()) {
+    if (!may_connect(descriptor) || !connections_.has_room(most_) || !connections_.add(descriptor)) {
       ++refused_;
       ::close(descriptor);
       continue;
     }
     const int yes = 1;
     ::setsockopt(descriptor, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
-    {
-      const std::lock_guard lock(mutex_);
-      taken_.emplace(descriptor, *inode);
-    }
     ++accepted_;
     take_(listening, descriptor);
   }
 }
 
-std::size_t Listener::still_open() const {
-  const std::lock_guard lock(mutex_);
-  std::erase_if(taken_, [](const auto& connection) { return inode_of(connection.first) != connection.second; });
-  return taken_.size();
-}
-
-bool Listener::is_full() const {
-  {
-    const std::lock_guard lock(mutex_);
-    if (taken_.size() < most_) return false;
-  }
-  return still_open() >= most_;
-}
-
-ListenerCounts Listener::counts() const { return {still_open(), accepted_, refused_, failed_}; }
+ListenerCounts Listener::counts() { return {connections_.count(), accepted_, refused_, failed_}; }
 
 }  // namespace osteon

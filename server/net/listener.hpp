@@ -4,16 +4,15 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
-#include <mutex>
-#include <set>
 #include <string>
 #include <thread>
-#include <utility>
 #include <vector>
 
 #include "common/core/result.hpp"
+#include "server/net/connections.hpp"
 
 namespace osteon {
 
@@ -28,6 +27,10 @@ class Listener {
   // `host`: a name or an address, [IPv6] in brackets; every address of it is listened on. `port` 0: the system chooses. Errors:
   // exists (the port is in use), unavailable (the system refuses for the reason in the message).
   [[nodiscard]] static Result<std::unique_ptr<Listener>> open(const std::string& host, int port, std::size_t most);
+  // At a Unix socket, which only this process's user and root can open. One that a process left behind is replaced;
+  // `most` counts its connections alone. Errors: exists (a program listens there, or it is a file of another kind),
+  // unavailable.
+  [[nodiscard]] static Result<std::unique_ptr<Listener>> open_at(const std::filesystem::path& socket, std::size_t most);
   ~Listener();
   Listener(const Listener&) = delete;
   Listener& operator=(const Listener&) = delete;
@@ -39,24 +42,22 @@ class Listener {
   // From now on `take(listening, descriptor)` is called with every connection, which it owns; on a thread of the listener's own.
   void start(std::function<void(int listening, int descriptor)> take);
   void stop();  // accepts no more; once
-  [[nodiscard]] ListenerCounts counts() const;  // any thread
+  [[nodiscard]] ListenerCounts counts();        // any thread
+  [[nodiscard]] Connections& connections() { return connections_; }
 
  private:
   explicit Listener(std::size_t most) : most_(most) {}
   void run();
   void accept_from(int listening);
-  [[nodiscard]] bool is_full() const;
-  [[nodiscard]] std::size_t still_open() const;
 
   const std::size_t most_;
   std::vector<int> sockets_;
   int wake_ = -1;  // an eventfd that ends the thread
   int port_ = 0;
   std::string address_;
+  std::filesystem::path path_;  // of a Unix socket; empty: there is none
   std::function<void(int, int)> take_;
-  // Connections handed on: descriptor and inode, by which one that was closed is told from another with its number.
-  mutable std::mutex mutex_;
-  mutable std::set<std::pair<int, std::uint64_t>> taken_;  // under mutex_
+  Connections connections_;  // that were handed on
   std::atomic<std::uint64_t> accepted_ = 0, refused_ = 0, failed_ = 0;
   std::thread thread_;
 };

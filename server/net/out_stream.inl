@@ -54,6 +54,7 @@ inline std::string short_words(std::string why) {
 inline Status invalid(std::string why) { return {StatusCode::INVALID_ARGUMENT, short_words(std::move(why))}; }
 
 inline Status status_of(const Refusal& why) {
+  if (why.is_for_now) return {StatusCode::RESOURCE_EXHAUSTED, why.sentence};
   return {why.is_known ? StatusCode::PERMISSION_DENIED : StatusCode::UNAUTHENTICATED, why.sentence};
 }
 

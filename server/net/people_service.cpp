@@ -68,6 +68,7 @@ class PeopleServiceImpl final : public PeopleBase {
   explicit PeopleServiceImpl(Rooms& rooms) : rooms_(rooms) {}
 
   WriteReactor* WatchPeople(grpc::CallbackServerContext* context, const ByteBuffer* bytes) override {
+    if (auto why = refusal_of<v1::WatchPeopleRequest>(rooms_, *context)) return refused(std::move(*why));
     const auto request = parse<v1::WatchPeopleRequest>(*bytes);
     if (!request) return refused(invalid("the WatchPeopleRequest could not be parsed"));
     const AuthorId author{request->author()};
@@ -84,6 +85,7 @@ class PeopleServiceImpl final : public PeopleBase {
   grpc::ServerUnaryReactor* Supervise(grpc::CallbackServerContext* context, const v1::SuperviseRequest* request,
                                       v1::SuperviseResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::SuperviseRequest>(rooms_, *context, reactor)) return reactor;
     const Result<Supervision> word = wire::from_wire(request->supervision());
     if (!word) return refuse(reactor, invalid(word.error().message));
     const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
@@ -134,6 +136,7 @@ class PeopleServiceImpl final : public PeopleBase {
   grpc::ServerUnaryReactor* Annotate(grpc::CallbackServerContext* context, const v1::AnnotateRequest* request,
                                      v1::AnnotateResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::AnnotateRequest>(rooms_, *context, reactor)) return reactor;
     const AuthorId by{request->author()};
     const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
@@ -158,6 +161,7 @@ class PeopleServiceImpl final : public PeopleBase {
   grpc::ServerUnaryReactor* Say(grpc::CallbackServerContext* context, const v1::SayRequest* request,
                                 v1::SayResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::SayRequest>(rooms_, *context, reactor)) return reactor;
     const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
     return change_room(
@@ -171,6 +175,7 @@ class PeopleServiceImpl final : public PeopleBase {
   grpc::ServerUnaryReactor* Demonstrate(grpc::CallbackServerContext* context, const v1::DemonstrateRequest* request,
                                         v1::DemonstrateResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::DemonstrateRequest>(rooms_, *context, reactor)) return reactor;
     const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
     // What was cut in another room is that room's.
@@ -199,6 +204,7 @@ class PeopleServiceImpl final : public PeopleBase {
                                              const v1::EndDemonstrationRequest* request,
                                              v1::EndDemonstrationResponse*) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::EndDemonstrationRequest>(rooms_, *context, reactor)) return reactor;
     const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
     // Not behind those that are about to begin.

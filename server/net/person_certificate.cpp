@@ -2,11 +2,15 @@
 
 #include <openssl/bio.h>
 #include <openssl/bn.h>
+#include <openssl/err.h>
 #include <openssl/pem.h>
+#include <openssl/x509_vfy.h>
 #include <openssl/x509v3.h>
 
 #include <ctime>
 #include <memory>
+#include <optional>
+#include <vector>
 
 #include "common/access/ticket.hpp"
 
@@ -27,6 +31,9 @@ using Bio = std::unique_ptr<BIO, Freed<BIO_free>>;
 using X509Ptr = std::unique_ptr<X509, Freed<X509_free>>;
 using Names = std::unique_ptr<GENERAL_NAMES, Freed<GENERAL_NAMES_free>>;
 using Number = std::unique_ptr<BIGNUM, Freed<BN_free>>;
+using Crl = std::unique_ptr<X509_CRL, Freed<X509_CRL_free>>;
+using Store = std::unique_ptr<X509_STORE, Freed<X509_STORE_free>>;
+using StoreContext = std::unique_ptr<X509_STORE_CTX, Freed<X509_STORE_CTX_free>>;
 using Key = std::unique_ptr<EVP_PKEY, Freed<EVP_PKEY_free>>;
 using Text = std::unique_ptr<char, Freed<free_text>>;
 
@@ -37,7 +44,119 @@ X509Ptr first_of(std::string_view pem) {
   return X509Ptr(bio ? PEM_read_bio_X509(bio.get(), nullptr, nullptr, nullptr) : nullptr);
 }
 
+// Empty: it cannot be read.
+std::string hex_of(const ASN1_INTEGER* serial) {
+  const Number number(ASN1_INTEGER_to_BN(serial, nullptr));
+  const Text digits(number ? BN_bn2hex(number.get()) : nullptr);
+  return digits ? digits.get() : "";
+}
+
+// All of one kind in a PEM text; nothing where something in it cannot be read. Other kinds are passed over.
+template <class Ptr, auto Read>
+std::optional<std::vector<Ptr>> all_of(std::string_view pem) {
+  const Bio bio = reader_of(pem);
+  if (!bio) return {};
+  std::vector<Ptr> all;
+  ERR_clear_error();
+  while (auto* one = Read(bio.get(), nullptr, nullptr, nullptr)) all.emplace_back(one);
+  // The end of the text is the one fault that is none.
+  const unsigned long last = ERR_peek_last_error();
+  ERR_clear_error();
+  if (ERR_GET_LIB(last) != ERR_LIB_PEM || ERR_GET_REASON(last) != PEM_R_NO_START_LINE) return {};
+  return all;
+}
+std::optional<std::vector<X509Ptr>> certificates_of(std::string_view pem) {
+  return all_of<X509Ptr, PEM_read_bio_X509>(pem);
+}
+std::optional<std::vector<Crl>> lists_of(std::string_view pem) { return all_of<Crl, PEM_read_bio_X509_CRL>(pem); }
+
+// As strong as the TLS of Debian asks for: 112 bits, no SHA-1.
+constexpr int kSecurityLevel = 2;
+
+// A list out of its time is used on, and an authority without a list revokes nobody by one.
+int accept_old_lists(int ok, X509_STORE_CTX* context) {
+  const int error = X509_STORE_CTX_get_error(context);
+  const bool is_old = error == X509_V_ERR_CRL_HAS_EXPIRED || error == X509_V_ERR_CRL_NOT_YET_VALID;
+  return is_old || error == X509_V_ERR_UNABLE_TO_GET_CRL ? 1 : ok;
+}
+
+// The authorities and lists, ready to check with; null where one of them cannot be read.
+Store store_of(const Authorities& authorities) {
+  const auto trusted = certificates_of(authorities.certificates);
+  const auto lists = lists_of(authorities.revocation_lists);
+  Store store(X509_STORE_new());
+  if (!store || !trusted || trusted->empty() || !lists) return {};
+  for (const X509Ptr& one : *trusted) X509_STORE_add_cert(store.get(), one.get());
+  for (const Crl& one : *lists) X509_STORE_add_crl(store.get(), one.get());
+  if (!lists->empty()) X509_STORE_set_flags(store.get(), X509_V_FLAG_CRL_CHECK | X509_V_FLAG_CRL_CHECK_ALL);
+  X509_STORE_set_verify_cb(store.get(), accept_old_lists);
+  return store;
+}
+
+ChainRefusal refusal_of(int error) {
+  switch (error) {
+    case X509_V_ERR_CERT_HAS_EXPIRED:
+      return {ChainFault::expired, "the certificate has expired; ask for a new one"};
+    case X509_V_ERR_CERT_NOT_YET_VALID:
+      return {ChainFault::not_yet_valid, "the certificate does not hold yet; set the clocks of both machines"};
+    case X509_V_ERR_CERT_REVOKED:
+      return {ChainFault::revoked, "the certificate was revoked; ask for a new one"};
+    case X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT:
+    case X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT_LOCALLY:
+    case X509_V_ERR_UNABLE_TO_VERIFY_LEAF_SIGNATURE:
+    case X509_V_ERR_DEPTH_ZERO_SELF_SIGNED_CERT:
+    case X509_V_ERR_SELF_SIGNED_CERT_IN_CHAIN:
+    case X509_V_ERR_CERT_SIGNATURE_FAILURE:
+      return {ChainFault::unknown_authority,
+              "the certificate is of an authority that this server does not know; ask whoever runs it for one"};
+    case X509_V_ERR_INVALID_PURPOSE:
+      return {ChainFault::purpose, "the certificate is not for a person; make one with deploy/certs person NAME"};
+    default:
+      return {ChainFault::other,
+              "the certificate cannot be accepted: " + std::string(X509_verify_cert_error_string(error))};
+  }
+}
+
 }  // namespace
+
+tl::expected<void, ChainRefusal> check_client_chain(std::string_view chain_pem, const Authorities& authorities,
+                                                    std::chrono::sys_seconds now) {
+  const auto chain = certificates_of(chain_pem);
+  if (!chain || chain->empty())
+    return tl::unexpected(ChainRefusal{ChainFault::unreadable, "the certificate cannot be read; ask for a new one"});
+  const Store store = store_of(authorities);
+  const StoreContext context(X509_STORE_CTX_new());
+  STACK_OF(X509)* between = sk_X509_new_null();  // holds no references
+  const std::unique_ptr<STACK_OF(X509), void (*)(STACK_OF(X509)*)> freed(between,
+                                                                         [](STACK_OF(X509) * s) { sk_X509_free(s); });
+  if (!store || !context || !between ||
+      X509_STORE_CTX_init(context.get(), store.get(), chain->front().get(), between) != 1)
+    return tl::unexpected(
+        ChainRefusal{ChainFault::other, "the server cannot read its authority; tell whoever runs it"});
+  for (std::size_t i = 1; i < chain->size(); ++i) sk_X509_push(between, (*chain)[i].get());
+  X509_STORE_CTX_set_default(context.get(), "ssl_client");
+  X509_VERIFY_PARAM* rules = X509_STORE_CTX_get0_param(context.get());
+  X509_VERIFY_PARAM_set_auth_level(rules, kSecurityLevel);
+  X509_VERIFY_PARAM_set_time(rules, static_cast<std::time_t>(now.time_since_epoch().count()));
+  const bool holds = X509_verify_cert(context.get()) == 1;
+  const int error = X509_STORE_CTX_get_error(context.get());
+  ERR_clear_error();
+  if (holds) return {};
+  return tl::unexpected(refusal_of(error));
+}
+
+Result<std::set<std::string>> listed_serials(const Authorities& authorities) {
+  if (!store_of(authorities))
+    return failure(ErrorCode::invalid_input, "a certificate or a revocation list in it cannot be read");
+  std::set<std::string> serials;
+  const auto lists = lists_of(authorities.revocation_lists);
+  for (const Crl& list : *lists) {
+    STACK_OF(X509_REVOKED)* revoked = X509_CRL_get_REVOKED(list.get());  // null where the list is empty
+    for (int i = 0; i < sk_X509_REVOKED_num(revoked); ++i)
+      serials.insert(hex_of(X509_REVOKED_get0_serialNumber(sk_X509_REVOKED_value(revoked, i))));
+  }
+  return serials;
+}
 
 Result<PersonCertificate> read_person_certificate(std::string_view pem) {
   const X509Ptr x509 = first_of(pem);
@@ -60,12 +179,10 @@ Result<PersonCertificate> read_person_certificate(std::string_view pem) {
     return failure(ErrorCode::invalid_input,
                    "the certificate does not name one person (osteon://person/NAME); make one with deploy/certs person NAME");
 
-  const Number number(ASN1_INTEGER_to_BN(X509_get0_serialNumber(x509.get()), nullptr));
-  const Text digits(number ? BN_bn2hex(number.get()) : nullptr);
+  certificate.serial = hex_of(X509_get0_serialNumber(x509.get()));
   std::tm ends{};
-  if (!digits || ASN1_TIME_to_tm(X509_get0_notAfter(x509.get()), &ends) != 1)
+  if (certificate.serial.empty() || ASN1_TIME_to_tm(X509_get0_notAfter(x509.get()), &ends) != 1)
     return failure(ErrorCode::invalid_input, "the certificate has no number or no end; ask for a new one");
-  certificate.serial = digits.get();
   certificate.ends = std::chrono::sys_seconds{std::chrono::seconds(timegm(&ends))};
   return certificate;
 }

@@ -1,6 +1,7 @@
 // What a certificate in PEM says of the person who holds it.
 #pragma once
 #include <chrono>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -14,9 +15,31 @@ struct PersonCertificate {
   std::chrono::sys_seconds ends{};
 };
 
-// The first one in `pem`. Says nothing of who signed it: that was checked in the handshake. Errors: invalid_input (it cannot be
+// The first one in `pem`. Says nothing of who signed it: check_client_chain does. Errors: invalid_input (it cannot be
 // read, or names no person or several).
 [[nodiscard]] Result<PersonCertificate> read_person_certificate(std::string_view pem);
+
+// What the certificates of clients are checked against. Both in PEM, several one after another.
+struct Authorities {
+  std::string certificates;
+  std::string revocation_lists;  // CRLs of these authorities (RFC 5280, section 5); empty: there are none
+  friend bool operator==(const Authorities&, const Authorities&) = default;
+};
+enum class ChainFault { unreadable, unknown_authority, not_yet_valid, expired, revoked, purpose, other };
+struct ChainRefusal {
+  ChainFault fault = ChainFault::other;
+  std::string sentence;  // says what is wrong and the remedy
+};
+// Whether an authority signed the first certificate in `chain_pem`, for TLS clients, and it holds at `now`; the
+// others in `chain_pem` may lie between the two (RFC 5280, section 6). A revocation list whose time is over still
+// counts: it is older, and what it lists stays revoked.
+[[nodiscard]] tl::expected<void, ChainRefusal> check_client_chain(std::string_view chain_pem,
+                                                                  const Authorities& authorities,
+                                                                  std::chrono::sys_seconds now);
+// The serial numbers on the lists, hexadecimal, upper case. Error invalid_input: a certificate or a list cannot be
+// read, or there is no certificate.
+[[nodiscard]] Result<std::set<std::string>> listed_serials(const Authorities& authorities);
+
 // Error invalid_input: one of them cannot be read, or the key is not that of the certificate.
 [[nodiscard]] Result<void> check_key_pair(std::string_view certificate_pem, std::string_view key_pem);
 

@@ -23,8 +23,9 @@ class RefusalCounts {
     else
       ++counts_[counts_.size() < kMost ? std::string(reason) : "other"];
   }
-  // Counts it, and logs it: once for each `who`, a person or an address, and reason, so that nobody fills the disk.
-  void note(std::string_view reason, std::string_view who, std::string_view said);
+  // Counts it, and logs it: once for each `who`, a person or an address, `from` and reason, so that nobody fills the
+  // disk. `from`: the address of a person; empty: it is not known, or `who` is one.
+  void note(std::string_view reason, std::string_view who, std::string_view said, std::string_view from = {});
   [[nodiscard]] std::map<std::string, std::uint64_t, std::less<>> counts() const {
     const std::lock_guard lock(mutex_);
     return counts_;
@@ -35,8 +36,5 @@ class RefusalCounts {
   std::map<std::string, std::uint64_t, std::less<>> counts_;
   RefusalLog log_;
 };
-
-// "ipv4:10.0.0.7" of gRPC's "ipv4:10.0.0.7:50123": from one address strangers come by many ports.
-[[nodiscard]] std::string address_of(std::string_view peer);
 
 }  // namespace osteon

@@ -9,6 +9,8 @@
 #include <string>
 #include <string_view>
 
+#include "server/net/connections.hpp"
+
 namespace osteon {
 namespace {
 
@@ -17,7 +19,7 @@ using grpc::experimental::InterceptionHookPoints;
 
 // gRPC's log has one function for the process, and no place for what belongs to it.
 std::mutex watches_mutex;
-std::vector<RefusalCounts*> watches;
+std::vector<HandshakeWatch*> watches;
 
 void hear(gpr_log_func_args* line) {
   if (line->message == nullptr) return;
@@ -28,7 +30,7 @@ void hear(gpr_log_func_args* line) {
   const std::string who =
       "a stranger: " + std::string(routine == std::string_view::npos ? said : said.substr(routine + 2));
   const std::lock_guard lock(watches_mutex);
-  for (RefusalCounts* refusals : watches) refusals->note("tls", who, said);
+  for (HandshakeWatch* watch : watches) watch->note(who, said);
 }
 
 std::string_view reason_of(StatusCode code) {
@@ -52,7 +54,9 @@ class CallNotes final : public grpc::experimental::Interceptor {
   void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_STATUS)) {
       const grpc::Status status = methods->GetSendStatus();
-      if (const std::string_view reason = reason_of(status.error_code()); !reason.empty())
+      const auto* trailers = methods->GetSendTrailingMetadata();
+      const bool noted = trailers != nullptr && trailers->contains(kRefusalTrailer);
+      if (const std::string_view reason = reason_of(status.error_code()); !noted && !reason.empty())
         refusals_.note(reason, address_of(call_.server_context()->peer()),
                        std::string(call_.method()) + ": " + status.error_message());
     }
@@ -78,17 +82,22 @@ class CallNotesMaker final : public grpc::experimental::ServerInterceptorFactory
 
 }  // namespace
 
-HandshakeWatch::HandshakeWatch(RefusalCounts& refusals) : refusals_(refusals) {
+HandshakeWatch::HandshakeWatch(RefusalCounts& refusals, Connections& connections)
+    : refusals_(refusals), connections_(connections) {
   {
     const std::lock_guard lock(watches_mutex);
-    watches.push_back(&refusals_);
+    watches.push_back(this);
   }
   gpr_set_log_function(hear);
 }
 
 HandshakeWatch::~HandshakeWatch() {
   const std::lock_guard lock(watches_mutex);
-  watches.erase(std::ranges::find(watches, &refusals_));
+  watches.erase(std::ranges::find(watches, this));
+}
+
+void HandshakeWatch::note(const std::string& who, std::string_view said) {
+  refusals_.note("tls", who, said, some_addresses(connections_));
 }
 
 std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> refused_call_notes(

@@ -1,5 +1,6 @@
 #include "server/net/room_server.hpp"
 
+#include <grpcpp/generic/async_generic_service.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/impl/service_type.h>
@@ -9,8 +10,9 @@
 
 #include "common/core/check.hpp"
 #include "common/runtime/log.hpp"
-#include "server/net/health_watch.hpp"
+#include "server/net/call_flood.hpp"
 #include "server/net/gate.hpp"
+#include "server/net/health_watch.hpp"
 #include "server/net/host_port.hpp"
 #include "server/net/link_server.hpp"
 #include "server/net/listener.hpp"
@@ -52,12 +54,15 @@ constexpr std::chrono::milliseconds kComeAgainAfter{1000}, kDrainLook{5};
 struct RoomServer::Impl {
   std::unique_ptr<Rooms> rooms;
   std::unique_ptr<HandshakeWatch> handshakes;
+  std::unique_ptr<Listener> listener;  // hands connections to the acceptor; its table of them outlives the gate
+  std::unique_ptr<Listener> proxy_listener;  // null: there is no proxy
+  std::unique_ptr<CallFlood> flood;    // null: plain text
   std::unique_ptr<Gate> gate;          // null: plain text; outlives the streams
   std::unique_ptr<LinkServer> links;   // outlives the streams
   std::vector<std::unique_ptr<grpc::Service>> services;
-  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor;
+  std::unique_ptr<grpc::CallbackGenericService> unknown_calls;
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor, proxy_acceptor;
   std::unique_ptr<grpc::Server> server;
-  std::unique_ptr<Listener> listener;  // hands connections to the acceptor
   std::unique_ptr<HealthWatch> health;  // of the server
   std::string address;
 };
@@ -93,19 +98,30 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   auto impl = std::make_unique<Impl>();
   impl->rooms = std::move(rooms);
   // What fails is told in one sentence by the caller, not in gRPC's own lines.
-  impl->handshakes = std::make_unique<HandshakeWatch>(impl->rooms->refusals);
   impl->listener = std::move(*listener);
+  impl->handshakes = std::make_unique<HandshakeWatch>(impl->rooms->refusals, impl->listener->connections());
   std::shared_ptr<grpc::ServerCredentials> credentials = grpc::InsecureServerCredentials();  // shared with gRPC
   if (!doors.certificates.empty()) {
     Result<std::unique_ptr<Gate>> gate = Gate::open(doors.certificates, impl->rooms->refusals);
     if (!gate) return tl::unexpected(gate.error());
     impl->gate = std::move(*gate);
     impl->rooms->gate = impl->gate.get();
+    impl->gate->set_connections(impl->listener->connections());
     impl->gate->set_only_room([all = impl->rooms.get()] {
       const Result<std::shared_ptr<OpenRoom>> only = all->find("");
       return only ? (*only)->name : std::string();
     });
     credentials = impl->gate->credentials();
+  }
+  if (!doors.proxy_socket.empty()) {
+    if (!impl->gate)
+      return failure(ErrorCode::invalid_input,
+                     "--proxy-socket needs --certificates DIR: a proxy brings calls of people");
+    Result<std::unique_ptr<Listener>> proxy = Listener::open_at(doors.proxy_socket, doors.most_connections);
+    if (!proxy)
+      return failure(proxy.error().code, "cannot listen at --proxy-socket " + doors.proxy_socket.string() + ": " +
+                                             proxy.error().message + "; choose another path");
+    impl->proxy_listener = std::move(*proxy);
   }
   // Beside the streams; without it all goes over them.
   if (Result<std::unique_ptr<LinkServer>> links = LinkServer::open(impl->listener->address()); links)
@@ -124,6 +140,9 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   // What comes in is accepted and counted by the listener; gRPC takes it over from there.
   impl->acceptor = builder.experimental().AddExternalConnectionAcceptor(
       grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, credentials);
+  if (impl->proxy_listener)
+    impl->proxy_acceptor = builder.experimental().AddExternalConnectionAcceptor(
+        grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, grpc::InsecureServerCredentials());
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveMs);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
@@ -139,17 +158,32 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   builder.SetResourceQuota(quota);
   builder.SetMaxReceiveMessageSize(kMaxReceiveBytes);
   builder.SetMaxSendMessageSize(kMaxSendBytes);
-  builder.experimental().SetInterceptorCreators(refused_call_notes(impl->rooms->refusals));
+  auto interceptors = refused_call_notes(impl->rooms->refusals);
+  if (impl->gate) {
+    impl->flood = std::make_unique<CallFlood>(doors.flood);
+    interceptors.push_back(
+        flood_watch(*impl->flood, [gate = impl->gate.get()](const PeerClaims& peer) { gate->note_flood(peer); }));
+  }
+  builder.experimental().SetInterceptorCreators(std::move(interceptors));
+  // Calls that no service has are authorized, counted and bounded as all others are.
+  impl->unknown_calls = make_unknown_calls(*impl->rooms);
+  builder.RegisterCallbackGenericService(impl->unknown_calls.get());
   for (const auto& service : impl->services) builder.RegisterService(service.get());
   impl->server = builder.BuildAndStart();
   if (!impl->server) return tl::unexpected(cannot_listen(listen, "gRPC refused"));
-  impl->listener->start([acceptor = impl->acceptor.get()](int listening, int descriptor) {
-    grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
-    connection.listener_fd = listening;
-    connection.fd = descriptor;
-    acceptor->HandleNewConnection(&connection);
-  });
-  impl->health = std::make_unique<HealthWatch>(*impl->rooms, *impl->server->GetHealthCheckService());
+  const auto hand_to = [](grpc::experimental::ExternalConnectionAcceptor* acceptor) {
+    return [acceptor](int listening, int descriptor) {
+      grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
+      connection.listener_fd = listening;
+      connection.fd = descriptor;
+      acceptor->HandleNewConnection(&connection);
+    };
+  };
+  impl->listener->start(hand_to(impl->acceptor.get()));
+  if (impl->proxy_listener) impl->proxy_listener->start(hand_to(impl->proxy_acceptor.get()));
+  impl->health =
+      std::make_unique<HealthWatch>(*impl->rooms, *impl->server->GetHealthCheckService(),
+                                    impl->gate ? HealthWatch::Of::server : HealthWatch::Of::server_and_rooms);
   impl->address = parse_host_port(listen, "--listen")->host + ":" + std::to_string(impl->listener->port());
   return std::unique_ptr<RoomServer>(new RoomServer(std::move(impl)));
 }

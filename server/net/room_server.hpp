@@ -8,6 +8,7 @@
 #include <string>
 
 #include "common/core/result.hpp"
+#include "server/net/call_flood.hpp"
 #include "server/net/gate.hpp"
 #include "server/net/link_server.hpp"
 #include "server/net/listener.hpp"
@@ -20,6 +21,10 @@ namespace osteon {
 struct DoorOptions {
   std::filesystem::path certificates{};  // as Gate::open has them; empty: plain text, on this machine alone
   std::size_t most_connections = 512;    // further ones are closed at once
+  // A Unix socket at which a proxy of this machine brings calls in plain text, and says of each whose it is
+  // (peer_claims.hpp); empty: there is none. Needs certificates.
+  std::filesystem::path proxy_socket{};
+  FloodLimit flood{};  // of calls over one connection
   // After which calls go over a new connection, with a new handshake and the authority's certificates as they are then. Streams go
   // on over the old one for `longest_session` more; then it is closed, and sessions come again by themselves.
   std::chrono::milliseconds connection_age = std::chrono::hours(1), longest_session = std::chrono::hours(12);

@@ -38,6 +38,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
 
   Reactor* ListRooms(Context* context, const v1::ListRoomsRequest*, v1::ListRoomsResponse* response) override {
     Reactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::ListRoomsRequest>(rooms_, *context, reactor)) return reactor;
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) {
       reactor->Finish(status_of(caller.error()));
@@ -133,6 +134,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
   // Judged by the room that the message names, at once and again when its turn comes: others may take minutes before it.
   Reactor* slowly(Context* context, const char* name, const std::string& room, std::function<Status()> work) {
     Reactor* reactor = context->DefaultReactor();
+    if (std::optional<Status> why = refusal_of(rooms_, *context, method(name))) return refuse(reactor, std::move(*why));
     const auto refusal = [this, context, name, room]() -> std::optional<Status> {
       const Result<Caller> caller = caller_in(rooms_, *context, room, method(name));
       return caller ? std::nullopt : std::optional(status_of(caller.error()));

@@ -17,6 +17,7 @@
 #include "common/wire/convert.hpp"
 #include "osteon/v1/room.grpc.pb.h"
 #include "server/net/called_room.inl"
+#include "server/net/connections.hpp"
 
 namespace osteon {
 namespace {
@@ -114,6 +115,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* Join(grpc::CallbackServerContext* context, const v1::JoinRequest* request,
                                  v1::JoinResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::JoinRequest>(rooms_, *context, reactor)) return reactor;
     if (Status status = judge(*request); !status.ok()) {
       rooms_.refusals.note(status.error_code() == StatusCode::FAILED_PRECONDITION ? "version" : "request", address_of(context->peer()),
                            status.error_message());
@@ -184,6 +186,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* GetStatus(grpc::CallbackServerContext* context, const v1::GetStatusRequest*,
                                       v1::GetStatusResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::GetStatusRequest>(rooms_, *context, reactor)) return reactor;
     const std::shared_ptr<OpenRoom> room = room_of(rooms_, *context, reactor);
     if (!room) return reactor;
     room->host().run_slowly([room, reactor, response] {
@@ -215,6 +218,7 @@ class RoomServiceImpl final : public RoomBase {
   }
 
   WriteReactor* GetCase(grpc::CallbackServerContext* context, const ByteBuffer* bytes) override {
+    if (auto why = refusal_of<v1::GetCaseRequest>(rooms_, *context)) return refused(std::move(*why));
     const auto request = parse<v1::GetCaseRequest>(*bytes);
     if (!request) return refused(invalid("the GetCaseRequest could not be parsed"));
     const Result<Digest> hash = wire::digest_from_wire(request->case_hash());
@@ -240,6 +244,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* ListTools(grpc::CallbackServerContext* context, const v1::ListToolsRequest* request,
                                       v1::ListToolsResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::ListToolsRequest>(rooms_, *context, reactor)) return reactor;
     const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
     for (const ToolBox::Entry* entry : room->host().tools().entries()) {
@@ -256,6 +261,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* GetTool(grpc::CallbackServerContext* context, const v1::GetToolRequest* request,
                                     v1::GetToolResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::GetToolRequest>(rooms_, *context, reactor)) return reactor;
     const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
     const Result<Digest> hash = wire::digest_from_wire(request->tool_hash());
@@ -270,6 +276,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* AddTool(grpc::CallbackServerContext* context, const v1::AddToolRequest* request,
                                     v1::AddToolResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::AddToolRequest>(rooms_, *context, reactor)) return reactor;
     Result<Tool> tool = wire::from_wire(request->tool());
     if (!tool) return refuse(reactor, invalid(tool.error().message));
     return change(
@@ -283,6 +290,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* Undo(grpc::CallbackServerContext* context, const v1::UndoRequest* request,
                                  v1::UndoResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::UndoRequest>(rooms_, *context, reactor)) return reactor;
     std::vector<RoomSeq> places;
     for (const std::uint64_t place : request->room_seqs()) places.push_back(RoomSeq{place});
     const bool by_count = request->count() != 0 || request->of_author() != 0;
@@ -308,8 +316,10 @@ class RoomServiceImpl final : public RoomBase {
 
   grpc::ServerUnaryReactor* Redo(grpc::CallbackServerContext* context, const v1::RedoRequest* request,
                                  v1::RedoResponse* response) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::RedoRequest>(rooms_, *context, reactor)) return reactor;
     return change(
-        *context, context->DefaultReactor(), request->author(),
+        *context, reactor, request->author(),
         [by = AuthorId{request->author()}, count = request->count()](Room& room) { return room.redo_last(by, count); },
         [response](const RoomEvent& event) {
           response->set_room_seq(event.room_seq.value);
@@ -319,16 +329,20 @@ class RoomServiceImpl final : public RoomBase {
 
   grpc::ServerUnaryReactor* Mark(grpc::CallbackServerContext* context, const v1::MarkRequest* request,
                                  v1::MarkResponse* response) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::MarkRequest>(rooms_, *context, reactor)) return reactor;
     return change(
-        *context, context->DefaultReactor(), request->author(),
+        *context, reactor, request->author(),
         [by = AuthorId{request->author()}, label = request->label()](Room& room) { return room.mark(by, label); },
         [response](const RoomEvent& event) { response->set_room_seq(event.room_seq.value); });
   }
 
   grpc::ServerUnaryReactor* RemoveBody(grpc::CallbackServerContext* context, const v1::RemoveBodyRequest* request,
                                        v1::RemoveBodyResponse* response) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::RemoveBodyRequest>(rooms_, *context, reactor)) return reactor;
     return change(
-        *context, context->DefaultReactor(), request->author(),
+        *context, reactor, request->author(),
         [by = AuthorId{request->author()}, body = BodyId{request->body()}](Room& room) { return room.remove_body(by, body); },
         [response](const RoomEvent& event) { response->set_room_seq(event.room_seq.value); });
   }
@@ -336,6 +350,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* SetSceneItem(grpc::CallbackServerContext* context, const v1::SetSceneItemRequest* request,
                                          v1::SetSceneItemResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::SetSceneItemRequest>(rooms_, *context, reactor)) return reactor;
     const Result<SceneItem> item = wire::from_wire(request->item());
     if (!item) return refuse(reactor, invalid(item.error().message));
     const Result<Placing> placing = wire::placing_from_wire(*request);
@@ -353,8 +368,10 @@ class RoomServiceImpl final : public RoomBase {
 
   grpc::ServerUnaryReactor* RemoveSceneItem(grpc::CallbackServerContext* context, const v1::RemoveSceneItemRequest* request,
                                             v1::RemoveSceneItemResponse* response) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::RemoveSceneItemRequest>(rooms_, *context, reactor)) return reactor;
     return change(
-        *context, context->DefaultReactor(), request->author(),
+        *context, reactor, request->author(),
         [by = AuthorId{request->author()}, item = request->item()](Room& room) { return room.remove_item(by, item); },
         [response](const RoomEvent& event) { response->set_room_seq(event.room_seq.value); });
   }
@@ -362,6 +379,7 @@ class RoomServiceImpl final : public RoomBase {
   grpc::ServerUnaryReactor* SaveFields(grpc::CallbackServerContext* context, const v1::SaveFieldsRequest* request,
                                        v1::SaveFieldsResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::SaveFieldsRequest>(rooms_, *context, reactor)) return reactor;
     const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
     if (room->save.empty())

@@ -7,6 +7,7 @@
 #include "server/net/rooms.hpp"
 
 namespace grpc {
+class CallbackGenericService;
 class Service;
 }
 
@@ -25,5 +26,7 @@ class LinkServer;
 [[nodiscard]] std::unique_ptr<grpc::Service> make_people_service(Rooms& rooms);
 [[nodiscard]] std::unique_ptr<grpc::Service> make_rooms_service(Rooms& rooms);
 [[nodiscard]] std::unique_ptr<grpc::Service> make_case_service(Rooms& rooms);
+// Answers every call that none of them has.
+[[nodiscard]] std::unique_ptr<grpc::CallbackGenericService> make_unknown_calls(Rooms& rooms);
 
 }  // namespace osteon

@@ -102,6 +102,7 @@ class WatchServiceImpl final : public WatchBase {
   explicit WatchServiceImpl(Rooms& rooms) : rooms_(rooms) {}
 
   WriteReactor* WatchMesh(grpc::CallbackServerContext* context, const ByteBuffer* bytes) override {
+    if (auto why = refusal_of<v1::WatchMeshRequest>(rooms_, *context)) return refused(std::move(*why));
     const auto request = parse<v1::WatchMeshRequest>(*bytes);
     if (!request) return refused(invalid("the WatchMeshRequest could not be parsed"));
     const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context, AuthorId{request->author()});
@@ -124,6 +125,7 @@ class WatchServiceImpl final : public WatchBase {
   grpc::ServerUnaryReactor* LookFrom(grpc::CallbackServerContext* context, const v1::LookFromRequest* request,
                                      v1::LookFromResponse*) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (!admitted<v1::LookFromRequest>(rooms_, *context, reactor)) return reactor;
     const Result<Look> look = wire::from_wire(request->look());
     const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context, AuthorId{request->author()});
     if (!room) {
@@ -140,6 +142,7 @@ class WatchServiceImpl final : public WatchBase {
   }
 
   WriteReactor* WatchCutting(grpc::CallbackServerContext* context, const ByteBuffer* bytes) override {
+    if (auto why = refusal_of<v1::WatchCuttingRequest>(rooms_, *context)) return refused(std::move(*why));
     const auto request = parse<v1::WatchCuttingRequest>(*bytes);
     if (!request) return refused(invalid("the WatchCuttingRequest could not be parsed"));
     const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context, AuthorId{request->author()});

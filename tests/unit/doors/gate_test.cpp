@@ -43,15 +43,27 @@ class GateTest : public ::testing::Test {
   }
   // The refusal's sentence, with the word it is counted under; empty: let in.
   std::string refused(const std::string& user, const std::string& with, const std::string& room, const std::string& method, bool is_known) {
-    const auto caller = gate_->admit({certificate(user), with, room, method});
+    const auto caller =
+        gate_->admit({.peer = shown(certificate(user)), .ticket = with, .room = room, .method = method});
     if (caller) return {};
     EXPECT_EQ(caller.error().is_known, is_known) << caller.error().sentence;
     return std::string(caller.error().reason) + ": " + caller.error().sentence;
   }
   Caller let_in(const std::string& user, Role role, const std::string& room = "ward") {
-    const auto caller = gate_->admit({certificate(user), ticket(user, room, role), room, "/osteon.v1.RoomService/GetStatus"});
+    const auto caller = gate_->admit({.peer = shown(certificate(user)),
+                                      .ticket = ticket(user, room, role),
+                                      .room = room,
+                                      .method = "/osteon.v1.RoomService/GetStatus"});
     EXPECT_TRUE(caller.has_value()) << caller.error().sentence;
     return caller.value_or(Caller{});
+  }
+
+  static PeerClaims shown(std::string certificate) {
+    return {.certificate_pem = std::move(certificate), .peer = {}, .address = {}};
+  }
+  bool let_in_with(const std::string& certificate) {
+    const std::string text = ticket("anna", "ward", Role::trainee);
+    return gate_->admit({.peer = shown(certificate), .ticket = text, .room = "ward", .method = kUndo}).has_value();
   }
 
   static test::People* people_;
@@ -92,8 +104,8 @@ TEST_F(GateTest, SaysWhyNot) {
   EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::trainee), "other", kUndo, true), HasSubstr("room: "));
   EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::observer), "ward", kUndo, true), HasSubstr("role: an observer may not call RoomService/Undo"));
   EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::instructor), "ward", "/osteon.v1.RoomService/Nothing", true), HasSubstr("call: "));
-  EXPECT_FALSE(gate_->admit({content(people_->server() / "server.pem"), ticket("anna", "ward", Role::trainee), "ward", kUndo}));
-  EXPECT_FALSE(gate_->admit({"", ticket("anna", "ward", Role::trainee), "ward", kUndo}));
+  EXPECT_FALSE(let_in_with(content(people_->server() / "server.pem")));
+  EXPECT_FALSE(let_in_with(""));
   const auto counts = refusals_.counts();
   EXPECT_EQ(counts.at("ticket"), 4u);
   EXPECT_EQ(counts.at("certificate"), 2u);

@@ -157,7 +157,8 @@ TEST_F(Refused, ATicketIsItsOwnersAlone) {
 TEST_F(Refused, StrangersAreCountedAndLoggedOnce) {
   // A client in this process has taken gRPC's log over since the server started.
   RefusalCounts beside;
-  const HandshakeWatch again(beside);
+  Connections nobodys;
+  const HandshakeWatch again(beside, nobodys);
   const auto no_certificate = grpc::SslCredentials(
       {.pem_root_certs = content(people_.server() / "ca.pem"), .pem_private_key = "", .pem_cert_chain = ""});
   for (int i = 0; i < kTimes; ++i) {

@@ -48,6 +48,7 @@ retention_days: 365
 detail: near
 certificates: certs
 plain: true
+proxy_socket: proxy.sock
 most_connections: 40
 most_rooms: 12
 case_memory_mib: 2000
@@ -80,6 +81,7 @@ limits:
   EXPECT_EQ(c.detail, Detail::near);
   EXPECT_EQ(c.certificates, dir_ / "certs");
   EXPECT_TRUE(c.plain);
+  EXPECT_EQ(c.proxy_socket, dir_ / "proxy.sock");
   EXPECT_EQ(c.most_connections, 40);
   EXPECT_EQ(c.most_rooms, 12);
   EXPECT_EQ(c.case_memory_mib, 2000);
@@ -124,6 +126,7 @@ const std::multimap<std::string, std::pair<std::string, std::string>> kWrong{
     {"most_rooms", {"0", "from 1 to 65536"}},
     {"mount", {"soft", "true or false"}},
     {"plain", {"yes please", "true or false"}},
+    {"proxy_socket", {"[x]", "write a path"}},
     {"resume", {"''", "write a path"}},
     {"retention_days", {"0", "from 1 to 36500"}},
     {"rooms", {"[x]", "write a path"}},

@@ -1,0 +1,50 @@
+// Bounds how many calls a connection, or behind a proxy a certificate, may begin, whatever becomes of them. HTTP/2
+// lets a client begin and reset calls without waiting (CVE-2023-44487, "rapid reset"); gRPC 1.51 counts none of them.
+#pragma once
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <unordered_map>
+
+#include "server/net/peer_claims.hpp"
+
+namespace grpc::experimental {
+class ServerInterceptorFactoryInterface;
+}
+
+namespace osteon {
+
+struct FloodLimit {
+  double at_once = 2000.0;    // calls
+  double per_second = 400.0;  // calls, in the long run; the busiest client of ours makes 50
+};
+
+// Any thread.
+class CallFlood {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+  explicit CallFlood(FloodLimit limit) : limit_(limit) {}
+  // A call begins. `whose`: the connection, or behind a proxy the certificate. False: that has begun too many.
+  [[nodiscard]] bool take(const std::string& whose, Time now);
+
+ private:
+  static constexpr std::size_t kMost = 4096;  // connections remembered
+  struct Bucket {
+    double left = 0.0;
+    Time when{};
+  };
+  const FloodLimit limit_;
+  std::mutex mutex_;
+  std::unordered_map<std::string, Bucket> buckets_;  // by `whose`
+};
+
+// Is called for each call that begins beyond the limit, before its handler runs.
+using Flooded = std::function<void(const PeerClaims& peer)>;
+// `flood` outlives the server.
+[[nodiscard]] std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> flood_watch(CallFlood& flood,
+                                                                                                 Flooded flooded);
+
+}  // namespace osteon

@@ -1,0 +1,202 @@
+// People who have, or once had, a certificate of the authority, and say by HTTP/2 what no client of ours would: the
+// server lives on, others notice nothing, and the log says who and from where.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <functional>
+#include <iostream>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <string>
+
+#include "common/wire/room_client.hpp"
+#include "server/net/room_server.hpp"
+#include "tests/support/doors/people.hpp"
+#include "tests/support/doors/raw_http2.hpp"
+#include "tests/support/wait.hpp"
+#include "tests/unit/room/cuts.hpp"
+#include "tests/unit/room/members.hpp"
+#include "tests/unit/room/members.hpp"
+
+namespace osteon {
+namespace {
+
+using namespace std::chrono_literals;
+using test::kPatience;
+using test::kPatience;
+using test::RawHttp2;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr std::uint8_t kHeadersFrame = 1;
+constexpr const char* kGetStatus = "/osteon.v1.RoomService/GetStatus";
+constexpr const char* kSession = "/osteon.v1.CuttingService/Session";
+
+class Insiders : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const Case bone = test::test_block();
+    ASSERT_TRUE(bone.save(dir_ / "case"));
+    auto rooms = std::make_unique<Rooms>(RoomsOptions{.cases = {{bone, dir_ / "case"}}});
+    ASSERT_TRUE(rooms->create("ward", nullptr));
+    auto started =
+        RoomServer::start(std::move(rooms), "127.0.0.1:0",
+                          {.certificates = people_.server(), .flood = {.at_once = kCalls, .per_second = 1.0}});
+    ASSERT_TRUE(started.has_value()) << started.error().message;
+    server_ = std::move(*started);
+    anna_ = people_.door("anna", Role::trainee, "ward");
+    (void)people_.person("mallory");
+    testing::internal::CaptureStdout();  // where a program that has not opened its log writes it
+    capturing_ = true;
+  }
+  // Somebody else still comes in as before.
+  void TearDown() override {
+    if (!server_) return;
+    const auto joined = wire::join_room(address(), wire::ClientKind::viewer, "anna", 5s, {}, "ward", anna_);
+    EXPECT_TRUE(joined.has_value()) << joined.error().message;
+    if (capturing_) (void)log();
+  }
+  static constexpr double kCalls = 50;
+  const std::string& address() { return server_->address(); }
+  std::string log() {
+    capturing_ = false;
+    // What failed meanwhile stands in it too.
+    std::string said = testing::internal::GetCapturedStdout();
+    std::cout << said;
+    return said;
+  }
+  // What the first stream is answered; false: the connection ends without it.
+  static bool is_answered(RawHttp2& line) {
+    while (const auto frame = line.read(5s))
+      if (frame->type == kHeadersFrame) return true;
+    return false;
+  }
+  std::uint64_t counted(const std::string& reason) {
+    const auto counts = server_->rooms().refusals.counts();
+    const auto found = counts.find(reason);
+    return found == counts.end() ? 0 : found->second;
+  }
+
+  test::TempDir dir_;
+  test::People people_;
+  wire::Door anna_;
+  std::unique_ptr<RoomServer> server_;
+  bool capturing_ = false;
+};
+
+// gRPC 1.51 ends the process where an AuthMetadataProcessor is handed the first of these.
+TEST_F(Insiders, AreRefusedForHeadersThatNoClientHas) {
+  const RawHttp2::Headers strange[] = {{{"grpclb_client_stats", "x"}}, {{"lb-token", "x"}},
+                                       {{"lb-cost-bin", "x"}},        {{"grpc-tags-bin", "x"}},
+                                       {{"x-osteon-certificate", "x"}}, {{"grpc-previous-rpc-attempts", "1"}},
+                                       {{"grpc-retry-pushback-ms", "1"}}, {{"endpoint-load-metrics-bin", "x"}}};
+  for (const RawHttp2::Headers& headers : strange)
+    for (const char* path : {kGetStatus, kSession, "/osteon.v1.RoomService/Nothing", "/grpc.health.v1.Health/Check"}) {
+      RawHttp2 line(address(), people_.person("mallory"));
+      ASSERT_TRUE(line.call(1, path, headers) && line.send_empty_message(1));
+      EXPECT_TRUE(is_answered(line)) << path << " " << headers.front().first;
+    }
+  // Nobody has come in without a ticket; without a strange header that alone is why.
+  EXPECT_EQ(server_->door_health().gate.admitted, 0u);
+  RawHttp2 line(address(), people_.person("mallory"));
+  ASSERT_TRUE(line.call(1, kSession));
+  EXPECT_TRUE(is_answered(line));
+  const std::string said = log();
+  EXPECT_THAT(said, HasSubstr("a header that this server does not know; leave out "));
+  EXPECT_THAT(said, HasSubstr("no ticket came with the call"));
+  EXPECT_THAT(said, HasSubstr("mallory"));
+  EXPECT_THAT(said, HasSubstr("ipv4:127.0.0.1"));
+}
+
+TEST_F(Insiders, WhoAreRevokedFailInTheHandshake) {
+  people_.certs({"revoke", "mallory"});
+  ASSERT_TRUE(test::wait_until(
+      [&] {
+        RawHttp2 line(address(), people_.person("mallory"));
+        (void)line.call(1, kGetStatus, {{"grpclb_client_stats", "x"}});
+        return !line.read(5s);
+      },
+      kPatience));
+  const std::uint64_t refused = server_->door_health().gate.refused;
+  for (int i = 0; i < 5; ++i) {
+    RawHttp2 line(address(), people_.person("mallory"));
+    (void)line.call(1, kGetStatus, {{"grpclb_client_stats", "x"}});
+    // Not even the settings with which an HTTP/2 server begins.
+    EXPECT_FALSE(line.read(5s).has_value());
+    EXPECT_TRUE(line.closed_within(kPatience));
+  }
+  EXPECT_EQ(server_->door_health().gate.refused, refused) << "calls came through";
+  EXPECT_GE(counted("revoked"), 5u);
+  const std::string said = log();
+  EXPECT_THAT(said, HasSubstr("mallory, certificate "));
+  EXPECT_THAT(said, HasSubstr("was revoked; ask for a new one"));
+  EXPECT_THAT(said, HasSubstr("ipv4:127.0.0.1"));
+}
+
+TEST_F(Insiders, WhoAreRevokedLoseTheConnectionsThatTheyHave) {
+  RawHttp2 of_a_call(address(), people_.person("mallory"));
+  ASSERT_TRUE(of_a_call.call(1, kSession));
+  ASSERT_TRUE(is_answered(of_a_call));
+  RawHttp2 of_no_call(address(), people_.person("mallory"));
+  ASSERT_TRUE(of_no_call.read(5s).has_value());  // the server's settings: the handshake is over
+  const wire::Door anna = anna_;
+  RawHttp2 annas(address(), people_.person("anna"));
+  ASSERT_TRUE(annas.call(1, kSession));
+  ASSERT_TRUE(is_answered(annas));
+
+  people_.certs({"revoke", "mallory"});
+  EXPECT_TRUE(of_a_call.closed_within(kPatience));
+  EXPECT_TRUE(of_no_call.closed_within(kPatience));
+  EXPECT_FALSE(annas.closed_within(1s)) << "the connection of somebody else was closed";
+  EXPECT_TRUE(test::wait_until([&] { return server_->door_health().connections.open == 1; }, kPatience));
+}
+
+// A revocation list as other authorities write it holds as the server's own list does.
+TEST_F(Insiders, AreRevokedByAListOfTheAuthorityAlone) {
+  const std::filesystem::path list = people_.server() / "access.txt";
+  people_.certs({"revoke", "mallory"});
+  ASSERT_TRUE(std::filesystem::exists(people_.server() / "crl.pem"));
+  std::ofstream(list) << "# nobody\n";
+  EXPECT_TRUE(test::wait_until([&] { return !RawHttp2(address(), people_.person("mallory")).read(5s); }, kPatience));
+  EXPECT_TRUE(RawHttp2(address(), people_.person("anna")).read(5s).has_value());
+}
+
+// CVE-2023-44487: calls that are begun and reset, without waiting.
+TEST_F(Insiders, WhoResetCallsRapidlyAreCutOffAndWait) {
+  RawHttp2 line(address(), people_.person("mallory"));
+  int begun = 0;
+  for (std::uint32_t stream = 1; stream < 40'001; stream += 2, ++begun)
+    if (!line.call(stream, kSession) || !line.reset(stream)) break;
+  EXPECT_TRUE(line.closed_within(kPatience));
+  EXPECT_GE(counted("flood"), 1u);
+  // What had arrived when the connection was closed may still begin; it is refused.
+  EXPECT_LT(server_->door_health().gate.admitted + server_->door_health().gate.refused, 20'000u);
+  // They do not come again at once, whatever connection they take.
+  EXPECT_FALSE(RawHttp2(address(), people_.person("mallory")).read(5s).has_value());
+  EXPECT_TRUE(RawHttp2(address(), people_.person("anna")).read(5s).has_value());
+  const std::string said = log();
+  EXPECT_THAT(said, HasSubstr("mallory"));
+  EXPECT_THAT(said, HasSubstr("more calls than a connection may begin"));
+}
+
+// Handshakes that fail are noted with the address, whatever is wrong.
+TEST_F(Insiders, AndStrangersAreNotedWithTheirAddress) {
+  test::People elsewhere;
+  EXPECT_FALSE(RawHttp2(address(), elsewhere.person("anna")).read(5s).has_value());
+  EXPECT_FALSE(RawHttp2(address()).read(5s).has_value());
+  ASSERT_TRUE(test::wait_until([&] { return counted("certificate") == 1 && counted("tls") >= 1; }, kPatience));
+  std::istringstream lines(log());
+  int noted = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.find("refused") == std::string::npos) continue;
+    ++noted;
+    EXPECT_THAT(line, HasSubstr("ipv4:127.0.0.1"));
+  }
+  EXPECT_EQ(noted, 2);
+}
+
+}  // namespace
+}  // namespace osteon
