@@ -118,7 +118,7 @@ TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
   ASSERT_EQ(stage_.server().terminate(30s), 0) << stage_.server().err();
   // Each of those who were refused is in the server's log, once.
   const std::string log = stage_.server().err();
-  EXPECT_THAT(log, HasSubstr("who=eve reason=person"));
+  EXPECT_THAT(log, HasSubstr("who=eve from=ipv4:127.0.0.1 reason=person"));
   EXPECT_THAT(log, HasSubstr("who=ben reason=revoked"));
 }
 
