@@ -19,13 +19,11 @@
 #include "tests/support/wait.hpp"
 #include "tests/unit/room/cuts.hpp"
 #include "tests/unit/room/members.hpp"
-#include "tests/unit/room/members.hpp"
 
 namespace osteon {
 namespace {
 
 using namespace std::chrono_literals;
-using test::kPatience;
 using test::kPatience;
 using test::RawHttp2;
 using testing::HasSubstr;
