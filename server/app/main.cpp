@@ -279,7 +279,8 @@ Result<void> run(const ServerConfig& options, const StopSignal& stop) {
   }
   const DoorOptions doors{.certificates = options.certificates,
                           .most_connections = static_cast<std::size_t>(options.most_connections),
-                          .proxy_socket = options.proxy_socket};
+                          .proxy_socket = options.proxy_socket,
+                          .udp_listen = options.udp_listen};
   if (Result<void> usable = RoomServer::check_listen(options.listen, doors); !usable) return usable;
   if (Result<void> usable = check_writable(options.save_file, "the fields", "--save"); !usable) return usable;
   Result<std::unique_ptr<Rooms>> rooms = open_rooms(options);
@@ -343,6 +344,9 @@ int main(int argc, char** argv) {
   add_key_command(app, command);
   app.require_subcommand(0, 1);
   app.add_option("--listen", options.listen, "HOST:PORT on this machine; port 0 lets the system choose")->capture_default_str();
+  app.add_option(
+      "--udp-listen", options.udp_listen,
+      "HOST:PORT for the datagrams of the fast path, HOST numeric; without it where --listen is, at a free port");
   app.add_option("--certificates", options.certificates,
                  "Folder with ca.pem, server.pem, server.key and tickets.pub, as deploy/certs makes it: clients come with a certificate and a ticket");
   app.add_option("--proxy-socket", options.proxy_socket,

@@ -130,6 +130,8 @@ const std::vector<Field>& fields() {
       {"signing_key", [](const Value& v, Config& c) { c.signing_key = path(v); }},
       {"summary", [](const Value& v, Config& c) { c.summary_file = path(v); }},
       {"tools", [](const Value& v, Config& c) { c.tools_folder = path(v); }},
+      {"udp_listen",
+       [](const Value& v, Config& c) { c.udp_listen = host_port(v, "write HOST:PORT, such as 0.0.0.0:50000"); }},
       {"uploads", [](const Value& v, Config& c) { c.uploads_folder = path(v); }},
   };
   return all;

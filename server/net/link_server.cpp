@@ -98,10 +98,10 @@ void SessionLink::close() {
   sink_ = nullptr;
 }
 
-Result<std::unique_ptr<LinkServer>> LinkServer::open(const std::string& address) {
-  Result<std::unique_ptr<UdpPort>> port = UdpPort::open({.address = address});
-  if (!port) return tl::unexpected(port.error());
-  return std::unique_ptr<LinkServer>(new LinkServer(std::move(*port)));
+Result<std::unique_ptr<LinkServer>> LinkServer::open(const std::string& address, std::uint16_t port) {
+  Result<std::unique_ptr<UdpPort>> opened = UdpPort::open({.address = address, .port = port});
+  if (!opened) return tl::unexpected(opened.error());
+  return std::unique_ptr<LinkServer>(new LinkServer(std::move(*opened)));
 }
 
 LinkServer::LinkServer(std::unique_ptr<UdpPort> port) : port_(std::move(port)) {

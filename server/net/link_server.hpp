@@ -81,8 +81,8 @@ struct LinkServerHealth {
 
 class LinkServer {
  public:
-  // `address`: numeric, as UdpPortOptions. Errors of UdpPort::open.
-  [[nodiscard]] static Result<std::unique_ptr<LinkServer>> open(const std::string& address);
+  // `address`: numeric, as UdpPortOptions; `port` 0: the system chooses. Errors of UdpPort::open.
+  [[nodiscard]] static Result<std::unique_ptr<LinkServer>> open(const std::string& address, std::uint16_t port = 0);
   ~LinkServer();
   LinkServer(const LinkServer&) = delete;
   LinkServer& operator=(const LinkServer&) = delete;

@@ -38,6 +38,28 @@ Result<std::unique_ptr<Listener>> listen_on(const std::string& listen, const Doo
   return listener;
 }
 
+// Where `doors.udp_listen` says, or at a free port of where connections come in: then a failure is no error, since the
+// streams carry everything.
+Result<std::unique_ptr<LinkServer>> hear_datagrams(const DoorOptions& doors, const std::string& address) {
+  if (doors.udp_listen.empty()) {
+    Result<std::unique_ptr<LinkServer>> links = LinkServer::open(address);
+    if (links) return links;
+    log::warn("no fast path", {{"reason", links.error().message}});
+    return nullptr;
+  }
+  const Result<HostPort> at = parse_host_port(doors.udp_listen, "--udp-listen");
+  if (!at) return tl::unexpected(at.error());
+  if (doors.certificates.empty() && !is_loopback(at->host))
+    return failure(ErrorCode::invalid_input, "--udp-listen " + doors.udp_listen +
+                                                 " is reachable from other machines, but this server speaks plain "
+                                                 "text; use 127.0.0.1 or [::1], or give --certificates DIR");
+  std::string host = at->host;
+  if (host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
+  return LinkServer::open(host, static_cast<std::uint16_t>(at->port)).map_error([&](const Error& error) {
+    return Error{error.code, "--udp-listen " + doors.udp_listen + ": " + error.message};
+  });
+}
+
 constexpr int kMaxReceiveBytes = 4 * 1024 * 1024;  // a cut of 64 knots is below 4 kB, a tool made from a mesh a few MB
 constexpr int kMaxSendBytes = 4 * 1024 * 1024;     // a piece of a case is 1 MiB
 constexpr int kKeepaliveMs = 10'000;               // a peer that answers no ping that long is gone
@@ -76,6 +98,9 @@ RoomServer::~RoomServer() {
 Result<void> RoomServer::check_listen(const std::string& listen, const DoorOptions& doors) {
   const Result<std::unique_ptr<Listener>> listener = listen_on(listen, doors);
   if (!listener) return tl::unexpected(listener.error());
+  if (doors.udp_listen.empty()) return {};
+  const Result<std::unique_ptr<LinkServer>> links = hear_datagrams(doors, (*listener)->address());
+  if (!links) return tl::unexpected(links.error());
   return {};
 }
 
@@ -124,10 +149,9 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
     impl->proxy_listener = std::move(*proxy);
   }
   // Beside the streams; without it all goes over them.
-  if (Result<std::unique_ptr<LinkServer>> links = LinkServer::open(impl->listener->address()); links)
-    impl->links = std::move(*links);
-  else
-    log::warn("no fast path", {{"reason", links.error().message}});
+  Result<std::unique_ptr<LinkServer>> links = hear_datagrams(doors, impl->listener->address());
+  if (!links) return tl::unexpected(links.error());
+  impl->links = std::move(*links);
   impl->services.push_back(make_room_service(*impl->rooms));
   impl->services.push_back(make_cutting_service(*impl->rooms, impl->links.get()));
   impl->services.push_back(make_watch_service(*impl->rooms));

@@ -24,6 +24,9 @@ struct DoorOptions {
   // A Unix socket at which a proxy of this machine brings calls in plain text, and says of each whose it is
   // (peer_claims.hpp); empty: there is none. Needs certificates.
   std::filesystem::path proxy_socket{};
+  // Where datagrams of the fast path come in: HOST:PORT, HOST numeric. Empty: where connections do, at a port that the
+  // system chooses.
+  std::string udp_listen{};
   FloodLimit flood{};  // of calls over one connection
   // After which calls go over a new connection, with a new handshake and the authority's certificates as they are then. Streams go
   // on over the old one for `longest_session` more; then it is closed, and sessions come again by themselves.

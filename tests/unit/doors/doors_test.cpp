@@ -21,6 +21,7 @@
 #include <string>
 #include <thread>
 
+#include "common/link/udp_port.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/room_client.hpp"
 #include "osteon/v1/people.grpc.pb.h"
@@ -518,6 +519,37 @@ TEST(DoorsSomewhere, HaveTheFastPathWhereverTheServerListens) {
     ++heard;
   }
   EXPECT_GE(heard, 3);
+}
+
+// A firewall lets one known port through.
+TEST(DoorsSomewhere, HaveTheFastPathAtThePortThatIsAskedFor) {
+  test::People people;
+  const test::TempDir dir;
+  const Case bone = test::test_block();
+  ASSERT_TRUE(bone.save(dir / "case"));
+  const auto start = [&](const std::string& udp_listen, bool with_certificates = true) {
+    auto rooms = std::make_unique<Rooms>(RoomsOptions{.cases = {{bone, dir / "case"}}});
+    EXPECT_TRUE(rooms->create("ward", nullptr));
+    return RoomServer::start(
+        std::move(rooms), "127.0.0.1:0",
+        {.certificates = with_certificates ? people.server() : std::filesystem::path(), .udp_listen = udp_listen});
+  };
+  // The system chose this one for another socket, and it is free again.
+  const std::uint16_t port = UdpPort::open({}).value()->local().port;
+  const std::string at = "127.0.0.1:" + std::to_string(port);
+  const auto server = start(at);
+  ASSERT_TRUE(server.has_value()) << server.error().message;
+  EXPECT_EQ((*server)->link_port(), port);
+  test::Surgeon surgeon((*server)->address(), dir / "cache", "", "ward", people.door("sue", Role::trainee, "ward"));
+  EXPECT_TRUE(test::wait_until([&] { return surgeon.session().fast_path().alive; }, test::kPatience));
+  // A second server finds it taken, before it prepares anything too.
+  const auto second = start(at);
+  ASSERT_FALSE(second.has_value());
+  EXPECT_THAT(second.error().message, HasSubstr("--udp-listen " + at));
+  EXPECT_THAT(second.error().message, HasSubstr("give an address of this machine and a free port"));
+  EXPECT_FALSE(RoomServer::check_listen("127.0.0.1:0", {.certificates = people.server(), .udp_listen = at}));
+  EXPECT_THAT(start("somewhere:1").error().message, HasSubstr("no numeric address"));
+  EXPECT_THAT(start("0.0.0.0:0", false).error().message, HasSubstr("--certificates DIR"));
 }
 
 // A surgeon of the ward at work, and somebody beside who is in trouble.

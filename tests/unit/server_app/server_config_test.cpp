@@ -44,6 +44,7 @@ resume: resume.vdb
 journal: room.journal
 rooms: rooms
 uploads: uploads
+udp_listen: 0.0.0.0:50001
 retention_days: 365
 detail: near
 certificates: certs
@@ -77,6 +78,7 @@ limits:
   EXPECT_EQ(c.journal_file, dir_ / "room.journal");
   EXPECT_EQ(c.rooms_folder, dir_ / "rooms");
   EXPECT_EQ(c.uploads_folder, dir_ / "uploads");
+  EXPECT_EQ(c.udp_listen, "0.0.0.0:50001");
   EXPECT_EQ(c.retention_days, 365);
   EXPECT_EQ(c.detail, Detail::near);
   EXPECT_EQ(c.certificates, dir_ / "certs");
@@ -134,6 +136,7 @@ const std::multimap<std::string, std::pair<std::string, std::string>> kWrong{
     {"signing_key", {"[x]", "write a path"}},
     {"summary", {"{}", "write a path"}},
     {"tools", {"{}", "write a path"}},
+    {"udp_listen", {"50001", "HOST:PORT"}},
     {"uploads", {"[x]", "write a path"}},
 };
 
