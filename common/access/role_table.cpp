@@ -43,7 +43,7 @@ constexpr std::array kCalls{
     CallRow{"/osteon.v1.RoomsService/CloseRoom", kOperator},
     CallRow{"/osteon.v1.RoomsService/ResumeRoom", kOperator},
     CallRow{"/osteon.v1.RoomsService/BranchRoom", kOversight},
-    CallRow{"/osteon.v1.RoomsService/DeleteRoom", kOperator},
+    CallRow{"/osteon.v1.RoomsService/DeleteRoom", kOversight},  // an instructor: what they made
     CallRow{"/osteon.v1.RoomsService/VerifyRoom", kOversight},
     CallRow{"/osteon.v1.RoomsService/BackUpRoom", kOperator},
     CallRow{"/osteon.v1.RoomsService/ReplayRoom", kOversight},

@@ -207,6 +207,8 @@ Result<std::unique_ptr<Rooms>> open_rooms(const ServerConfig& options) {
   rooms_options.rates.mount = options.mount;
   rooms_options.retention_days = options.retention_days;
   rooms_options.most_rooms = options.most_rooms;
+  rooms_options.most_rooms_per_person = options.most_rooms_per_person;
+  rooms_options.most_backups_per_person = options.most_backups_per_person;
   rooms_options.keys = *keys;
   rooms_options.case_memory_bytes = static_cast<std::uint64_t>(options.case_memory_mib) << 20;
   std::uint64_t case_bytes = 0;
@@ -356,6 +358,14 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 65535))
       ->capture_default_str();
   app.add_option("--most-rooms", options.most_rooms, "Open and closed ones together; none is made, branched or shown again beyond")
+      ->check(CLI::Range(1, 65536))
+      ->capture_default_str();
+  app.add_option("--most-rooms-per-person", options.most_rooms_per_person,
+                 "Rooms, branches and replays together that somebody who is no operator may have made")
+      ->check(CLI::Range(1, 65536))
+      ->capture_default_str();
+  app.add_option("--most-backups-per-person", options.most_backups_per_person,
+                 "Backups in the folder of rooms that one person, operators too, may have made")
       ->check(CLI::Range(1, 65536))
       ->capture_default_str();
   app.add_option("--address-file", options.address_file, "Written with HOST:PORT when clients may come");

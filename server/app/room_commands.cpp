@@ -108,7 +108,7 @@ void add_room_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
   of_room("backup", "Copies a room's journal while the room is cut", back_up)
       ->add_option("file", given->file_name, "Plain name in the server's folder of rooms, ending in .backup")
       ->required();
-  of_room("delete", "Deletes a room and all that is kept of it", remove)
+  of_room("delete", "Deletes a room and all that is kept of it, or a backup by its name NAME.backup", remove)
       ->add_flag("--with-branches", given->with_branches, "Its branches, and theirs, too");
 }
 

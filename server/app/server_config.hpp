@@ -28,6 +28,7 @@ struct ServerConfig {
   bool plain = false;                   // without: plain text, on this machine alone
   int most_connections = 512;           // of everybody together
   int most_rooms = kMostRooms;          // open and closed ones together
+  int most_rooms_per_person = kMostRoomsPerPerson, most_backups_per_person = kMostBackupsPerPerson;
   std::filesystem::path address_file, summary_file, tools_folder;
   std::filesystem::path save_file, resume_file, journal_file, rooms_folder, uploads_folder;
   std::filesystem::path signing_key;    // empty: beside the journals

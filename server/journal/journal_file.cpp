@@ -102,6 +102,7 @@ Digest seal_of(std::string_view name, std::string_view value) {
 }  // namespace
 
 fs::path wal_of(const fs::path& journal) { return journal.string() + "-wal"; }
+fs::path owner_file_of(const fs::path& journal) { return journal.string() + "-owner"; }
 fs::path failed_of(const fs::path& journal) { return journal.string() + ".failed"; }
 
 fs::path checkpoint_file(const fs::path& journal, const JournalHead& at) {
@@ -159,7 +160,7 @@ bool belongs_to(const fs::path& journal, std::string_view name) {
   const std::string own = journal.filename().string();
   if (!name.starts_with(own)) return false;
   // A lock of earlier versions; the last two are SQLite's, where somebody else looked into it.
-  for (const std::string_view end : {"", "-log", "-mirror", "-wal", ".failed", ".lock", "-shm", "-journal"})
+  for (const std::string_view end : {"", "-log", "-mirror", "-owner", "-wal", ".failed", ".lock", "-shm", "-journal"})
     if (name == own + std::string(end)) return true;
   return is_partial_of(journal, name) || parse_checkpoint_file(journal, name);
 }

@@ -24,6 +24,7 @@ namespace osteon {
 
 // Files beside the journal's own, besides log_of() and mirror_of().
 [[nodiscard]] std::filesystem::path wal_of(const std::filesystem::path& journal);     // SQLite's write-ahead log
+[[nodiscard]] std::filesystem::path owner_file_of(const std::filesystem::path& journal);  // names who made it
 [[nodiscard]] std::filesystem::path failed_of(const std::filesystem::path& journal);  // says why it takes no more rows
 // Its name is a witness: of the place and the chain there.
 [[nodiscard]] std::filesystem::path checkpoint_file(const std::filesystem::path& journal, const JournalHead& at);

@@ -378,6 +378,11 @@ Gate::Entered Gate::enter(const Caller& caller, const std::string& room, AuthorI
   return std::shared_ptr<OpenStream>(stream);
 }
 
+Role Gate::role_in(const Caller& caller, const std::string& room) const {
+  const std::lock_guard lock(mutex_);
+  return access_list_.role(caller.user, room, caller.ticket_role);
+}
+
 GateCounts Gate::counts() const {
   const std::lock_guard lock(mutex_);
   GateCounts counts = counts_;

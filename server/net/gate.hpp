@@ -131,6 +131,8 @@ class Gate {
   using End = std::function<void(const Refusal& why)>;
   using Entered = tl::expected<std::shared_ptr<OpenStream>, Refusal>;
   [[nodiscard]] Entered enter(const Caller& caller, const std::string& room, AuthorId author, std::string_view method, End end);
+  // What a caller would be in another room than that of the call, if the ticket were for it.
+  [[nodiscard]] Role role_in(const Caller& caller, const std::string& room) const;
   [[nodiscard]] GateCounts counts() const;
   void look();  // at all streams, now
 

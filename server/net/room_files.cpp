@@ -13,7 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // Ends of names of files that are beside a journal, or not a whole one.
-constexpr std::array<std::string_view, 8> kNoJournals{"-wal",    "-log",        "-mirror",  ".lock",
+constexpr std::array<std::string_view, 9> kNoJournals{"-wal",    "-log",        "-mirror",  "-owner",  ".lock",
                                                       ".failed", ".checkpoint", ".partial", ".copying"};
 
 Disk& or_system(Disk* disk) { return disk != nullptr ? *disk : system_disk(); }

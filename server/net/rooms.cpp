@@ -4,6 +4,7 @@
 #include <chrono>
 #include <deque>
 #include <future>
+#include <iterator>
 #include <system_error>
 #include <utility>
 
@@ -14,6 +15,7 @@
 #include "server/net/gate.hpp"
 #include "server/net/journal_rows.hpp"
 #include "server/net/room_files.hpp"
+#include "server/net/room_owners.hpp"
 
 namespace osteon {
 namespace {
@@ -21,6 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kEnding = ".journal";
+constexpr const char* kBackupEnding = ".backup";
 constexpr const char* kOpenList = "open-rooms";  // in the folder: the names of those that are open, a line each
 constexpr std::chrono::seconds kUpkeepEvery{5};
 // Rows that a playback reads ahead.
@@ -31,6 +34,23 @@ bool is_name(const std::string& name) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
   };
   return !name.empty() && name.size() <= 64 && std::ranges::all_of(name, fits) && name.front() != '-';
+}
+
+// A plain name: nobody reaches another folder by it.
+bool is_backup_name(const std::string& name) {
+  const fs::path plain = name;
+  return plain == plain.filename() && plain.extension() == kBackupEnding && is_name(plain.stem().string());
+}
+
+// The first few, for a sentence.
+std::string some_of(const std::set<std::string>& names) {
+  constexpr std::size_t kMost = 5;
+  std::string text;
+  for (auto name = names.begin(); name != names.end(); ++name) {
+    if (std::distance(names.begin(), name) == kMost) return text + " and others";
+    text += (text.empty() ? "" : ", ") + *name;
+  }
+  return text;
 }
 
 Error no_such_room(const std::string& name) {
@@ -183,12 +203,22 @@ void Rooms::end_calls() {
 }
 
 void Rooms::run_upkeep() {
-  std::unique_lock lock(mutex_);
-  while (!upkeep_wake_.wait_for(lock, kUpkeepEvery, [&] { return ending_.load(); })) {
-    lock.unlock();
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point forget_at = Clock::now();
+  const auto keep_up = [&] {
+    if (options_.retention_days > 0 && Clock::now() >= forget_at) {
+      forget_at += std::chrono::hours(24);
+      if (const std::size_t gone = forget_owners(options_.folder, std::chrono::days(options_.retention_days)); gone > 0)
+        log::info("owners forgotten", {{"count", gone}});
+    }
     for (const std::shared_ptr<OpenRoom>& room : open_rooms()) room->keep_up(until_the_end().stop);
+  };
+  std::unique_lock lock(mutex_);
+  do {
+    lock.unlock();
+    keep_up();
     lock.lock();
-  }
+  } while (!upkeep_wake_.wait_for(lock, kUpkeepEvery, [&] { return ending_.load(); }));
 }
 
 UpkeepCalls Rooms::until_the_end() const {
@@ -297,12 +327,32 @@ std::vector<RoomListing> Rooms::list() const {
   return listed;
 }
 
-Result<void> Rooms::check_new(const std::string& name) const {
+std::string Rooms::owner(const std::string& name) const {
+  if (const Result<std::shared_ptr<OpenRoom>> room = find(name); room && !(*room)->keeper()) return (*room)->owner;
+  if (options_.folder.empty() || !(is_name(name) || is_backup_name(name))) return {};
+  return owner_of(is_name(name) ? journal_of(name) : options_.folder / name);
+}
+
+// So that nobody uses up the rooms of all.
+Result<void> Rooms::check_share(const Requester& by) const {
+  if (by.user.empty() || by.may_have_any_number) return {};
+  std::set<std::string> own = owned_by(by.user, options_.folder, kEnding);
+  for (const std::shared_ptr<OpenRoom>& room : open_rooms())
+    if (room->owner == by.user) own.insert(room->name);
+  if (own.size() < static_cast<std::size_t>(options_.most_rooms_per_person)) return {};
+  return failure(
+      ErrorCode::exhausted,
+      "you have made " + std::to_string(own.size()) + " rooms (" + some_of(own) +
+          "), as many as one person may have; delete one with osteon-server rooms delete NAME, or ask whoever "
+          "runs the server for a larger --most-rooms-per-person");
+}
+
+Result<void> Rooms::check_new(const std::string& name, const Requester& by) const {
   if (!is_name(name))
     return failure(ErrorCode::invalid_input, "\"" + name + "\" is no name of a room; use letters, digits, - and _, at most 64");
   if (Result<void> free = check_free(name); !free) return free;
   // Each open one holds a bone and threads, each closed one a journal.
-  if (count() < static_cast<std::size_t>(options_.most_rooms)) return {};
+  if (count() < static_cast<std::size_t>(options_.most_rooms)) return check_share(by);
   return failure(ErrorCode::exhausted, "there are " + std::to_string(options_.most_rooms) +
                                            " rooms, open and closed, as many as there may be; delete some, or start the server with a larger --most-rooms");
 }
@@ -377,16 +427,18 @@ void Rooms::resume_all(const std::function<void(double)>& progress) {
   }
 }
 
-Result<std::shared_ptr<OpenRoom>> Rooms::create(const std::string& name, const Digest* case_hash) {
+Result<std::shared_ptr<OpenRoom>> Rooms::create(const std::string& name, const Digest* case_hash, const Requester& by) {
   const std::lock_guard changing(changing_);
-  if (Result<void> may = check_new(name); !may) return tl::unexpected(may.error());
+  if (Result<void> may = check_new(name, by); !may) return tl::unexpected(may.error());
   if (!case_hash && cases().size() > 1)
     return failure(ErrorCode::invalid_input, "the server has several cases; say which with --case-hash");
   const Result<LoadedCase> of = cases_.load(case_hash ? *case_hash : cases().front().hash);
   if (!of) return tl::unexpected(of.error());
-  if (!options_.folder.empty()) return open(name, *of, true, {});
-  return take_in(std::make_shared<OpenRoom>(name, *of, Room(*of->bone, options_.limits, options_.tools()), options_,
-                                            std::function<void(double)>{}, nullptr));
+  if (!options_.folder.empty()) return make_owned(journal_of(name), by.user, [&] { return open(name, *of, true, {}); });
+  auto made = std::make_shared<OpenRoom>(name, *of, Room(*of->bone, options_.limits, options_.tools()), options_,
+                                         std::function<void(double)>{}, nullptr);
+  made->owner = by.user;
+  return take_in(std::move(made));
 }
 
 Result<std::shared_ptr<OpenRoom>> Rooms::resume(const std::string& name, const std::function<void(double)>& progress) {
@@ -442,26 +494,30 @@ Result<RoomSummary> Rooms::close(const std::string& name) {
   return summary;
 }
 
-Result<std::shared_ptr<OpenRoom>> Rooms::branch(const std::string& name, const std::string& new_name, RoomSeq to) {
+Result<std::shared_ptr<OpenRoom>> Rooms::branch(const std::string& name, const std::string& new_name, RoomSeq to,
+                                                const Requester& by) {
   {
     const std::lock_guard changing(changing_);
-    if (Result<void> may = check_new(new_name); !may) return tl::unexpected(may.error());
+    if (Result<void> may = check_new(new_name, by); !may) return tl::unexpected(may.error());
     const Result<std::shared_ptr<OpenRoom>> from = find(name);
     if (from && !(*from)->keeper()) return tl::unexpected(not_kept(name));
     if (from && options_.folder.empty()) return tl::unexpected(kept_elsewhere(**from));
     const Result<fs::path> file = from ? Result<fs::path>(fs::path{}) : kept_file(name);
     if (!file) return tl::unexpected(file.error());
-    const Result<JournalHead> made = from ? (*from)->keeper()->branch(journal_of(new_name), to, new_name, until_the_end())
-                                          : branch_journal(*file, journal_of(new_name), to, new_name, until_the_end());
+    const fs::path journal = journal_of(new_name);
+    const Result<JournalHead> made = make_owned(journal, by.user, [&] {
+      return from ? (*from)->keeper()->branch(journal, to, new_name, until_the_end())
+                  : branch_journal(*file, journal, to, new_name, until_the_end());
+    });
     if (!made) return tl::unexpected(made.error());
   }
   return resume(new_name);
 }
 
-Result<std::shared_ptr<OpenRoom>> Rooms::replay(const std::string& name, const std::string& new_name, RoomSeq from, RoomSeq to,
-                                                double speed) {
+Result<std::shared_ptr<OpenRoom>> Rooms::replay(const std::string& name, const std::string& new_name, RoomSeq from,
+                                                RoomSeq to, double speed, const Requester& by) {
   const std::lock_guard changing(changing_);
-  if (Result<void> may = check_new(new_name); !may) return tl::unexpected(may.error());
+  if (Result<void> may = check_new(new_name, by); !may) return tl::unexpected(may.error());
   if (!(speed >= 0 && speed <= 1e6)) return failure(ErrorCode::invalid_input, "the speed is not between 0 and 1000000");
   const Result<std::shared_ptr<OpenRoom>> source = find(name);
   if (!source) return tl::unexpected(source.error());
@@ -487,6 +543,7 @@ Result<std::shared_ptr<OpenRoom>> Rooms::replay(const std::string& name, const s
   auto shown = std::make_shared<OpenRoom>(new_name, of, std::move(*room), options_, std::function<void(double)>{}, nullptr,
                                           std::move(playback));
   shown->shows = {name, last};
+  shown->owner = by.user;
   return take_in(std::move(shown));
 }
 
@@ -519,6 +576,7 @@ Result<RoomGenesis> Rooms::read(const std::string& name, RoomSeq to, const std::
 
 Result<std::vector<std::string>> Rooms::remove(const std::string& name, bool with_branches,
                                                const std::function<Result<void>(const std::string& room)>& may) {
+  if (is_backup_name(name)) return remove_backup(name, may);
   std::vector<std::string> names{name};
   if (const Result<fs::path> file = kept_file(name)) {
     // Only a room's own keeper can look into a journal that is in use.
@@ -558,6 +616,18 @@ Result<std::vector<std::string>> Rooms::remove(const std::string& name, bool wit
   return deleted;
 }
 
+Result<std::vector<std::string>> Rooms::remove_backup(const std::string& name,
+                                                      const std::function<Result<void>(const std::string&)>& may) {
+  const fs::path file = options_.folder / name;
+  std::error_code ignored;
+  if (options_.folder.empty() || !fs::exists(file, ignored))
+    return failure(ErrorCode::not_found, "there is no backup " + name + " in the server's folder of rooms");
+  if (const Result<void> allowed = may ? may(name) : Result<void>{}; !allowed) return tl::unexpected(allowed.error());
+  if (const Result<void> gone = delete_journals({file}); !gone) return tl::unexpected(gone.error());
+  log::info("backup deleted", {{"file", name}});
+  return std::vector<std::string>{name};
+}
+
 Result<RoomReport> Rooms::verify(const std::string& name) {
   const Result<std::shared_ptr<OpenRoom>> room = find(name);
   if (!room) return tl::unexpected(room.error());
@@ -573,17 +643,27 @@ Result<RoomReport> Rooms::verify(const std::string& name) {
   return (*room)->keeper()->verify((*room)->host().bone(), BoneAt{status.room_seq, status.field_hash}, until_the_end());
 }
 
-Result<JournalHead> Rooms::back_up(const std::string& name, const std::string& file_name, fs::path& file) {
+Result<JournalHead> Rooms::back_up(const std::string& name, const std::string& file_name, fs::path& file,
+                                   const Requester& by) {
   const Result<std::shared_ptr<OpenRoom>> room = find(name);
   if (!room) return tl::unexpected(room.error());
   if (!(*room)->keeper()) return tl::unexpected(not_kept(name));
   if (options_.folder.empty()) return tl::unexpected(kept_elsewhere(**room));
   // A client names no folder: it may not write elsewhere on the server's disk.
-  const fs::path plain = file_name;
-  if (plain != plain.filename() || plain.extension() != ".backup" || !is_name(plain.stem().string()))
+  if (!is_backup_name(file_name))
     return failure(ErrorCode::invalid_input, "\"" + file_name + "\" is not a plain name that ends in .backup");
-  file = options_.folder / plain;
-  return (*room)->keeper()->backup(file, until_the_end());
+  file = options_.folder / file_name;
+  std::error_code ignored;
+  if (fs::exists(file, ignored))
+    return failure(ErrorCode::exists, "there is a backup " + file_name + "; choose another name, or delete it");
+  const std::set<std::string> own =
+      by.user.empty() ? std::set<std::string>{} : owned_by(by.user, options_.folder, kBackupEnding);
+  if (own.size() >= static_cast<std::size_t>(options_.most_backups_per_person))
+    return failure(ErrorCode::exhausted,
+                   "you have made " + std::to_string(own.size()) + " backups (" + some_of(own) +
+                       "), as many as one person may have on the server; delete one with osteon-server rooms delete "
+                       "NAME.backup, move some elsewhere, or start the server with a larger --most-backups-per-person");
+  return make_owned(file, by.user, [&] { return (*room)->keeper()->backup(file, until_the_end()); });
 }
 
 std::map<std::string, RoomSummary> Rooms::close_all() {

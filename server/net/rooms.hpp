@@ -42,7 +42,15 @@ struct RoomSummary {
   Digest surface_hash;         // equal to every viewer's that has shown room_seq
 };
 
-inline constexpr int kMostRooms = 256;  // unless somebody says otherwise
+// Unless somebody says otherwise.
+inline constexpr int kMostRooms = 256;
+inline constexpr int kMostRoomsPerPerson = 16, kMostBackupsPerPerson = 64;
+
+// Who asks for a room or a backup, and owns it then.
+struct Requester {
+  std::string user{};                // of the certificate; empty: nobody says who asks, and nothing is counted
+  bool may_have_any_number = false;  // of rooms: an operator
+};
 
 struct RoomsOptions {
   std::vector<ServedCase> cases;      // at least one; in memory as long as the rooms are
@@ -56,6 +64,8 @@ struct RoomsOptions {
   std::shared_ptr<CaseStore> store{};  // where uploaded cases are kept, shared with uploads under way; null: none are taken
   std::uint64_t case_memory_bytes = kMostCaseMemory;  // of all cases that rooms have
   int most_rooms = kMostRooms;        // open and closed ones together; none is made beyond
+  // Of those that one person made: rooms, branches and playbacks together, and backups in the folder.
+  int most_rooms_per_person = kMostRoomsPerPerson, most_backups_per_person = kMostBackupsPerPerson;
 };
 
 // A room that is open. Streams and calls hold it, so that it is there until the last of them is over.
@@ -67,6 +77,7 @@ class OpenRoom {
   const std::string name;
   const LoadedCase of;                // in memory for as long as this is
   std::filesystem::path save;         // where the cut fields are written on request; empty: nowhere
+  std::string owner;                  // who made one that is not kept; of one that is kept see Rooms::owner()
   const std::uint64_t server_epoch;   // rises with every opening
   std::optional<std::pair<std::string, RoomSeq>> shows;  // of a playback: which room, up to where
 
@@ -135,25 +146,30 @@ class Rooms {
   // All that were open when the folder was last left, however that was. Those that cannot be opened are logged.
   void resume_all(const std::function<void(double)>& progress);
   // `case_hash` null: of the only case.
-  Result<std::shared_ptr<OpenRoom>> create(const std::string& name, const Digest* case_hash);
+  Result<std::shared_ptr<OpenRoom>> create(const std::string& name, const Digest* case_hash, const Requester& by = {});
   Result<std::shared_ptr<OpenRoom>> resume(const std::string& name, const std::function<void(double)>& progress = {});
   Result<RoomSummary> close(const std::string& name);
   // All that `name` was up to that event, null for all.
-  Result<std::shared_ptr<OpenRoom>> branch(const std::string& name, const std::string& new_name, RoomSeq to);
+  Result<std::shared_ptr<OpenRoom>> branch(const std::string& name, const std::string& new_name, RoomSeq to,
+                                           const Requester& by = {});
   // Shows `name`, which is open, from one event, null for its beginning, to another, null for its last. It ends early where
   // that room is closed meanwhile.
-  Result<std::shared_ptr<OpenRoom>> replay(const std::string& name, const std::string& new_name, RoomSeq from, RoomSeq to,
-                                           double speed);
+  Result<std::shared_ptr<OpenRoom>> replay(const std::string& name, const std::string& new_name, RoomSeq from,
+                                           RoomSeq to, double speed, const Requester& by = {});
   // The rows of a kept room, open or closed, from its first to `to`, null for all, until `take` returns false; and what it
   // began as.
   Result<RoomGenesis> read(const std::string& name, RoomSeq to, const std::function<bool(const RoomRow&)>& take);
-  // The names of those that are gone. `may` is asked of it and of each branch that would go too, before any does; its error is the
-  // result. Error unavailable: it has branches, and they are not to go too; it is kept elsewhere.
+  // Who made a room or, where the name has its ending, a backup; empty: nobody knows.
+  [[nodiscard]] std::string owner(const std::string& name) const;
+  // Removes a room, or a backup by its file's name. The names of those that are gone. `may` is asked of it and of each
+  // branch that would go too, before any does; its error is the result. Error unavailable: it has branches, and they
+  // are not to go too; it is kept elsewhere.
   Result<std::vector<std::string>> remove(const std::string& name, bool with_branches,
                                           const std::function<Result<void>(const std::string& room)>& may = {});
   // Of an open room, while it is cut.
   Result<RoomReport> verify(const std::string& name);
-  Result<JournalHead> back_up(const std::string& name, const std::string& file_name, std::filesystem::path& file);
+  Result<JournalHead> back_up(const std::string& name, const std::string& file_name, std::filesystem::path& file,
+                              const Requester& by = {});
 
   // From now on nobody is let in, and demonstrations are over. `again`: when those who are asked to leave may come again.
   void begin_drain(std::chrono::milliseconds again, const std::string& why);
@@ -174,10 +190,13 @@ class Rooms {
 
  private:
   [[nodiscard]] std::filesystem::path journal_of(const std::string& name) const;
-  [[nodiscard]] Result<void> check_new(const std::string& name) const;  // with changing_
+  [[nodiscard]] Result<void> check_new(const std::string& name, const Requester& by) const;  // with changing_
+  [[nodiscard]] Result<void> check_share(const Requester& by) const;
   [[nodiscard]] Result<void> check_free(const std::string& name) const;
   [[nodiscard]] std::size_t count() const;  // of open and of kept ones
   [[nodiscard]] Result<std::filesystem::path> kept_file(const std::string& name) const;
+  Result<std::vector<std::string>> remove_backup(const std::string& name,
+                                                 const std::function<Result<void>(const std::string&)>& may);
   Result<std::shared_ptr<OpenRoom>> open(const std::string& name, const LoadedCase& of, bool is_new,
                                          const std::function<void(double)>& progress);
   std::shared_ptr<OpenRoom> take_in(std::shared_ptr<OpenRoom> room);

@@ -31,16 +31,23 @@ Error error_of(const grpc::Status& status) {
 template <class Response, class Request>
 Result<Response> ask(const std::shared_ptr<grpc::Channel>& channel,
                      grpc::Status (v1::RoomsService::Stub::*call)(grpc::ClientContext*, const Request&, Response*),
-                     const Request& request) {
+                     const Request& request, const std::string& in_room) {
   grpc::ClientContext context;
-  // By the role in that room it is let in, too, which may be more than the ticket's.
-  if constexpr (requires { request.name(); })
-    if (!request.name().empty()) context.AddMetadata("osteon-room-bin", request.name());
+  if (!in_room.empty()) context.AddMetadata("osteon-room-bin", in_room);
   Response response;
   const auto stub = v1::RoomsService::NewStub(channel);
   const grpc::Status status = (stub.get()->*call)(&context, request, &response);
   if (!status.ok()) return tl::unexpected(error_of(status));
   return response;
+}
+
+template <class Response, class Request>
+Result<Response> ask(const std::shared_ptr<grpc::Channel>& channel,
+                     grpc::Status (v1::RoomsService::Stub::*call)(grpc::ClientContext*, const Request&, Response*),
+                     const Request& request) {
+  // By the role in that room it is let in, too, which may be more than the ticket's.
+  if constexpr (requires { request.name(); }) return ask(channel, call, request, request.name());
+  return ask(channel, call, request, "");
 }
 
 RoomLine line_of(const v1::RoomInfo& info) {
@@ -131,7 +138,10 @@ Result<std::vector<std::string>> RoomsClient::remove(const std::string& name, bo
   v1::DeleteRoomRequest request;
   request.set_name(name);
   request.set_with_branches(with_branches);
-  const auto response = ask(channel_, &v1::RoomsService::Stub::DeleteRoom, request);
+  // By the ticket's own room first: who made a branch has a ticket for the room that it was made from.
+  auto response = ask(channel_, &v1::RoomsService::Stub::DeleteRoom, request, "");
+  if (!response && response.error().code == ErrorCode::denied)
+    response = ask(channel_, &v1::RoomsService::Stub::DeleteRoom, request);
   if (!response) return tl::unexpected(response.error());
   return std::vector<std::string>(response->deleted().begin(), response->deleted().end());
 }

@@ -44,22 +44,25 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
       reactor->Finish(status_of(caller.error()));
       return reactor;
     }
-    rooms_.files.run([this, reactor, context, response] {
+    rooms_.files.run([this, reactor, context, response, caller = *caller] {
       for (const RoomListing& listing : rooms_.list())
-        if (caller_in(rooms_, *context, listing.name, method("ListRooms"))) *response->add_rooms() = to_wire(listing);
+        if (caller_in(rooms_, *context, listing.name, method("ListRooms")) || is_owner(caller, listing.name))
+          *response->add_rooms() = to_wire(listing);
       reactor->Finish(Status::OK);
     });
     return reactor;
   }
   Reactor* CreateRoom(Context* context, const v1::CreateRoomRequest* request, v1::CreateRoomResponse* response) override {
-    return slowly(context, "CreateRoom", request->name(), [this, request, response] {
+    return slowly(context, "CreateRoom", request->name(), [this, context, request, response] {
       std::optional<Digest> hash;
       if (!request->case_hash().empty()) {
         const Result<Digest> named = wire::digest_from_wire(request->case_hash());
         if (!named) return invalid("case_hash is not a digest of 32 bytes");
         hash = *named;
       }
-      return told(rooms_.create(request->name(), hash ? &*hash : nullptr), response->mutable_room());
+      const Result<Requester> by = requester(*context, "CreateRoom", request->name());
+      if (!by) return status_of(by.error());
+      return told(rooms_.create(request->name(), hash ? &*hash : nullptr, *by), response->mutable_room());
     });
   }
   Reactor* CloseRoom(Context* context, const v1::CloseRoomRequest* request, v1::CloseRoomResponse* response) override {
@@ -77,17 +80,17 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     return slowly(context, "ResumeRoom", request->name(), [this, request, response] { return told(rooms_.resume(request->name()), response->mutable_room()); });
   }
   Reactor* BranchRoom(Context* context, const v1::BranchRoomRequest* request, v1::BranchRoomResponse* response) override {
-    return slowly(context, "BranchRoom", request->name(), [this, request, response] {
-      return told(rooms_.branch(request->name(), request->new_name(), RoomSeq{request->room_seq()}), response->mutable_room());
+    return slowly(context, "BranchRoom", request->name(), [this, context, request, response] {
+      const Result<Requester> by = requester(*context, "BranchRoom", request->name());
+      if (!by) return status_of(by.error());
+      return told(rooms_.branch(request->name(), request->new_name(), RoomSeq{request->room_seq()}, *by),
+                  response->mutable_room());
     });
   }
   Reactor* DeleteRoom(Context* context, const v1::DeleteRoomRequest* request, v1::DeleteRoomResponse* response) override {
-    return slowly(context, "DeleteRoom", request->name(), [this, context, request, response] {
+    const auto work = [this, context, request, response] {
       // Of every branch too it is asked whether the caller may.
-      const auto may = [&](const std::string& room) -> Result<void> {
-        const Result<Caller> caller = caller_in(rooms_, *context, room, method("DeleteRoom"));
-        return caller ? Result<void>{} : tl::unexpected(caller.error());
-      };
+      const auto may = [&](const std::string& room) { return may_delete(*context, room); };
       const Result<std::vector<std::string>> gone = rooms_.remove(request->name(), request->with_branches(), may);
       if (!gone) return status_of(gone.error());
       for (const std::string& name : *gone) {
@@ -95,7 +98,9 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
         response->add_deleted(name);
       }
       return Status(Status::OK);
-    });
+    };
+    return slowly(context, "DeleteRoom", request->name(), work,
+                  [this, context, request] { return may_delete(*context, request->name()); });
   }
   Reactor* VerifyRoom(Context* context, const v1::VerifyRoomRequest* request, v1::VerifyRoomResponse* response) override {
     return slowly(context, "VerifyRoom", request->name(), [this, request, response] {
@@ -110,9 +115,11 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     });
   }
   Reactor* BackUpRoom(Context* context, const v1::BackUpRoomRequest* request, v1::BackUpRoomResponse* response) override {
-    return slowly(context, "BackUpRoom", request->name(), [this, request, response] {
+    return slowly(context, "BackUpRoom", request->name(), [this, context, request, response] {
+      const Result<Requester> by = requester(*context, "BackUpRoom", request->name());
+      if (!by) return status_of(by.error());
       std::filesystem::path file;
-      const Result<JournalHead> copied = rooms_.back_up(request->name(), request->file_name(), file);
+      const Result<JournalHead> copied = rooms_.back_up(request->name(), request->file_name(), file, *by);
       if (!copied) return status_of(copied.error());
       response->set_room_seq(copied->place.value);
       response->set_chain(wire::to_wire(copied->chain));
@@ -121,9 +128,11 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     });
   }
   Reactor* ReplayRoom(Context* context, const v1::ReplayRoomRequest* request, v1::ReplayRoomResponse* response) override {
-    return slowly(context, "ReplayRoom", request->name(), [this, request, response] {
+    return slowly(context, "ReplayRoom", request->name(), [this, context, request, response] {
+      const Result<Requester> by = requester(*context, "ReplayRoom", request->name());
+      if (!by) return status_of(by.error());
       return told(rooms_.replay(request->name(), request->new_name(), RoomSeq{request->from_room_seq()},
-                                RoomSeq{request->to_room_seq()}, request->speed()),
+                                RoomSeq{request->to_room_seq()}, request->speed(), *by),
                   response->mutable_room());
     });
   }
@@ -131,13 +140,36 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
  private:
   static std::string method(const char* name) { return std::string("/osteon.v1.RoomsService/") + name; }
 
-  // Judged by the room that the message names, at once and again when its turn comes: others may take minutes before it.
-  Reactor* slowly(Context* context, const char* name, const std::string& room, std::function<Status()> work) {
+  [[nodiscard]] Result<Requester> requester(Context& context, const char* name, const std::string& room) const {
+    const Result<Caller> caller = caller_in(rooms_, context, room, method(name));
+    if (!caller) return tl::unexpected(caller.error());
+    return Requester{caller->user, caller->role == Role::operator_};
+  }
+  [[nodiscard]] bool is_owner(const Caller& caller, const std::string& name) const {
+    return !caller.user.empty() && rooms_.owner(name) == caller.user;
+  }
+  // An operator, and who made it: also with a ticket for another room, as of a branch that they made.
+  [[nodiscard]] Result<void> may_delete(Context& context, const std::string& name) const {
+    if (!rooms_.gate) return {};
+    const std::string call = method("DeleteRoom");
+    const Result<Caller> in_room = caller_in(rooms_, context, name, call), caller = caller_of(rooms_, context);
+    if (!caller) return tl::unexpected(caller.error());
+    if (in_room && in_room->role == Role::operator_) return {};
+    if (is_owner(*caller, name) && may_call(rooms_.gate->role_in(*caller, name), call)) return {};
+    if (!in_room) return tl::unexpected(in_room.error());
+    return failure(ErrorCode::denied, name + " is not yours; only who made it, or an operator, may delete it");
+  }
+
+  // Judged by the room that the message names, or as `may` says, at once and again when its turn comes: others may take
+  // minutes before it.
+  Reactor* slowly(Context* context, const char* name, const std::string& room, std::function<Status()> work,
+                  const std::function<Result<void>()>& may = {}) {
     Reactor* reactor = context->DefaultReactor();
     if (std::optional<Status> why = refusal_of(rooms_, *context, method(name))) return refuse(reactor, std::move(*why));
-    const auto refusal = [this, context, name, room]() -> std::optional<Status> {
-      const Result<Caller> caller = caller_in(rooms_, *context, room, method(name));
-      return caller ? std::nullopt : std::optional(status_of(caller.error()));
+    const auto refusal = [this, context, name, room, may]() -> std::optional<Status> {
+      const auto in_room = [&] { return caller_in(rooms_, *context, room, method(name)).map([](const Caller&) {}); };
+      const Result<void> allowed = may ? may() : in_room();
+      return allowed ? std::nullopt : std::optional(status_of(allowed.error()));
     };
     // A call that names none would be about the only one that is open, whichever that is when its turn comes.
     std::optional<Status> refused = room.empty() ? std::optional(invalid("the request names no room")) : refusal();

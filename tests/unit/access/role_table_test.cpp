@@ -48,9 +48,9 @@ Names allowed(Role role) {
     names.insert({"/osteon.v1.CuttingService/Session", room + "AddTool", room + "Undo", room + "Redo", room + "Mark",
                   room + "SetSceneItem", room + "RemoveSceneItem", people + "Say"});
   if (role >= Role::instructor)
-    names.insert({people + "Supervise", people + "Annotate", people + "Demonstrate", people + "EndDemonstration", room + "RemoveBody",
-                  room + "SaveFields", rooms + "ListRooms", rooms + "VerifyRoom", rooms + "BranchRoom", rooms + "ReplayRoom",
-                  cases + "ListCases"});
+    names.insert({people + "Supervise", people + "Annotate", people + "Demonstrate", people + "EndDemonstration",
+                  room + "RemoveBody", room + "SaveFields", rooms + "ListRooms", rooms + "DeleteRoom",
+                  rooms + "VerifyRoom", rooms + "BranchRoom", rooms + "ReplayRoom", cases + "ListCases"});
   return names;
 }
 

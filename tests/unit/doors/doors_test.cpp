@@ -172,8 +172,8 @@ void Doors::expect_every_role_to_make_the_calls_that_are_for_it() {
   // By the rules as people are told them: what a role may do beyond looking.
   const std::set<std::string> hands{"Session", "AddTool", "Undo", "Redo", "Mark", "SetSceneItem", "RemoveSceneItem", "Say"},
       instructors{"RemoveBody", "SaveFields", "Supervise", "Annotate", "Demonstrate", "EndDemonstration"},
-      both{"ListRooms", "VerifyRoom", "BranchRoom", "ReplayRoom", "ListCases"},
-      operators{"CreateRoom", "CloseRoom", "ResumeRoom", "DeleteRoom", "BackUpRoom", "UploadCase"};
+      both{"ListRooms", "DeleteRoom", "VerifyRoom", "BranchRoom", "ReplayRoom", "ListCases"},
+      operators{"CreateRoom", "CloseRoom", "ResumeRoom", "BackUpRoom", "UploadCase"};
   const auto may = [&](Role role, const std::string& name) {
     if (operators.contains(name)) return role == Role::operator_;
     if (both.contains(name)) return role == Role::operator_ || role == Role::instructor;

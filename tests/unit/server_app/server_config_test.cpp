@@ -52,6 +52,8 @@ plain: true
 proxy_socket: proxy.sock
 most_connections: 40
 most_rooms: 12
+most_rooms_per_person: 3
+most_backups_per_person: 4
 case_memory_mib: 2000
 mount: true
 metrics: 9464
@@ -86,6 +88,8 @@ limits:
   EXPECT_EQ(c.proxy_socket, dir_ / "proxy.sock");
   EXPECT_EQ(c.most_connections, 40);
   EXPECT_EQ(c.most_rooms, 12);
+  EXPECT_EQ(c.most_rooms_per_person, 3);
+  EXPECT_EQ(c.most_backups_per_person, 4);
   EXPECT_EQ(c.case_memory_mib, 2000);
   EXPECT_TRUE(c.mount);
   EXPECT_EQ(c.metrics, "9464");
@@ -124,8 +128,10 @@ const std::multimap<std::string, std::pair<std::string, std::string>> kWrong{
     {"listen", {"127.0.0.1:70000", "HOST:PORT"}},
     {"metrics", {"0.0.0.0:9464", "this machine alone"}},
     {"metrics", {"port", "write a port"}},
+    {"most_backups_per_person", {"none", "from 1 to 65536"}},
     {"most_connections", {"0", "from 1 to 65535"}},
     {"most_rooms", {"0", "from 1 to 65536"}},
+    {"most_rooms_per_person", {"0", "from 1 to 65536"}},
     {"mount", {"soft", "true or false"}},
     {"plain", {"yes please", "true or false"}},
     {"proxy_socket", {"[x]", "write a path"}},
