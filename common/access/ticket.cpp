@@ -201,6 +201,15 @@ Result<void> check_time(const Ticket& ticket, UnixTime now) {
   return failure(ErrorCode::unavailable, "the ticket expired at " + time_text(ticket.expires) + "; ask for a new one");
 }
 
+Result<void> check_life(const Ticket& ticket, UnixTime now, std::chrono::hours most) {
+  constexpr std::chrono::minutes kClocksDiffer{1};
+  if (most == std::chrono::hours(0) || ticket.expires <= now + most + kClocksDiffer) return {};
+  const auto left = std::chrono::ceil<std::chrono::hours>(ticket.expires - now);
+  return failure(ErrorCode::unavailable, "the ticket is good for " + std::to_string(left.count()) +
+                                             " more hours, and this server takes none for more than " +
+                                             std::to_string(most.count()) + "; ask for a shorter one");
+}
+
 Result<void> check_room(const Ticket& ticket, std::string_view room) {
   if (ticket.room == kAnyRoom || ticket.room == room) return {};
   return failure(ErrorCode::unsupported, "the ticket is for room " + ticket.room + " and not for this one; ask for one for this room");

@@ -25,6 +25,7 @@ struct Ticket {
 };
 inline constexpr std::string_view kAnyRoom = "*";
 inline constexpr std::size_t kMostTicketChars = 1024;  // of its text form
+inline constexpr std::chrono::hours kLongTicket{168};  // more than that wants a reason
 
 struct TicketKey {
   std::array<std::uint8_t, 32> seed{};  // secret
@@ -55,6 +56,9 @@ struct TicketCheckKey {
 [[nodiscard]] Result<Ticket> open_ticket(std::string_view text, const TicketCheckKey& key);
 // Error unavailable: it has expired.
 [[nodiscard]] Result<void> check_time(const Ticket& ticket, UnixTime now);
+// Error unavailable: it is good for longer than a server may take, zero for any time, from now on: it does not say
+// since when. A minute more is for clocks that differ.
+[[nodiscard]] Result<void> check_life(const Ticket& ticket, UnixTime now, std::chrono::hours most);
 // Error unsupported: it is for another room.
 [[nodiscard]] Result<void> check_room(const Ticket& ticket, std::string_view room);
 

@@ -282,7 +282,8 @@ Result<void> run(const ServerConfig& options, const StopSignal& stop) {
   const DoorOptions doors{.certificates = options.certificates,
                           .most_connections = static_cast<std::size_t>(options.most_connections),
                           .proxy_socket = options.proxy_socket,
-                          .udp_listen = options.udp_listen};
+                          .udp_listen = options.udp_listen,
+                          .most_ticket_life = std::chrono::hours(options.most_ticket_hours)};
   if (Result<void> usable = RoomServer::check_listen(options.listen, doors); !usable) return usable;
   if (Result<void> usable = check_writable(options.save_file, "the fields", "--save"); !usable) return usable;
   Result<std::unique_ptr<Rooms>> rooms = open_rooms(options);
@@ -357,6 +358,9 @@ int main(int argc, char** argv) {
   app.add_option("--most-connections", options.most_connections, "Of everybody together; further ones are closed at once")
       ->check(CLI::Range(1, 65535))
       ->capture_default_str();
+  app.add_option("--most-ticket-hours", options.most_ticket_hours,
+                 "Refuses tickets that are good for more hours, counted from the call; without it none")
+      ->check(CLI::Range(1, 87600));
   app.add_option("--most-rooms", options.most_rooms, "Open and closed ones together; none is made, branched or shown again beyond")
       ->check(CLI::Range(1, 65536))
       ->capture_default_str();

@@ -122,6 +122,7 @@ const std::vector<Field>& fields() {
       {"most_connections", [](const Value& v, Config& c) { c.most_connections = whole(v, 1, 65535); }},
       {"most_rooms", [](const Value& v, Config& c) { c.most_rooms = whole(v, 1, 65536); }},
       {"most_rooms_per_person", [](const Value& v, Config& c) { c.most_rooms_per_person = whole(v, 1, 65536); }},
+      {"most_ticket_hours", [](const Value& v, Config& c) { c.most_ticket_hours = whole(v, 1, 87600); }},
       {"mount", [](const Value& v, Config& c) { c.mount = yes_or_no(v); }},
       {"plain", [](const Value& v, Config& c) { c.plain = yes_or_no(v); }},
       {"proxy_socket", [](const Value& v, Config& c) { c.proxy_socket = path(v); }},
@@ -262,6 +263,8 @@ Result<void> check_server_config(const ServerConfig& config) {
     return wrong("--signing-key signs journals, and none is kept; give --rooms FOLDER or --journal FILE too");
   if (ways[0].second && !config.save_file.empty())
     return wrong("--rooms excludes --save, on the command line as in a --config file; leave one");
+  if (config.plain && config.most_ticket_hours != 0)
+    return wrong("--most-ticket-hours needs --certificates DIR: over plain text nobody has a ticket");
   if (config.plain && !config.proxy_socket.empty())
     return wrong("--proxy-socket needs --certificates DIR: a proxy brings calls of people");
   if (config.plain == !config.certificates.empty())

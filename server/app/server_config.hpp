@@ -26,6 +26,7 @@ struct ServerConfig {
   std::filesystem::path certificates;   // folder, as Gate::open has it
   std::filesystem::path proxy_socket;   // Unix socket for a proxy of this machine; empty: none
   bool plain = false;                   // without: plain text, on this machine alone
+  int most_ticket_hours = 0;            // 0: however long a ticket is good
   int most_connections = 512;           // of everybody together
   int most_rooms = kMostRooms;          // open and closed ones together
   int most_rooms_per_person = kMostRoomsPerPerson, most_backups_per_person = kMostBackupsPerPerson;

@@ -35,6 +35,12 @@ Result<void> run(const Arguments& given) {
   // Beside what is kept as the file: by this it can be revoked.
   std::fprintf(stderr, "ticket %s: %s, %s in %s, for %g hours\n", to_hex(ticket->id).c_str(), ticket->user.c_str(), given.role.c_str(),
                given.room == kAnyRoom ? "every room" : given.room.c_str(), given.hours);
+  if (good_for > kLongTicket)
+    std::fprintf(
+        stderr,
+        "warning: this ticket is good for more than %d hours, and a server with --most-ticket-hours may refuse it; "
+        "give fewer --hours\n",
+        static_cast<int>(kLongTicket.count()));
   return {};
 }
 

@@ -239,6 +239,8 @@ tl::expected<Caller, Refusal> Gate::judge(const CallClaims& call) {
   if (call.ticket.empty()) return refused("ticket", false, "no ticket came with the call; give one with --ticket FILE");
   const Result<Ticket> ticket = ticket_of(call.ticket);
   if (!ticket) return refused("ticket", false, ticket.error().message);
+  if (const Result<void> short_enough = check_life(*ticket, now_(), most_ticket_life_); !short_enough)
+    return refused("ticket", false, short_enough.error().message);
   if (ticket->user != certificate->user)
     return refused("person", true, "the ticket is for " + ticket->user + " and the certificate for " + certificate->user + "; come with your own");
   if (!call.room.empty())

@@ -95,6 +95,9 @@ class Gate {
   // Which room a call is to that names none, with a ticket for every room; empty: there is no such. Before the first call.
   void set_only_room(std::function<std::string()> name) { only_room_ = std::move(name); }
 
+  // Tickets that are good for longer, counted from now, are refused; zero: none is. Before the first call.
+  void set_most_ticket_life(std::chrono::hours most) { most_ticket_life_ = most; }
+
   // Through which connections are closed whose certificate is revoked; they outlive the gate. Before the first call.
   void set_connections(Connections& connections) { connections_ = &connections; }
 
@@ -161,6 +164,7 @@ class Gate {
   RefusalCounts& refusals_;
   const Now now_;
   std::function<std::string()> only_room_;
+  std::chrono::hours most_ticket_life_{0};
   Connections* connections_ = nullptr;  // null: of a gate without a server
   std::mutex reading_;         // taken before mutex_, never within it
   AccessFile access_;          // under reading_, as the next

@@ -131,6 +131,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
     if (!gate) return tl::unexpected(gate.error());
     impl->gate = std::move(*gate);
     impl->rooms->gate = impl->gate.get();
+    impl->gate->set_most_ticket_life(doors.most_ticket_life);
     impl->gate->set_connections(impl->listener->connections());
     impl->gate->set_only_room([all = impl->rooms.get()] {
       const Result<std::shared_ptr<OpenRoom>> only = all->find("");

@@ -27,6 +27,7 @@ struct DoorOptions {
   // Where datagrams of the fast path come in: HOST:PORT, HOST numeric. Empty: where connections do, at a port that the
   // system chooses.
   std::string udp_listen{};
+  std::chrono::hours most_ticket_life{0};  // tickets that are good for longer are refused; zero: none is
   FloodLimit flood{};  // of calls over one connection
   // After which calls go over a new connection, with a new handshake and the authority's certificates as they are then. Streams go
   // on over the old one for `longest_session` more; then it is closed, and sessions come again by themselves.

@@ -122,6 +122,23 @@ TEST_F(GateTest, GoesByTheClock) {
   EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::trainee), "ward", kUndo, false), HasSubstr("certificate: the certificate has expired"));
 }
 
+TEST_F(GateTest, TakesNoTicketThatIsGoodForTooLong) {
+  const std::string day = ticket("anna", "ward", Role::trainee, 24h), more = ticket("anna", "ward", Role::trainee, 26h);
+  EXPECT_EQ(refused("anna", more, "ward", kUndo, true), "") << "unless somebody says otherwise";
+  gate_->set_most_ticket_life(24h);
+  EXPECT_EQ(refused("anna", day, "ward", kUndo, true), "");
+  EXPECT_EQ(refused("anna", more, "ward", kUndo, false),
+            "ticket: the ticket is good for 26 more hours, and this server takes none for more than 24; ask for a "
+            "shorter one");
+  // A ticket does not say since when it is good: what is left counts.
+  now_ += 2 * 3600;
+  EXPECT_EQ(refused("anna", more, "ward", kUndo, true), "");
+  // The clock of whoever signs may be a little ahead.
+  EXPECT_EQ(refused("anna", ticket("anna", "ward", Role::trainee, 24h + 59s), "ward", kUndo, true), "");
+  EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::trainee, 24h + 61s), "ward", kUndo, false),
+              HasSubstr("25 more hours"));
+}
+
 TEST_F(GateTest, ReadsTheListWhileItRuns) {
   const std::string good = ticket("anna", "ward", Role::trainee), instead = ticket("ben", "ward", Role::trainee);
   people_->append_access("role anna observer ward");

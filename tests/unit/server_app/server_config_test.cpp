@@ -52,6 +52,7 @@ plain: true
 proxy_socket: proxy.sock
 most_connections: 40
 most_rooms: 12
+most_ticket_hours: 168
 most_rooms_per_person: 3
 most_backups_per_person: 4
 case_memory_mib: 2000
@@ -88,6 +89,7 @@ limits:
   EXPECT_EQ(c.proxy_socket, dir_ / "proxy.sock");
   EXPECT_EQ(c.most_connections, 40);
   EXPECT_EQ(c.most_rooms, 12);
+  EXPECT_EQ(c.most_ticket_hours, 168);
   EXPECT_EQ(c.most_rooms_per_person, 3);
   EXPECT_EQ(c.most_backups_per_person, 4);
   EXPECT_EQ(c.case_memory_mib, 2000);
@@ -132,6 +134,7 @@ const std::multimap<std::string, std::pair<std::string, std::string>> kWrong{
     {"most_connections", {"0", "from 1 to 65535"}},
     {"most_rooms", {"0", "from 1 to 65536"}},
     {"most_rooms_per_person", {"0", "from 1 to 65536"}},
+    {"most_ticket_hours", {"0", "from 1 to 87600"}},
     {"mount", {"soft", "true or false"}},
     {"plain", {"yes please", "true or false"}},
     {"proxy_socket", {"[x]", "write a path"}},
@@ -206,6 +209,9 @@ TEST_F(ServerConfigTest, WhatDoesNotFitTogetherIsSaid) {
   EXPECT_NE(check_server_config(config).error().message.find("--plain excludes"), std::string::npos);
   config.certificates.clear();
   EXPECT_TRUE(check_server_config(config).has_value());
+  ServerConfig tickets = config;
+  tickets.most_ticket_hours = 24;
+  EXPECT_NE(check_server_config(tickets).error().message.find("--certificates"), std::string::npos);
   ServerConfig two = config;
   two.case_folders = {"a", "b"};
   EXPECT_NE(check_server_config(two).error().message.find("--rooms"), std::string::npos);
