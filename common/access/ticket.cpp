@@ -157,6 +157,23 @@ Result<TicketCheckKey> parse_check_key(std::string_view text) {
   if (!bytes) return tl::unexpected(bytes.error());
   return TicketCheckKey{*bytes};
 }
+Result<std::vector<TicketCheckKey>> parse_check_keys(std::string_view text) {
+  constexpr std::size_t kMostKeys = 4;
+  std::vector<TicketCheckKey> keys;
+  for (int line = 1; !text.empty(); ++line) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::string_view one = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    if (one.find_first_not_of(" \t\r") == std::string_view::npos) continue;
+    const Result<TicketCheckKey> key = parse_check_key(one);
+    if (!key) return failure(ErrorCode::invalid_input, "line " + std::to_string(line) + ": " + key.error().message);
+    keys.push_back(*key);
+  }
+  if (!keys.empty() && keys.size() <= kMostKeys) return keys;
+  return failure(ErrorCode::invalid_input, "it has " + std::to_string(keys.size()) +
+                                               " keys that check tickets, and not 1 to " + std::to_string(kMostKeys) +
+                                               "; make it with deploy/certs");
+}
 std::string to_text(const TicketKey& key) { return to_hex(Digest{key.seed}); }
 std::string to_text(const TicketCheckKey& key) { return to_hex(Digest{key.bytes}); }
 

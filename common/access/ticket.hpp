@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/access/role.hpp"
 #include "common/core/result.hpp"
@@ -32,6 +33,7 @@ struct TicketKey {
 };
 struct TicketCheckKey {
   std::array<std::uint8_t, 32> bytes{};  // public
+  friend bool operator==(const TicketCheckKey&, const TicketCheckKey&) = default;
 };
 
 // 1 to 64 letters, digits and . _ - @.
@@ -45,6 +47,9 @@ struct TicketCheckKey {
 // the text.
 [[nodiscard]] Result<TicketKey> parse_ticket_key(std::string_view text);
 [[nodiscard]] Result<TicketCheckKey> parse_check_key(std::string_view text);
+// One to four keys, a line each: while one takes over from another, tickets of both count. Empty lines do not matter.
+// Error invalid_input, naming the line.
+[[nodiscard]] Result<std::vector<TicketCheckKey>> parse_check_keys(std::string_view text);
 [[nodiscard]] std::string to_text(const TicketKey& key);
 [[nodiscard]] std::string to_text(const TicketCheckKey& key);
 

@@ -99,8 +99,11 @@ class Gate::Watched final : public OpenStream {
   std::atomic<Role> role_;
 };
 
-Gate::Gate(std::filesystem::path folder, TicketCheckKey key, RefusalCounts& counts, Now now)
-    : folder_(std::move(folder)), key_(key), refusals_(counts), now_(now ? std::move(now) : Now(system_now)), access_(folder_ / "access.txt") {}
+Gate::Gate(std::filesystem::path folder, RefusalCounts& counts, Now now)
+    : folder_(std::move(folder)),
+      refusals_(counts),
+      now_(now ? std::move(now) : Now(system_now)),
+      access_(folder_ / "access.txt") {}
 
 Gate::~Gate() {
   if (!thread_.joinable()) return;
@@ -114,15 +117,14 @@ Gate::~Gate() {
 
 Result<std::unique_ptr<Gate>> Gate::open(const std::filesystem::path& folder, RefusalCounts& counts, Now now) {
   const Result<std::string> authority = read_all(folder / "ca.pem"), certificate = read_all(folder / "server.pem"),
-                            secret = read_all(folder / "server.key"), check = read_all(folder / "tickets.pub");
-  for (const auto* file : {&authority, &certificate, &secret, &check})
+                            secret = read_all(folder / "server.key");
+  for (const auto* file : {&authority, &certificate, &secret})
     if (!*file) return tl::unexpected(file->error());
   if (const Result<void> pair = check_key_pair(*certificate, *secret); !pair)
     return failure(ErrorCode::invalid_input, (folder / "server.pem").string() + " and server.key: " + pair.error().message +
                                                  "; make both anew with deploy/certs server");
-  const Result<TicketCheckKey> key = parse_check_key(*check);
-  if (!key) return failure(ErrorCode::invalid_input, (folder / "tickets.pub").string() + ": " + key.error().message);
-  std::unique_ptr<Gate> gate(new Gate(folder, *key, counts, std::move(now)));
+  std::unique_ptr<Gate> gate(new Gate(folder, counts, std::move(now)));
+  if (const Result<bool> read = gate->read_ticket_keys(); !read) return tl::unexpected(read.error());
   // A list that is wrong at the start would let in whom it is to keep out.
   if (const Result<bool> read = gate->access_.refresh(); !read) return tl::unexpected(read.error());
   gate->access_list_ = gate->access_.list();
@@ -193,18 +195,25 @@ Result<void> Gate::check_shown(const PeerClaims& peer) {
   return {};
 }
 
-Result<Ticket> Gate::ticket_of(std::string_view text) {
+Result<Gate::CheckedTicket> Gate::ticket_of(std::string_view text) {
   if (const auto known = tickets_.find(std::string(text)); known != tickets_.end()) return known->second;
-  Result<Ticket> opened = open_ticket(text, key_);
-  if (!opened) return opened;
-  make_space(tickets_);
-  return tickets_.emplace(text, std::move(*opened)).first->second;
+  Result<Ticket> opened;
+  for (const TicketCheckKey& key : ticket_keys_) {
+    opened = open_ticket(text, key);
+    if (!opened) continue;
+    make_space(tickets_);
+    return tickets_.emplace(text, CheckedTicket{std::move(*opened), key}).first->second;
+  }
+  return tl::unexpected(opened.error());
 }
 
 std::optional<Refusal> Gate::judge_again(Caller& caller, const std::string& room, std::string_view method) const {
   const UnixTime now = now_();
   if (now >= caller.certificate_ends) return Refusal{"certificate", false, "the certificate has expired; ask for a new one"};
   if (const auto why = revoked(caller.serial, caller.user, caller.ticket_id)) return Refusal{"revoked", false, *why};
+  if (std::ranges::find(ticket_keys_, caller.ticket_key) == ticket_keys_.end())
+    return Refusal{"ticket", false,
+                   "the key that signed the ticket was replaced; ask whoever runs the server for a new ticket"};
   Ticket ticket;
   ticket.expires = caller.ends;
   if (const Result<void> in_time = check_time(ticket, now); !in_time)
@@ -237,8 +246,9 @@ tl::expected<Caller, Refusal> Gate::judge(const CallClaims& call) {
   const Result<PersonCertificate> certificate = certificate_of(call.peer.certificate_pem);
   if (!certificate) return refused("certificate", false, certificate.error().message);
   if (call.ticket.empty()) return refused("ticket", false, "no ticket came with the call; give one with --ticket FILE");
-  const Result<Ticket> ticket = ticket_of(call.ticket);
-  if (!ticket) return refused("ticket", false, ticket.error().message);
+  const Result<CheckedTicket> checked = ticket_of(call.ticket);
+  if (!checked) return refused("ticket", false, checked.error().message);
+  const Ticket* ticket = &checked->ticket;
   if (const Result<void> short_enough = check_life(*ticket, now_(), most_ticket_life_); !short_enough)
     return refused("ticket", false, short_enough.error().message);
   if (ticket->user != certificate->user)
@@ -252,6 +262,7 @@ tl::expected<Caller, Refusal> Gate::judge(const CallClaims& call) {
                 .ticket_role = ticket->role,
                 .role = ticket->role,
                 .ends = ticket->expires,
+                .ticket_key = checked->key,
                 .certificate_ends = certificate->ends,
                 .address = call.peer.address};
   // A role may hold in one room alone: that room has to be known here, however the call names it.
@@ -415,6 +426,19 @@ Result<bool> Gate::read_authorities() {
   return true;
 }
 
+Result<bool> Gate::read_ticket_keys() {
+  const std::filesystem::path file = folder_ / "tickets.pub";
+  const Result<std::string> text = read_all(file);
+  if (!text) return tl::unexpected(text.error());
+  Result<std::vector<TicketCheckKey>> keys = parse_check_keys(*text);
+  if (!keys) return failure(ErrorCode::invalid_input, file.string() + ": " + keys.error().message);
+  if (*keys == ticket_keys_) return false;
+  const std::lock_guard lock(mutex_);
+  ticket_keys_ = std::move(*keys);
+  tickets_.clear();
+  return true;
+}
+
 // A disk that is slow lets no call wait: only what was read is put in under the lock that calls take.
 void Gate::refresh() {
   const std::lock_guard reading(reading_);
@@ -433,6 +457,9 @@ void Gate::refresh() {
   const Result<bool> authorities = read_authorities();
   if (authorities && *authorities) log::info("authorities", {{"revoked_certificates", listed_serials_.size()}});
   tell("authorities", authorities, authorities_fault_);
+  const Result<bool> keys = read_ticket_keys();
+  if (keys && *keys) log::info("ticket keys", {{"keys", ticket_keys_.size()}});
+  tell("ticket keys were not read, and those before count on", keys, keys_fault_);
   revoked_anew_ = (list && *list) || (authorities && *authorities);
 }
 

@@ -45,6 +45,7 @@ struct Caller {
   Role ticket_role = Role::none;     // of the ticket
   Role role = Role::none;            // what holds now
   UnixTime ends{};                   // of the ticket
+  TicketCheckKey ticket_key{};       // that checks the ticket
   UnixTime certificate_ends{};
   std::string room{};                // that the call named or meant, where the role holds
   std::string address{};             // from where the call came, as address_of() has it
@@ -84,8 +85,8 @@ class Gate {
   static constexpr std::chrono::milliseconds kLookEvery{250};
   using Now = std::function<UnixTime()>;
 
-  // `folder`: ca.pem, server.pem, server.key, tickets.pub; access.txt and crl.pem where somebody was revoked. All but
-  // tickets.pub are read again when they change. `counts` outlives it. Errors: not_found, invalid_input; the sentence
+  // `folder`: ca.pem, server.pem, server.key, tickets.pub; access.txt and crl.pem where somebody was revoked. All are
+  // read again when they change. `counts` outlives it. Errors: not_found, invalid_input; the sentence
   // names the file.
   [[nodiscard]] static Result<std::unique_ptr<Gate>> open(const std::filesystem::path& folder, RefusalCounts& counts, Now now = {});
   ~Gate();
@@ -141,9 +142,11 @@ class Gate {
 
  private:
   class Watched;
-  Gate(std::filesystem::path folder, TicketCheckKey key, RefusalCounts& counts, Now now);
+  Gate(std::filesystem::path folder, RefusalCounts& counts, Now now);
   // Reads ca.pem and crl.pem. True: they are other ones now. Under reading_.
   [[nodiscard]] Result<bool> read_authorities();
+  // Reads tickets.pub. True: it has other keys now. Under reading_.
+  [[nodiscard]] Result<bool> read_ticket_keys();
   // Closes the connections whose certificate is revoked, and those of which nobody knows yet whose they are.
   void close_revoked();
   [[nodiscard]] std::optional<std::string> revoked(const std::string& serial, const std::string& user,
@@ -155,12 +158,15 @@ class Gate {
   [[nodiscard]] Result<void> check_resume_locked(const Caller& caller, const std::string& room, int kind, AuthorId author) const;
   [[nodiscard]] Result<PersonCertificate> certificate_of(std::string_view pem);  // under mutex_, as the next three
   [[nodiscard]] Result<void> check_shown(const PeerClaims& peer);
-  [[nodiscard]] Result<Ticket> ticket_of(std::string_view text);
+  struct CheckedTicket {
+    Ticket ticket;
+    TicketCheckKey key;
+  };
+  [[nodiscard]] Result<CheckedTicket> ticket_of(std::string_view text);
   void refresh();
   void run();
 
   const std::filesystem::path folder_;
-  const TicketCheckKey key_;
   RefusalCounts& refusals_;
   const Now now_;
   std::function<std::string()> only_room_;
@@ -168,17 +174,18 @@ class Gate {
   Connections* connections_ = nullptr;  // null: of a gate without a server
   std::mutex reading_;         // taken before mutex_, never within it
   AccessFile access_;          // under reading_, as the next
-  std::string access_fault_, authorities_fault_;  // that was logged last
+  std::string access_fault_, authorities_fault_, keys_fault_;  // that was logged last
   std::atomic<bool> revoked_anew_ = false;  // at the last look
   mutable std::mutex mutex_;
   AccessList access_list_;
+  std::vector<TicketCheckKey> ticket_keys_;
   std::shared_ptr<const Authorities> authorities_;  // shared with handshakes that are under way
   std::set<std::string> listed_serials_;            // on the revocation lists
   std::set<std::string> checked_;  // certificates in PEM that a proxy showed and these authorities signed
   std::map<std::string, std::chrono::steady_clock::time_point> paused_;  // until when, by user
   std::unordered_map<std::string, PersonCertificate> certificates_;  // by PEM, of those seen lately
   CallRates rates_;
-  std::unordered_map<std::string, Ticket> tickets_;            // by text, of those seen lately
+  std::unordered_map<std::string, CheckedTicket> tickets_;     // by text, of those seen lately
   using Seat = std::tuple<std::string, std::string, int>;      // room, user, kind
   std::map<Seat, AuthorId> seats_;
   struct Member {

@@ -64,6 +64,19 @@ TEST(TicketKey, IsReadBackAndNothingElseIsRead) {
   }
 }
 
+TEST(TicketKey, OfSeveralStandsOneOnALine) {
+  const TicketCheckKey first = check_key_of(new_ticket_key()), second = check_key_of(new_ticket_key());
+  const auto keys = parse_check_keys(to_text(first) + "\n\n  " + to_text(second) + "\r\n");
+  ASSERT_TRUE(keys.has_value()) << keys.error().message;
+  EXPECT_EQ(*keys, (std::vector{first, second}));
+  EXPECT_EQ(parse_check_keys(to_text(first)).value(), std::vector{first});
+  EXPECT_THAT(parse_check_keys(to_text(first) + "\nhalf a key\n").error().message, HasSubstr("line 2: "));
+  EXPECT_THAT(parse_check_keys("\n\n").error().message, HasSubstr("it has 0 keys"));
+  std::string five;
+  for (int i = 0; i < 5; ++i) five += to_text(first) + "\n";
+  EXPECT_THAT(parse_check_keys(five).error().message, HasSubstr("it has 5 keys"));
+}
+
 TEST(Ticket, ComesBackAsItWasSigned) {
   for (const Role role : {Role::observer, Role::trainee, Role::collaborator, Role::instructor, Role::operator_}) {
     const Ticket ticket = make_ticket(std::string(kAnyRoom), "u", role, kNoon).value();

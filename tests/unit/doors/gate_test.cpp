@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 #include <optional>
+#include <stdexcept>
 #include <string>
 
 #include "server/net/person_certificate.hpp"
@@ -149,6 +150,50 @@ TEST_F(GateTest, ReadsTheListWhileItRuns) {
   gate_->look();
   EXPECT_THAT(refused("anna", good, "ward", kWatch, false), HasSubstr("revoked"));
   EXPECT_EQ(refused("ben", instead, "ward", kUndo, true), "");
+}
+
+TEST_F(GateTest, ReadsTheKeysOfTicketsWhileItRuns) {
+  const std::string old = ticket("anna", "ward", Role::trainee);
+  const Caller anna = let_in("anna", Role::trainee);
+  std::optional<Refusal> ended;
+  std::atomic<int> calls = 0;
+  const auto stream = gate_->enter(anna, "ward", AuthorId{}, kWatch, [&](const Refusal& why) { ended = why, ++calls; });
+  ASSERT_TRUE(stream.has_value());
+  people_->certs({"rotate-tickets"});
+  EXPECT_THROW(people_->certs({"rotate-tickets"}), std::runtime_error) << "one rotation at a time";
+  gate_->look();
+  const std::string fresh = ticket("anna", "ward", Role::trainee);
+  EXPECT_EQ(refused("anna", old, "ward", kUndo, true), "");
+  EXPECT_EQ(refused("anna", fresh, "ward", kUndo, true), "");
+  EXPECT_EQ(calls, 0);
+  people_->certs({"rotate-tickets", "--finish"});
+  gate_->look();
+  EXPECT_THAT(refused("anna", old, "ward", kUndo, false), HasSubstr("signature"));
+  EXPECT_EQ(refused("anna", fresh, "ward", kUndo, true), "");
+  ASSERT_TRUE(test::wait_until([&] { return calls == 1; }, 5s)) << "what is open by a ticket of the old key ends too";
+  EXPECT_THAT(ended->sentence, HasSubstr("the key that signed the ticket was replaced"));
+  EXPECT_THROW(people_->certs({"rotate-tickets", "--finish"}), std::runtime_error) << "there is none to finish";
+}
+
+TEST_F(GateTest, GoesOnWithTheKeysOfTicketsThatItHasWhereNewOnesAreWrong) {
+  const std::filesystem::path file = people_->server() / "tickets.pub";
+  const std::string good = ticket("anna", "ward", Role::trainee), keys = content(file);
+  testing::internal::CaptureStdout();  // where a program that has not opened its log writes it
+  for (const std::string& wrong : {std::string("nonsense\n"), keys + "nonsense\n", std::string()}) {
+    std::ofstream(file) << wrong;
+    gate_->look();
+    gate_->look();
+    EXPECT_EQ(refused("anna", good, "ward", kUndo, true), "") << wrong;
+  }
+  std::filesystem::remove(file);
+  gate_->look();
+  EXPECT_EQ(refused("anna", good, "ward", kUndo, true), "");
+  std::ofstream(file) << keys;
+  gate_->look();
+  const std::string log = testing::internal::GetCapturedStdout();
+  EXPECT_THAT(log, HasSubstr("ticket keys were not read, and those before count on"));
+  EXPECT_THAT(log, HasSubstr("line 2: "));
+  EXPECT_EQ(refused("anna", good, "ward", kUndo, true), "");
 }
 
 TEST_F(GateTest, DoesNotOpenWithAWrongList) {
