@@ -10,6 +10,7 @@
 
 #include "common/access/ticket.hpp"
 #include "common/runtime/files.hpp"
+#include "common/runtime/secret_file.hpp"
 
 namespace osteon {
 namespace {
@@ -23,6 +24,7 @@ struct Arguments {
 Result<void> run(const Arguments& given) {
   const Result<std::string> text = read_file(given.key);
   if (!text) return tl::unexpected(text.error());
+  if (const auto why = who_else_reads(given.key)) std::fprintf(stderr, "warning: %s\n", why->c_str());
   const Result<TicketKey> key = parse_ticket_key(*text);
   if (!key) return failure(key.error().code, given.key.string() + ": " + key.error().message);
   const auto role = parse_role(given.role);

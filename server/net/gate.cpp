@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "common/runtime/log.hpp"
+#include "common/runtime/secret_file.hpp"
 
 namespace osteon {
 namespace {
@@ -27,6 +28,12 @@ Result<std::string> read_all(const std::filesystem::path& file) {
   std::string text{std::istreambuf_iterator<char>(in), {}};
   if (in && !text.empty()) return text;
   return failure(ErrorCode::not_found, file.string() + " cannot be read; deploy/certs makes what --certificates needs");
+}
+
+// The keys of an authority have no business here; who copied them here is told of them as well.
+void warn_of_readable_secrets(const std::filesystem::path& folder) {
+  for (const char* name : {"server.key", "proxy.pem", "tickets.key", "ca.key"})
+    if (const auto why = who_else_reads(folder / name)) log::warn("READABLE SECRET KEY", {{"fault", *why}});
 }
 
 std::string article(Role role) {
@@ -123,6 +130,7 @@ Result<std::unique_ptr<Gate>> Gate::open(const std::filesystem::path& folder, Re
   if (const Result<void> pair = check_key_pair(*certificate, *secret); !pair)
     return failure(ErrorCode::invalid_input, (folder / "server.pem").string() + " and server.key: " + pair.error().message +
                                                  "; make both anew with deploy/certs server");
+  warn_of_readable_secrets(folder);
   std::unique_ptr<Gate> gate(new Gate(folder, counts, std::move(now)));
   if (const Result<bool> read = gate->read_ticket_keys(); !read) return tl::unexpected(read.error());
   // A list that is wrong at the start would let in whom it is to keep out.

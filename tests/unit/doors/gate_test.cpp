@@ -215,6 +215,27 @@ TEST_F(GateTest, NamesTheFileThatIsWrong) {
   EXPECT_THAT(Gate::open(dir / "d", refusals_).error().message, HasSubstr("not that of the certificate"));
 }
 
+TEST_F(GateTest, WarnsOfSecretKeysThatOthersMayRead) {
+  namespace fs = std::filesystem;
+  const fs::path key = people_->server() / "server.key", proxy = people_->server() / "proxy.pem";
+  const auto said = [&](fs::perms of_key) {
+    fs::permissions(key, of_key);
+    testing::internal::CaptureStdout();  // where a program that has not opened its log writes it
+    EXPECT_TRUE(Gate::open(people_->server(), refusals_));
+    return testing::internal::GetCapturedStdout();
+  };
+  EXPECT_THAT(said(fs::perms(0600)), testing::Not(HasSubstr("READABLE SECRET KEY")));
+  for (const int mode : {0644, 0640, 0604, 0620}) {
+    const std::string log = said(fs::perms(mode));
+    EXPECT_THAT(log, HasSubstr("READABLE SECRET KEY")) << std::oct << mode;
+    EXPECT_THAT(log, HasSubstr("chmod 600 " + key.string())) << std::oct << mode;
+    EXPECT_THAT(log, testing::Not(HasSubstr(proxy.string()))) << "that one is private";
+  }
+  fs::permissions(proxy, fs::perms(0644));
+  EXPECT_THAT(said(fs::perms(0600)), HasSubstr("chmod 600 " + proxy.string()));
+  fs::permissions(proxy, fs::perms(0600));
+}
+
 TEST_F(GateTest, KeepsAuthorsToTheirPeople) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
   (void)gate_->joined(anna, "ward", 1, AuthorId{1});
