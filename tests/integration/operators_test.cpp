@@ -394,8 +394,10 @@ std::string read_text(const std::filesystem::path& file) {
 // Asked of systemd's own checker, where it is there, with this build's program in the place of the installed one.
 TEST(Operators, TheServiceIsAsSystemdWantsIt) {
   const std::string unit = read_text(std::filesystem::path(OSTEON_DEPLOY) / "systemd" / "osteon-server.service");
-  for (const char* line : {"\nDynamicUser=yes\n", "\nProtectSystem=strict\n", "\nKillSignal=SIGTERM\n", "\nRestart=on-failure\n",
-                           "\nNoNewPrivileges=yes\n", "\nCapabilityBoundingSet=\n"})
+  for (const char* line :
+       {"\nDynamicUser=yes\n", "\nProtectSystem=strict\n", "\nKillSignal=SIGTERM\n", "\nRestart=on-failure\n",
+        "\nStartLimitIntervalSec=0\n", "\nRestartSec=5\n", "\nMemoryMax=80%\n", "\nOOMPolicy=continue\n",
+        "\nNoNewPrivileges=yes\n", "\nCapabilityBoundingSet=\n"})
     EXPECT_NE(unit.find(line), std::string::npos) << line;
   if (!std::filesystem::exists("/usr/bin/systemd-analyze")) return;
   TempDir folder;
