@@ -471,7 +471,8 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
   command("people", "Lists the people whose numbers the events have", list_people);
   CLI::App* gone = command("forget", "Forgets who people were; what they did stays", forget);
   gone->add_option("--person", given->person, "Number of one, as \"people\" lists it");
-  gone->add_option("--older-than", given->days, "All who came more than so many days ago; 0: all who came before today");
+  gone->add_option("--older-than", given->days, "All who came more than so many days ago; 0: all who came before today")
+      ->check(CLI::Range(0, 36500));
   signs(gone);
   CLI::App* renamed =
       command("rename-room", "Gives a room another name, which its file must have to be served", rename_room);

@@ -1,6 +1,8 @@
 // The program's commands on journals: what they must never replace, and what they say of a journal that is damaged.
 #include <gmock/gmock.h>
 
+#include <chrono>
+#include <cstdint>
 #include <fstream>
 #include <iterator>
 
@@ -177,6 +179,23 @@ TEST_F(JournalCommands, NobodyIsForgottenWhomNobodyKnows) {
   done("forget", {"--older-than", "0"});  // all who came before today: nobody here
   refused("forget", {}, {"either --person", "or --older-than"});
   refused("forget", {"--person", "2", "--older-than", "0"}, {"either --person", "or --older-than"});
+}
+
+// No day is a number of days like any other.
+TEST_F(JournalCommands, ForgettingWhoCameBeforeTodayLeavesTheOthers) {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  const auto today = static_cast<std::int32_t>(std::chrono::duration_cast<std::chrono::days>(now).count());
+  {
+    Result<Journal> journal = Journal::open(file_);
+    ASSERT_TRUE(journal.has_value()) << journal.error().message;
+    ASSERT_TRUE(journal->set_person({"7", "Bert", today - 1}));
+    ASSERT_TRUE(journal->set_person({"8", "Cora", today + 1}));
+    ASSERT_TRUE(journal->close());
+  }
+  refused("forget", {"--older-than=-3"}, {"--older-than"});
+  EXPECT_THAT(server("people", {}).out, AllOf(HasSubstr("Bert"), HasSubstr("Cora")));
+  done("forget", {"--older-than", "0"});
+  EXPECT_THAT(server("people", {}).out, AllOf(Not(HasSubstr("Bert")), HasSubstr("Cora")));
 }
 
 TEST_F(JournalCommands, ASecondBackupNamesTheFirst) {
