@@ -177,7 +177,7 @@ TEST_F(Owners, AreForgottenWithTime) {
   fs::last_write_time(folder() / "w.backup-owner", fs::file_time_type::clock::now() - std::chrono::days(366));
   server_.reset();
   const Rooms rooms({.cases = {{test::test_block(), dir_ / "case"}}, .folder = folder(), .retention_days = 365});
-  EXPECT_TRUE(test::wait_until([&] { return rooms.owner("w.backup").empty(); }, test::kPatience));
+  EXPECT_TRUE(test::wait_until([&] { return rooms.owner("w.backup").empty(); }, 20s));
 }
 
 }  // namespace
