@@ -21,6 +21,8 @@
 #include "common/runtime/progress.hpp"
 #include "common/volume/case.hpp"
 #include "common/volume/field_file.hpp"
+#include "server/app/audit_commands.hpp"
+#include "server/app/key_command.hpp"
 #include "server/journal/journal_file.hpp"
 #include "server/journal/signing.hpp"
 #include "server/journal/upkeep.hpp"
@@ -188,22 +190,6 @@ Result<Room> replayed(const Arguments& given) {
 
 std::string rows_text(RoomSeq from, RoomSeq to) {
   return std::to_string(from.value) + " to " + std::to_string(to.value);
-}
-
-// A key as 64 digits, or a file that has them or is a signing key.
-Result<PublicKey> public_key_of(const std::string& given) {
-  if (Result<PublicKey> key = parse_public_key(given)) return key;
-  std::error_code ignored;
-  if (!fs::exists(given, ignored))
-    return failure(ErrorCode::not_found, "--key " + given + " is neither 64 hexadecimal digits nor a file; give what "
-                                             "osteon-server key show prints");
-  if (const auto keys = load_signing_keys(given)) return (*keys)->key().public_key();
-  const Result<std::string> content = read_file(given);
-  if (!content) return tl::unexpected(content.error());
-  return parse_public_key(*content).map_error([&](Error error) {
-    error.message = "--key " + given + ": " + error.message;
-    return error;
-  });
 }
 
 // Says who signed what. Error invalid_input: the key does not vouch for all of it.
@@ -395,13 +381,29 @@ Result<void> list_people(const Arguments& given) {
   });
 }
 
+// Of one number: who that was, where the journal knows it. Of many: nobody, since they may be at work in other rooms.
+Result<void> forget_in_audit_too(const Arguments& given, const std::string& label) {
+  if (label.empty()) return {};
+  const Result<std::size_t> gone = erase_person(system_disk(), folder_of(given.file) / kAuditLogFile, label);
+  if (!gone) return tl::unexpected(gone.error());
+  if (*gone > 0) say("audit log", std::to_string(*gone) + " identities forgotten (what they did stays, under pseudonyms)");
+  return {};
+}
+
 Result<void> forget(const Arguments& given) {
   if ((given.person == 0) == !given.days)
     return failure(ErrorCode::invalid_input, "forget needs either --person NUMBER, as \"people\" lists it, or --older-than DAYS");
   const auto today = std::chrono::duration_cast<std::chrono::days>(std::chrono::system_clock::now().time_since_epoch());
-  return change_journal(given, [&](Journal& journal) -> Result<void> {
+  std::string label;
+  const Result<void> done = change_journal(given, [&](Journal& journal) -> Result<void> {
     // Also where nobody was to be forgotten: a name may be in what cannot be read.
     if (const Error* closed = journal.closed_because()) return tl::unexpected(*closed);
+    if (given.person != 0) {
+      const Result<std::vector<Person>> people = journal.people();
+      if (!people) return tl::unexpected(people.error());
+      const auto one = std::ranges::find(*people, std::to_string(given.person), &Person::pseudonym);
+      if (one != people->end()) label = one->label;
+    }
     const Result<std::size_t> forgotten =
         given.person == 0 ? journal.forget_people_before(static_cast<std::int32_t>(today.count()) - *given.days)
                           : journal.forget_person(std::to_string(given.person));
@@ -412,6 +414,25 @@ Result<void> forget(const Arguments& given) {
     say("forgotten", std::to_string(*forgotten) + " (what they did stays, under a number; backups made before have the names)");
     return {};
   });
+  return done.and_then([&] { return forget_in_audit_too(given, label); });
+}
+
+// What the audit log says of a command; nothing of those that only look.
+std::optional<AuditEvent> audited_as(const std::string& name, const Arguments& given) {
+  if (name == "verify" || name == "people" || (name == "replay" && given.fields.empty())) return {};
+  AuditEvent event{.action = name, .object = given.file.filename().string(), .result = kOk};
+  if (!given.to.empty()) event.detail = "to " + given.to.filename().string();
+  if (!given.fields.empty()) event.detail = "to " + given.fields.filename().string();
+  if (!given.name.empty()) event.detail = "to " + given.name;
+  if (given.person != 0) event.detail += " person " + std::to_string(given.person);
+  if (given.days) event.detail += " older than " + std::to_string(*given.days) + " days";
+  return event;
+}
+
+Result<void> run_command(const std::string& name, Result<void> (*run)(const Arguments&), const Arguments& given) {
+  std::optional<AuditEvent> event = audited_as(name, given);
+  if (!event) return run(given);
+  return run_audited(given.file, given.signing_key, std::move(*event), [&] { return run(given); });
 }
 
 // What a file is named decides as what room it is served; so a new name is given on purpose.
@@ -434,7 +455,7 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
   const auto command = [&](const char* name, const char* what, Result<void> (*run)(const Arguments&)) {
     CLI::App* sub = app.add_subcommand(name, what);
     sub->add_option("file", given->file, "The journal; no server may have it open")->required();
-    sub->callback([&chosen, given, run] { chosen = [given, run] { return run(*given); }; });
+    sub->callback([&chosen, given, name, run] { chosen = [given, name, run] { return run_command(name, run, *given); }; });
     return sub;
   };
   const auto copies = [&](const char* name, const char* what, Result<void> (*run)(const Arguments&)) {
@@ -458,14 +479,17 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
   signs(copies("backup", "Copies a sound journal", [](const Arguments& a) { return copy(a, backup_journal); }));
   signs(copies("migrate", "Copies a journal of an earlier version into one of today's",
                [](const Arguments& a) { return copy(a, migrate_journal); }));
-  copies("branch", "Makes a room of its own from what another was at a place", branch)
-      ->add_option("--at", given->at, "room_seq of the last event that it takes over; all by default");
+  CLI::App* branched = copies("branch", "Makes a room of its own from what another was at a place", branch);
+  signs(branched);
+  branched->add_option("--at", given->at, "room_seq of the last event that it takes over; all by default");
   CLI::App* again = command("replay", "Makes the room again and says its hashes, marks and time", replay);
+  signs(again);
   again->add_option("--case", given->case_folder, "Folder of the case")->required();
   again->add_option("--to", given->at, "room_seq of the last event; all by default");
   again->add_option("--fields", given->fields,
                     "Writes the bone as it was then (.vdb), for --resume and osteon-import surface; replaces only earlier fields");
   CLI::App* lines = copies("export", "Writes each event as a line of JSON", write_out);
+  signs(lines);
   lines->add_option("--person", given->person, "Number of one, as \"people\" lists it: who it is and only what it did");
   lines->add_option("--to", given->at, "room_seq of the last event; all by default");
   command("people", "Lists the people whose numbers the events have", list_people);
@@ -479,6 +503,7 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
   renamed->add_option("name", given->name, "The new name: that of the file, without .journal")->required();
   signs(renamed);
   CLI::App* end = command("delete", "Removes a room: its journal and all files beside it", remove);
+  signs(end);
   CLI::Option* too = end->add_flag("--branches", given->branches, "And its branches in the same folder, and theirs");
   end->add_flag("--alone", given->alone, "Its branches stay")->excludes(too);
 }

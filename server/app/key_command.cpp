@@ -6,7 +6,8 @@
 #include <filesystem>
 #include <memory>
 
-#include "server/journal/signing.hpp"
+#include "common/runtime/files.hpp"
+#include "server/app/audit_commands.hpp"
 
 namespace osteon {
 namespace {
@@ -27,13 +28,31 @@ Result<void> show(const Arguments& given) {
 }
 
 Result<void> rotate(const Arguments& given) {
-  return rotate_signing_keys(given.file).map([](const auto& keys) {
-    print(*keys);
-    std::fprintf(stderr, "A server that runs signs with the earlier key until it is started again.\n");
+  const AuditEvent event{.action = "key-rotate", .object = given.file.filename().string(), .result = kOk};
+  return run_audited(given.file, given.file, event, [&] {
+    return rotate_signing_keys(given.file).map([](const auto& keys) {
+      print(*keys);
+      std::fprintf(stderr, "A server that runs signs with the earlier key until it is started again.\n");
+    });
   });
 }
 
 }  // namespace
+
+Result<PublicKey> public_key_of(const std::string& given) {
+  if (Result<PublicKey> key = parse_public_key(given)) return key;
+  std::error_code ignored;
+  if (!std::filesystem::exists(given, ignored))
+    return failure(ErrorCode::not_found, "--key " + given + " is neither 64 hexadecimal digits nor a file; give what "
+                                             "osteon-server key show prints");
+  if (const auto keys = load_signing_keys(given)) return (*keys)->key().public_key();
+  const Result<std::string> content = read_file(given);
+  if (!content) return tl::unexpected(content.error());
+  return parse_public_key(*content).map_error([&](Error error) {
+    error.message = "--key " + given + ": " + error.message;
+    return error;
+  });
+}
 
 void add_key_command(CLI::App& app, std::function<Result<void>()>& chosen) {
   const auto given = std::make_shared<Arguments>();  // shared by the options and by what runs

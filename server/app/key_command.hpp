@@ -2,7 +2,10 @@
 #pragma once
 #include <functional>
 
+#include <string>
+
 #include "common/core/result.hpp"
+#include "server/journal/signing.hpp"
 
 namespace CLI {
 class App;
@@ -12,5 +15,8 @@ namespace osteon {
 
 // `chosen` becomes what the command line asks for, where it asks for this.
 void add_key_command(CLI::App& app, std::function<Result<void>()>& chosen);
+
+// A key as 64 digits, or a file that has them or is a signing key. Errors, naming --key: not_found, invalid_input.
+[[nodiscard]] Result<PublicKey> public_key_of(const std::string& given);
 
 }  // namespace osteon

@@ -19,12 +19,14 @@
 #include "common/runtime/progress.hpp"
 #include "common/runtime/stop_signal.hpp"
 #include "common/volume/mesh_distance.hpp"
+#include "server/app/audit_commands.hpp"
 #include "server/app/case_commands.hpp"
 #include "server/app/journal_commands.hpp"
 #include "server/app/key_command.hpp"
 #include "server/app/room_commands.hpp"
 #include "server/app/server_config.hpp"
 #include "server/app/ticket_command.hpp"
+#include "server/audit/audit_trail.hpp"
 #include "server/journal/signing.hpp"
 #include "server/net/metrics.hpp"
 #include "server/net/room_files.hpp"
@@ -182,11 +184,35 @@ Result<std::vector<KnownCase>> open_uploads(const std::filesystem::path& folder,
   return known;
 }
 
-// What signs the journals. Null: none is kept.
+// Where it is taken down who does what. Empty: nowhere, since nothing else is kept either.
+std::filesystem::path audit_file_of(const ServerConfig& options) {
+  if (!options.audit_file.empty()) return options.audit_file;
+  if (!options.rooms_folder.empty()) return options.rooms_folder / kAuditLogFile;
+  return options.journal_file.empty() ? std::filesystem::path() : folder_of(options.journal_file) / kAuditLogFile;
+}
+
+// Null: see above. Records the start.
+Result<std::shared_ptr<AuditTrail>> open_audit(const ServerConfig& options, std::shared_ptr<const SigningKeys> keys) {
+  const std::filesystem::path file = audit_file_of(options);
+  if (file.empty()) return nullptr;
+  auto trail = AuditTrail::open({.file = file,
+                                 .keys = std::move(keys),
+                                 .syslog = options.audit_syslog,
+                                 .retention_days = options.audit_retention_days});
+  if (!trail)
+    return failure(trail.error().code, "the audit log cannot be written: " + trail.error().message +
+                                           "; mend that, or choose another file with --audit");
+  log::info("audit log", {{"file", file.string()}, {"retention_days", options.audit_retention_days}});
+  return std::shared_ptr<AuditTrail>(std::move(*trail));
+}
+
+// What signs the journals and the audit log. Null: none is kept.
 Result<std::shared_ptr<const SigningKeys>> open_signing_keys(const ServerConfig& options) {
-  if (options.rooms_folder.empty() && options.journal_file.empty()) return nullptr;
-  const std::filesystem::path folder =
-      options.rooms_folder.empty() ? folder_of(options.journal_file) : options.rooms_folder;
+  const std::filesystem::path audit = audit_file_of(options);
+  if (audit.empty()) return nullptr;
+  const std::filesystem::path folder = !options.rooms_folder.empty()   ? options.rooms_folder
+                                       : !options.journal_file.empty() ? folder_of(options.journal_file)
+                                                                       : folder_of(audit);
   const std::filesystem::path file = options.signing_key.empty() ? folder / kSigningKeyFile : options.signing_key;
   auto keys = load_or_make_signing_keys(file);
   if (keys) log::info("signing key", {{"file", file.string()}, {"public", to_hex((*keys)->key().public_key())}});
@@ -210,6 +236,9 @@ Result<std::unique_ptr<Rooms>> open_rooms(const ServerConfig& options) {
   rooms_options.most_rooms_per_person = options.most_rooms_per_person;
   rooms_options.most_backups_per_person = options.most_backups_per_person;
   rooms_options.keys = *keys;
+  Result<std::shared_ptr<AuditTrail>> trail = open_audit(options, *keys);
+  if (!trail) return tl::unexpected(trail.error());
+  rooms_options.trail = std::move(*trail);
   rooms_options.case_memory_bytes = static_cast<std::uint64_t>(options.case_memory_mib) << 20;
   std::uint64_t case_bytes = 0;
   for (const std::filesystem::path& folder : options.case_folders) {
@@ -345,6 +374,7 @@ int main(int argc, char** argv) {
   add_case_commands(app, command);
   add_ticket_command(app, command);
   add_key_command(app, command);
+  add_audit_commands(app, command);
   app.require_subcommand(0, 1);
   app.add_option("--listen", options.listen, "HOST:PORT on this machine; port 0 lets the system choose")->capture_default_str();
   app.add_option(
@@ -392,6 +422,14 @@ int main(int argc, char** argv) {
   app.add_option(
       "--signing-key", options.signing_key,
       "File of the key that signs journals, made where it is missing; by default signing.key beside the journals");
+  app.add_option("--audit", options.audit_file,
+                 "File that says who did what, signed; by default audit.log beside the journals");
+  app.add_option("--audit-syslog", options.audit_syslog,
+                 "Unix datagram socket of the system's log, such as /dev/log, that is sent the same records, with names");
+  app.add_option("--audit-retention-days", options.audit_retention_days,
+                 "After so many days records are removed from the audit log; 0: never")
+      ->check(CLI::Range(0, 36500))
+      ->capture_default_str();
   app.add_option("--uploads", options.uploads_folder,
                  "Folder in which cases are kept that \"osteon-server cases upload\" sends, for rooms of their own; without it none are taken");
   app.add_option("--case-memory-mib", options.case_memory_mib,

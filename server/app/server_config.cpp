@@ -110,6 +110,9 @@ const std::vector<Field>& fields() {
   using Config = ServerConfig;
   static const std::vector<Field> all{
       {"address_file", [](const Value& v, Config& c) { c.address_file = path(v); }},
+      {"audit", [](const Value& v, Config& c) { c.audit_file = path(v); }},
+      {"audit_retention_days", [](const Value& v, Config& c) { c.audit_retention_days = whole(v, 0, 36500); }},
+      {"audit_syslog", [](const Value& v, Config& c) { c.audit_syslog = path(v); }},
       {"case_memory_mib", [](const Value& v, Config& c) { c.case_memory_mib = whole(v, 1, kMostCaseMemoryMib); }},
       {"cases", [](const Value& v, Config& c) { c.case_folders = paths(v); }},
       {"certificates", [](const Value& v, Config& c) { c.certificates = path(v); }},
@@ -261,6 +264,8 @@ Result<void> check_server_config(const ServerConfig& config) {
     return wrong("--uploads needs --rooms, since a case that is uploaded is for rooms of its own; give --rooms FOLDER too");
   if (!config.signing_key.empty() && !ways[0].second && !ways[1].second)
     return wrong("--signing-key signs journals, and none is kept; give --rooms FOLDER or --journal FILE too");
+  if (!config.audit_syslog.empty() && config.audit_file.empty() && !ways[0].second && !ways[1].second)
+    return wrong("--audit-syslog sends audit records, and none are kept; give --audit FILE, --rooms FOLDER or --journal FILE too");
   if (ways[0].second && !config.save_file.empty())
     return wrong("--rooms excludes --save, on the command line as in a --config file; leave one");
   if (config.plain && config.most_ticket_hours != 0)
@@ -287,6 +292,7 @@ Result<void> check_server_places(const ServerConfig& config) {
   if (!config.certificates.empty() && !is_there(config.certificates / "server.pem", false))
     return missing("certificates (--certificates)", config.certificates, "has no server.pem; give a folder that deploy/certs server made");
   const std::tuple<const char*, const fs::path&> written[]{{"address_file (--address-file)", config.address_file},
+                                                           {"audit (--audit)", config.audit_file},
                                                            {"journal (--journal)", config.journal_file},
                                                            {"save (--save)", config.save_file},
                                                            {"summary (--summary)", config.summary_file},

@@ -33,6 +33,9 @@ struct ServerConfig {
   std::filesystem::path address_file, summary_file, tools_folder;
   std::filesystem::path save_file, resume_file, journal_file, rooms_folder, uploads_folder;
   std::filesystem::path signing_key;    // empty: beside the journals
+  std::filesystem::path audit_file;     // empty: audit.log beside the journals, where any are kept
+  std::filesystem::path audit_syslog;   // Unix datagram socket; empty: none
+  int audit_retention_days = 365;       // 0: records are never removed
   int case_memory_mib = static_cast<int>(kMostCaseMemory >> 20);  // of all cases in memory
   int retention_days = 0;               // 0: nobody is forgotten
   Detail detail = Detail::automatic;

@@ -50,22 +50,26 @@ inline std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServer
                                         std::string_view method) {
   if (!rooms.gate) return {};
   const PeerClaims peer = peer_claims(context);
+  const std::optional<std::string> room = metadata_of(context, "osteon-room-bin"),
+                                   ticket = metadata_of(context, "osteon-ticket");
+  const CallClaims call{.peer = peer,
+                        .ticket = ticket ? std::string_view(*ticket) : std::string_view(),
+                        .room = room ? std::string_view(*room) : std::string_view(),
+                        .method = method};
   // Tells programs the reason, and refused_call_notes() that it was noted.
   const auto tell = [&](std::string_view reason) {
     context.AddTrailingMetadata(kRefusalTrailer, std::string(reason));
   };
   const auto wrong = [&](std::string sentence) {
     tell("request");
-    rooms.gate->note_refused("request", sentence, peer.address);
+    rooms.gate->note_refused("request", sentence, call);
     return Status(StatusCode::INVALID_ARGUMENT, short_words(std::move(sentence)));
   };
   for (const auto& [key, value] : context.client_metadata())
     if (!is_known_header({key.data(), key.size()}, peer.by_proxy))
       return wrong("the call has a header that this server does not know; leave out " + std::string(key.data(), key.size()));
-  const std::optional<std::string> room = metadata_of(context, "osteon-room-bin"),
-                                   ticket = metadata_of(context, "osteon-ticket");
   if (!room || !ticket) return wrong("the call says twice which ticket or room is meant");
-  const auto caller = rooms.gate->admit({.peer = peer, .ticket = *ticket, .room = *room, .method = method});
+  const auto caller = rooms.gate->admit(call);
   if (caller) return {};
   tell(caller.error().reason);
   return status_of(caller.error());

@@ -14,6 +14,8 @@
 
 #include "common/runtime/log.hpp"
 #include "common/runtime/secret_file.hpp"
+#include "server/audit/audit_trail.hpp"
+#include "server/net/audited_calls.hpp"
 
 namespace osteon {
 namespace {
@@ -180,8 +182,42 @@ std::optional<Refusal> Gate::judge_handshake(std::string_view chain_pem) {
   std::string who =
       certificate ? certificate->user + ", certificate " + certificate->serial : "a certificate without a name";
   if (!chain && certificate) who = "a stranger who says to be " + who;
-  refusals_.note(refusal->reason, who, refusal->sentence, connections_ ? some_addresses(*connections_) : "");
+  const std::string from = connections_ ? some_addresses(*connections_) : "";
+  refusals_.note(refusal->reason, who, refusal->sentence, from);
+  if (trail_) {
+    AuditEvent event{.who = {.address = from}, .action = "handshake", .result = kRefused, .detail = std::string(refusal->reason)};
+    if (certificate) {
+      event.who.person = chain ? certificate->user : std::string(kClaimed) + certificate->user;
+      event.who.certificate = certificate->serial;
+    }
+    trail_->record(std::move(event));
+  }
   return refusal;
+}
+
+Gate::CallTrace Gate::trace_of(const CallClaims& call) {
+  CallTrace trace{.who = {.address = call.peer.address}, .room = std::string(call.room)};
+  const std::lock_guard lock(mutex_);
+  if (const Result<PersonCertificate> certificate = certificate_of(call.peer.certificate_pem)) {
+    trace.who.person = check_shown(call.peer) ? certificate->user : std::string(kClaimed) + certificate->user;
+    trace.who.certificate = certificate->serial;
+  }
+  if (call.ticket.empty()) return trace;
+  if (const Result<Ticket> ticket = ticket_of(call.ticket)) {
+    trace.who.ticket = to_hex(ticket->id);
+    if (trace.room.empty()) trace.room = ticket->room;
+  }
+  return trace;
+}
+
+void Gate::audit_refusal(std::string_view reason, const CallClaims& call) {
+  if (!trail_) return;
+  CallTrace trace = trace_of(call);
+  trail_->record({.who = std::move(trace.who),
+                  .action = std::string(call_name(call.method)),
+                  .object = std::move(trace.room),
+                  .result = kRefused,
+                  .detail = std::string(reason)});
 }
 
 Result<PersonCertificate> Gate::certificate_of(std::string_view pem) {
@@ -298,15 +334,17 @@ tl::expected<Caller, Refusal> Gate::admit(const CallClaims& call) {
     if (caller) return caller;
   }
   refusals_.note(caller.error().reason, who, caller.error().sentence, call.peer.address);
+  audit_refusal(caller.error().reason, call);
   return caller;
 }
 
-void Gate::note_refused(std::string_view reason, std::string_view sentence, std::string_view address) {
+void Gate::note_refused(std::string_view reason, std::string_view sentence, const CallClaims& call) {
   {
     const std::lock_guard lock(mutex_);
     ++counts_.refused;
   }
-  refusals_.note(reason, "a stranger", sentence, address);
+  refusals_.note(reason, "a stranger", sentence, call.peer.address);
+  audit_refusal(reason, call);
 }
 
 void Gate::note_flood(const PeerClaims& peer) {
@@ -321,6 +359,7 @@ void Gate::note_flood(const PeerClaims& peer) {
     }
   }
   refusals_.note("flood", who, "more calls than a connection may begin; it was closed", peer.address);
+  audit_refusal("flood", {.peer = peer});
   if (connections_)
     connections_->close_if([&](const Connection& one) { return one.peer == peer.peer || one.user == who; });
 }
@@ -510,6 +549,12 @@ void Gate::look() {
   for (const auto& [stream, why] : ending) {
     refusals_.count(why.reason);
     log::warn("stream ended", {{"who", stream->caller.user}, {"reason", why.reason}, {"said", why.sentence}});
+    if (trail_)
+      trail_->record({.who = {stream->caller.user, stream->caller.serial, stream->caller.ticket_id, stream->caller.address},
+                      .action = std::string(call_name(stream->method)),
+                      .object = stream->room,
+                      .result = kRefused,
+                      .detail = "ended: " + std::string(why.reason)});
     stream->end(why);
   }
 }

@@ -25,6 +25,7 @@
 #include "common/access/role_table.hpp"
 #include "common/access/ticket.hpp"
 #include "common/core/id.hpp"
+#include "server/audit/audit_record.hpp"
 #include "server/net/call_rates.hpp"
 #include "server/net/connections.hpp"
 #include "server/net/peer_claims.hpp"
@@ -36,6 +37,8 @@ class ServerCredentials;
 }
 
 namespace osteon {
+
+class AuditTrail;
 
 // A person who was let in.
 struct Caller {
@@ -102,6 +105,15 @@ class Gate {
   // Through which connections are closed whose certificate is revoked; they outlive the gate. Before the first call.
   void set_connections(Connections& connections) { connections_ = &connections; }
 
+  // Takes down every refusal; it outlives the gate. Before the first call.
+  void set_trail(AuditTrail& trail) { trail_ = &trail; }
+  // What is known of who makes a call, whether they may or not. `room`: that the call or its ticket names.
+  struct CallTrace {
+    AuditIdentity who;
+    std::string room;
+  };
+  [[nodiscard]] CallTrace trace_of(const CallClaims& call);
+
   // Mutual TLS, with this gate in every handshake. It outlives the server.
   [[nodiscard]] std::shared_ptr<grpc::ServerCredentials> credentials();
 
@@ -112,7 +124,7 @@ class Gate {
   // The same, counted, and logged once for each person and reason.
   [[nodiscard]] tl::expected<Caller, Refusal> admit(const CallClaims& call);
   // A call with which something is wrong before it can be judged: counted and logged likewise.
-  void note_refused(std::string_view reason, std::string_view sentence, std::string_view address);
+  void note_refused(std::string_view reason, std::string_view sentence, const CallClaims& call);
   // A connection began more calls than it may: it is closed, and who holds its certificate comes again kPause later.
   static constexpr std::chrono::seconds kPause{10};
   void note_flood(const PeerClaims& peer);
@@ -165,6 +177,7 @@ class Gate {
   [[nodiscard]] Result<CheckedTicket> ticket_of(std::string_view text);
   void refresh();
   void run();
+  void audit_refusal(std::string_view reason, const CallClaims& call);
 
   const std::filesystem::path folder_;
   RefusalCounts& refusals_;
@@ -172,6 +185,7 @@ class Gate {
   std::function<std::string()> only_room_;
   std::chrono::hours most_ticket_life_{0};
   Connections* connections_ = nullptr;  // null: of a gate without a server
+  AuditTrail* trail_ = nullptr;         // null: nothing is taken down
   std::mutex reading_;         // taken before mutex_, never within it
   AccessFile access_;          // under reading_, as the next
   std::string access_fault_, authorities_fault_, keys_fault_;  // that was logged last

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+#include "server/audit/audit_trail.hpp"
 #include "server/net/connections.hpp"
 
 namespace osteon {
@@ -97,7 +98,10 @@ HandshakeWatch::~HandshakeWatch() {
 }
 
 void HandshakeWatch::note(const std::string& who, std::string_view said) {
-  refusals_.note("tls", who, said, some_addresses(connections_));
+  const std::string from = some_addresses(connections_);
+  refusals_.note("tls", who, said, from);
+  if (trail_)
+    trail_->record({.who = {.address = from}, .action = "handshake", .result = kRefused, .detail = "no certificate"});
 }
 
 std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> refused_call_notes(

@@ -15,6 +15,8 @@ class ServerInterceptorFactoryInterface;
 
 namespace osteon {
 
+class AuditTrail;
+
 // While it lives: a handshake that fails before any certificate is seen, as of who has none or speaks plain text, is
 // noted as "tls". gRPC says it in its log alone, for the whole process and without an address; the rest of that log
 // is dropped. The addresses noted are those of all connections of which no call has come. Any thread.
@@ -23,12 +25,15 @@ class HandshakeWatch {
   HandshakeWatch(RefusalCounts& refusals, Connections& connections);  // which outlive it
   ~HandshakeWatch();
   void note(const std::string& who, std::string_view said);
+  // Takes down every one; it outlives this. Before the first connection.
+  void set_trail(AuditTrail& trail) { trail_ = &trail; }
   HandshakeWatch(const HandshakeWatch&) = delete;
   HandshakeWatch& operator=(const HandshakeWatch&) = delete;
 
  private:
   RefusalCounts& refusals_;
   Connections& connections_;
+  AuditTrail* trail_ = nullptr;  // null: nothing is taken down
 };
 
 // The trailing header of a call that the gate refused: its reason in one word. The gate has noted the call.

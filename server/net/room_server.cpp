@@ -10,6 +10,7 @@
 
 #include "common/core/check.hpp"
 #include "common/runtime/log.hpp"
+#include "server/net/audited_calls.hpp"
 #include "server/net/call_flood.hpp"
 #include "server/net/gate.hpp"
 #include "server/net/health_watch.hpp"
@@ -133,6 +134,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
     impl->rooms->gate = impl->gate.get();
     impl->gate->set_most_ticket_life(doors.most_ticket_life);
     impl->gate->set_connections(impl->listener->connections());
+    if (impl->rooms->trail()) impl->gate->set_trail(*impl->rooms->trail());
     impl->gate->set_only_room([all = impl->rooms.get()] {
       const Result<std::shared_ptr<OpenRoom>> only = all->find("");
       return only ? (*only)->name : std::string();
@@ -188,6 +190,10 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
     impl->flood = std::make_unique<CallFlood>(doors.flood);
     interceptors.push_back(
         flood_watch(*impl->flood, [gate = impl->gate.get()](const PeerClaims& peer) { gate->note_flood(peer); }));
+  }
+  if (impl->rooms->trail()) {
+    impl->handshakes->set_trail(*impl->rooms->trail());
+    interceptors.push_back(audited_calls(*impl->rooms->trail(), impl->gate.get()));
   }
   builder.experimental().SetInterceptorCreators(std::move(interceptors));
   // Calls that no service has are authorized, counted and bounded as all others are.

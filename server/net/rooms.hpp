@@ -18,6 +18,7 @@
 
 #include "common/core/result.hpp"
 #include "common/tools/tool_box.hpp"
+#include "server/audit/audit_trail.hpp"
 #include "server/intake/case_store.hpp"
 #include "server/net/case_shelf.hpp"
 #include "server/net/demonstration.hpp"
@@ -61,6 +62,7 @@ struct RoomsOptions {
   Detail detail = Detail::automatic;
   std::shared_ptr<const SigningKeys> keys = nullptr;  // sign the journals; null: nobody does
   int retention_days = 0;             // after which it is forgotten who somebody was; 0: never
+  std::shared_ptr<AuditTrail> trail = nullptr;  // shared with the server's calls; null: nothing is taken down
   std::shared_ptr<CaseStore> store{};  // where uploaded cases are kept, shared with uploads under way; null: none are taken
   std::uint64_t case_memory_bytes = kMostCaseMemory;  // of all cases that rooms have
   int most_rooms = kMostRooms;        // open and closed ones together; none is made beyond
@@ -137,6 +139,7 @@ class Rooms {
   [[nodiscard]] std::vector<KnownCase> cases() const { return cases_.all(); }
   void add_case(KnownCase known) { cases_.add(std::move(known)); }
   [[nodiscard]] std::uint64_t case_bytes() const { return cases_.loaded_bytes(); }  // that cases take in memory
+  [[nodiscard]] const std::shared_ptr<AuditTrail>& trail() const { return options_.trail; }
   [[nodiscard]] const std::shared_ptr<CaseStore>& store() const { return options_.store; }
   [[nodiscard]] std::vector<RoomListing> list() const;
 

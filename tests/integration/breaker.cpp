@@ -143,13 +143,14 @@ struct Breaker::Parts {
             {"rename-room", file, "other"},
             {"delete", file, "--alone"},
             {"delete", file, "--branches"},
-            {"--case", stage.bone(), "--journal", file, "--signing-key", stage.key()}};
+            {"--case", stage.bone(), "--journal", file, "--signing-key", stage.key(), "--audit",
+             stage.audit()}};
   }
 
   // A command of osteon-server that nobody tries here; empty: there is none.
   [[nodiscard]] std::string find_untried() const {
     std::istringstream help(stage.command({"--help"}).out);
-    std::vector<std::string> known{"rooms", "cases", "ticket", "key"};  // which take no journal
+    std::vector<std::string> known{"rooms", "cases", "ticket", "key", "audit"};  // which take no journal
     for (const std::vector<std::string>& one : commands("", "")) known.push_back(one.front());
     bool listed = false;
     std::size_t found = 0;
@@ -435,7 +436,8 @@ bool Breaker::read_only(std::uint64_t seed) {
     if (verdict.fault.empty())
       verdict.fault = parts_->stage.check_export((to / "copy").string(), life.oracle, life.rows);
     const RunResult served = parts_->stage.command(
-        {"--case", parts_->stage.bone(), "--journal", trial.file(), "--signing-key", parts_->stage.key()}, 10s);
+        {"--case", parts_->stage.bone(), "--journal", trial.file(), "--signing-key", parts_->stage.key(),
+         "--audit", parts_->stage.audit()}, 10s);
     if (verdict.fault.empty() && (served.exit_code == 0 || served.timed_out))
       verdict.fault = "a server: " + said(served);
     if (verdict.fault.empty()) verdict.fault = BreakerJudge::refusal("a server", served, trial.file());

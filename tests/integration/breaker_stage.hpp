@@ -80,6 +80,7 @@ class BreakerStage {
 
   // Of all servers here; not among the files that are damaged.
   [[nodiscard]] std::string key() const { return (temp_ / "signing.key").string(); }
+  [[nodiscard]] std::string audit() const { return (temp_ / "audit.log").string(); }  // not among what is damaged
   [[nodiscard]] const std::string& bone() const { return bone_; }
   [[nodiscard]] std::filesystem::path new_folder() const;
   [[nodiscard]] std::filesystem::path new_name() const;  // of a file that is not there

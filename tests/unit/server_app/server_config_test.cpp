@@ -109,6 +109,9 @@ limits:
 // One wrong value for every field that there is, and a word of the remedy.
 const std::multimap<std::string, std::pair<std::string, std::string>> kWrong{
     {"address_file", {"[a, b]", "write a path"}},
+    {"audit", {"[x]", "write a path"}},
+    {"audit_retention_days", {"-1", "from 0 to 36500"}},
+    {"audit_syslog", {"[x]", "write a path"}},
     {"case_memory_mib", {"0", "from 1 to 1048576"}},
     {"cases", {"{}", "list of paths"}},
     {"cases", {"[]", "list of paths"}},
