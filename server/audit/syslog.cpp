@@ -54,7 +54,7 @@ std::string syslog_message(const AuditRecord& record, const AuditIdentity& who, 
          parameter("address", who.address) + parameter("identity", record.identity) +
          parameter("action", record.action) + parameter("object", record.object) + parameter("result", record.result) +
          parameter("detail", record.detail) + parameter("hash", to_hex(line_hash)) + "] " + clean_text(record.action) +
-         " " + clean_text(record.object) + ": " + clean_text(record.result);
+         (record.object.empty() ? "" : " " + clean_text(record.object)) + ": " + clean_text(record.result);
 }
 
 SyslogSocket::~SyslogSocket() {
