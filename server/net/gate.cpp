@@ -203,9 +203,9 @@ Gate::CallTrace Gate::trace_of(const CallClaims& call) {
     trace.who.certificate = certificate->serial;
   }
   if (call.ticket.empty()) return trace;
-  if (const Result<Ticket> ticket = ticket_of(call.ticket)) {
-    trace.who.ticket = to_hex(ticket->id);
-    if (trace.room.empty()) trace.room = ticket->room;
+  if (const Result<CheckedTicket> checked = ticket_of(call.ticket)) {
+    trace.who.ticket = to_hex(checked->ticket.id);
+    if (trace.room.empty()) trace.room = checked->ticket.room;
   }
   return trace;
 }

@@ -126,13 +126,18 @@ TEST_F(Audited, SaysWhoMadeDeletedJoinedAndWasRefused) {
   expect_is(deleted, olga_);
   EXPECT_EQ(deleted.value("object", ""), "ward");
 
-  // A role that may not.
+  // A role that may not, several times.
   const Someone ivy = come("ivy", Role::instructor, "hall");
-  for (int i = 0; i < 5; ++i) EXPECT_FALSE(as(ivy).remove("hall", false));
-  const json refused = find("DeleteRoom", "refused", "ivy");
+  for (int i = 0; i < 5; ++i) EXPECT_FALSE(as(ivy).close("hall"));
+  const json refused = find("CloseRoom", "refused", "ivy");
   expect_is(refused, ivy);
   EXPECT_EQ(refused.value("object", ""), "hall");
   EXPECT_EQ(refused.value("detail", ""), "role");
+  // A role that may, of a room that is another person's: the handler knows that.
+  EXPECT_FALSE(as(ivy).remove("hall", false));
+  const json denied = find("DeleteRoom", "refused", "ivy");
+  expect_is(denied, ivy);
+  EXPECT_EQ(denied.value("detail", ""), "permission denied");
 
   // What a handler refuses: there is no such room.
   EXPECT_FALSE(as(olga_).remove("nowhere", false));
