@@ -5,22 +5,25 @@
 
 #include <cstdio>
 
+#include "common/core/bounded_text.hpp"
+
 namespace osteon::log {
 namespace {
 
 // Quoted where a space or a quote would make the line ambiguous to a parser.
 void append(std::string& line, const Field& field) {
+  const std::string value = bounded_text(field.value);
   line += ' ';
   line += field.key;
   line += '=';
-  if (field.value.find_first_of(" \"=\n") == std::string::npos && !field.value.empty()) {
-    line += field.value;
+  if (value.find_first_of(" \"=") == std::string::npos && !value.empty()) {
+    line += value;
     return;
   }
   line += '"';
-  for (const char c : field.value) {
+  for (const char c : value) {
     if (c == '"' || c == '\\') line += '\\';
-    line += c == '\n' ? ' ' : c;
+    line += c;
   }
   line += '"';
 }
@@ -48,7 +51,8 @@ void error(std::string_view event, std::initializer_list<Field> fields) { write(
 
 int exit_with(std::string_view program, const Error& error) {
   std::fflush(stdout);
-  std::fprintf(stderr, "%.*s: %s\n", static_cast<int>(program.size()), program.data(), error.message.c_str());
+  std::fprintf(stderr, "%.*s: %s\n", static_cast<int>(program.size()), program.data(),
+               bounded_text(error.message).c_str());
   return error.code == ErrorCode::cancelled ? 130 : 1;
 }
 

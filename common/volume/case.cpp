@@ -31,7 +31,18 @@ namespace {
 
 constexpr const char* kInfoFile = "case.json";
 constexpr const char* kVolumeFile = "bone.vdb";
+constexpr std::uintmax_t kMostInfoBytes = 1 << 20;
 const std::vector<std::string> kGridNames{"surface", "density", "clearance", "bone", "tissue"};
+// A case of a temporal bone at 0.1 mm takes 0.5 GiB, and five times its file. A file that declares more than all this is damaged
+// or hostile; a file of up to 64 MiB stays below 1 GiB.
+constexpr std::uint64_t kCaseMemoryBytes = std::uint64_t{768} << 20, kMemoryToFile = 12, kMostCaseLeaves = 4'000'000;
+
+VdbLimits limits_for(const std::filesystem::path& file) {
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(file, error);
+  const std::uint64_t memory = error ? kCaseMemoryBytes : std::max<std::uint64_t>(kCaseMemoryBytes, kMemoryToFile * bytes);
+  return {.memory_bytes = memory, .leaves = kMostCaseLeaves, .grids = 16};
+}
 
 // Above it bone counts as cortical. [A] Apparent densities of cancellous bone end near here.
 constexpr float kCorticalFrom_g_cm3 = 1.0f;
@@ -368,6 +379,9 @@ Result<Case> Case::load(const std::filesystem::path& folder) {
   std::ifstream in(file);
   if (!in)
     return failure(ErrorCode::invalid_input, folder.string() + " is not a case: it has no " + kInfoFile + "; make one with osteon-import");
+  std::error_code unknown;
+  if (std::filesystem::file_size(file, unknown) > kMostInfoBytes && !unknown)
+    return failure(ErrorCode::invalid_input, file.string() + " is longer than any case description; import the case again");
   CaseInfo info;
   Digest named;
   try {
@@ -390,7 +404,7 @@ Result<Case> Case::load(const std::filesystem::path& folder) {
   }
   if (!(info.pitch_mm > 0.0))
     return failure(ErrorCode::invalid_input, file.string() + ": pitch_mm must be above zero; import the case again");
-  auto volumes = load_volumes(folder / kVolumeFile, kGridNames);
+  auto volumes = load_volumes(folder / kVolumeFile, kGridNames, limits_for(folder / kVolumeFile));
   if (!volumes) return tl::unexpected(volumes.error());
   auto& v = *volumes;
   auto grids = std::make_shared<Grids>(Grids{std::move(info), named, std::move(v[0]), std::move(v[1]), std::move(v[2]), std::move(v[3]),

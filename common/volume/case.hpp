@@ -72,7 +72,7 @@ class Case {
   [[nodiscard]] static Result<Case> build(CaseInfo info, const CoordBox& box, const FillPart& fill,
                                           const KeepGoing& keep_going = {});
   // Errors: not_found (no such folder), invalid_input (no or broken case.json / bone.vdb, or content that does not
-  // match its hash), unsupported (schema version).
+  // match its hash), unsupported (schema version), exhausted (more memory than a case of its size takes).
   [[nodiscard]] static Result<Case> load(const std::filesystem::path& folder);
   // Writes beside `folder` and renames, so no half-written case is ever seen. `keep_going` is asked before the
   // renaming, too. Errors: exists, internal (disk), cancelled.

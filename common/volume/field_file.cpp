@@ -10,7 +10,6 @@
 #include <cstdio>
 #include <fstream>
 #include <functional>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <sstream>
@@ -20,6 +19,8 @@
 #include "common/core/check.hpp"
 #include "common/field/kernel.hpp"
 #include "common/tools/tool_file.hpp"
+#include "common/volume/openvdb_start.hpp"
+#include "common/volume/vdb_size.hpp"
 
 namespace osteon {
 namespace {
@@ -34,6 +35,9 @@ constexpr std::size_t kMostBodies = 4096;
 // Places are samples of a lattice in front of a surgeon: kilometres are an error.
 constexpr std::int32_t kFarthestSample = 1 << 22;
 
+constexpr VdbLimits kFieldLimits{
+    .memory_bytes = std::uint64_t{16} << 30, .leaves = kMostLeaves, .grids = std::uint32_t{kMostBodies} * kLevels};
+
 constexpr const char* kFormatKey = "osteon_format";
 constexpr const char* kCaseKey = "osteon_case_hash";
 constexpr const char* kKernelKey = "osteon_kernel_version";
@@ -43,11 +47,6 @@ constexpr const char* kBodiesKey = "osteon_bodies";
 constexpr const char* kItemsKey = "osteon_items";
 constexpr const char* kToolsKey = "osteon_tools";  // how many; each under this and its number
 constexpr std::size_t kMostItems = 4096, kMostTools = 1024;
-
-void initialize_once() {
-  static std::once_flag once;
-  std::call_once(once, [] { openvdb::initialize(); });
-}
 
 auto place_of(const FieldLeaf& leaf) { return std::tuple(leaf.body, leaf.level, leaf.origin); }
 
@@ -197,7 +196,7 @@ Result<void> read_scene(const fs::path& file, const openvdb::MetaMap& meta, Save
 
 Result<void> write_grids(const fs::path& file, const SavedFields& fields) {
   try {
-    initialize_once();
+    start_openvdb();
     openvdb::GridPtrVec grids;
     Grid::Ptr grid;
     std::optional<std::pair<BodyId, int>> current;
@@ -352,8 +351,9 @@ Result<SavedFields> load_fields(const fs::path& file) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return failure(ErrorCode::not_found, "there is no file " + file.string());
   if (const auto sealed = check_seal(file); !sealed) return tl::unexpected(sealed.error());
+  if (const auto size = measure_vdb(file, kFieldLimits); !size) return failure(ErrorCode::invalid_input, size.error().message);
   try {
-    initialize_once();
+    start_openvdb();
     openvdb::io::File in(file.string());
     in.open(false);
     auto fields = read_head(file, *in.getMetadata());

@@ -7,7 +7,6 @@
 #include <atomic>
 #include <cmath>
 #include <cstdio>
-#include <mutex>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -15,14 +14,10 @@
 
 #include "common/geometry/mesh_file.hpp"
 #include "common/geometry/triangle_distance.hpp"
+#include "common/volume/openvdb_start.hpp"
 
 namespace osteon {
 namespace {
-
-void initialize_once() {
-  static std::once_flag once;
-  std::call_once(once, [] { openvdb::initialize(); });
-}
 
 Result<void> check(const TriangleMesh& mesh, double pitch_mm, std::size_t most_triangles, double largest_mm) {
   char text[200];
@@ -167,7 +162,7 @@ Result<std::shared_ptr<const SampledDistance>> sampled_distance(const TriangleMe
   if (quanta < 1) return failure(ErrorCode::invalid_input, "the pitch of a mesh must be between 0.001 and 8 mm");
   if (const auto good = check(mesh, pitch_mm, kMostMeshTriangles, kLargestMesh_mm); !good) return tl::unexpected(good.error());
   try {
-    initialize_once();
+    start_openvdb();
     return measure(mesh, quanta);
   } catch (const std::exception& e) {
     return failure(ErrorCode::internal, std::string("the mesh could not be measured: ") + e.what());
@@ -279,7 +274,7 @@ Result<Case> case_of_mesh(CaseInfo info, const TriangleMesh& mesh, double densit
     return failure(ErrorCode::invalid_input, text);
   }
   try {
-    initialize_once();
+    start_openvdb();
     return build_of_mesh(std::move(info), mesh, density_g_cm3, keep_going);
   } catch (const std::exception& e) {
     return failure(ErrorCode::internal, std::string("the mesh could not be measured: ") + e.what());

@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <mutex>
+#include <new>
 
 #include "common/core/check.hpp"
+#include "common/volume/openvdb_start.hpp"
 
 namespace osteon {
 
@@ -22,18 +23,13 @@ struct SparseVolume::Impl {
 
 namespace {
 
-void initialize_once() {
-  static std::once_flag once;
-  std::call_once(once, [] { openvdb::initialize(); });
-}
-
 openvdb::Coord vdb(Coord c) { return {c.x, c.y, c.z}; }
 Coord ours(const openvdb::Coord& c) { return {c.x(), c.y(), c.z()}; }
 
 }  // namespace
 
 SparseVolume::SparseVolume(float background) : impl_(std::make_unique<Impl>()) {
-  initialize_once();
+  start_openvdb();
   impl_->grid = Grid::create(background);
 }
 SparseVolume::~SparseVolume() = default;
@@ -218,7 +214,7 @@ std::size_t SparseVolume::memory_bytes() const { return impl_->grid->tree().memU
 Result<void> save_volumes(const std::filesystem::path& file, double pitch_mm,
                           const std::vector<std::pair<std::string, const SparseVolume*>>& volumes) {
   try {
-    initialize_once();
+    start_openvdb();
     openvdb::GridPtrVec grids;
     for (const auto& [name, volume] : volumes) {
       const Grid::Ptr grid = volume->impl_->grid->copy();  // shares the tree, has a name and transform of its own
@@ -235,10 +231,15 @@ Result<void> save_volumes(const std::filesystem::path& file, double pitch_mm,
   }
 }
 
-Result<std::vector<SparseVolume>> load_volumes(const std::filesystem::path& file, const std::vector<std::string>& names) {
-  if (!std::filesystem::exists(file)) return failure(ErrorCode::not_found, "there is no file " + file.string());
+Result<std::vector<SparseVolume>> load_volumes(const std::filesystem::path& file, const std::vector<std::string>& names,
+                                               const VdbLimits& limits) {
+  if (const auto size = measure_vdb(file, limits); !size) {
+    Error error = size.error();
+    if (error.code == ErrorCode::invalid_input) error.message += "; import the case again";
+    return tl::unexpected(error);
+  }
   try {
-    initialize_once();
+    start_openvdb();
     openvdb::io::File in(file.string());
     in.open(false);  // no delayed loading: the file may be replaced while we run
     std::vector<SparseVolume> volumes;
@@ -253,6 +254,8 @@ Result<std::vector<SparseVolume>> load_volumes(const std::filesystem::path& file
       volumes.push_back(std::move(volume));
     }
     return volumes;
+  } catch (const std::bad_alloc&) {
+    return failure(ErrorCode::exhausted, file.string() + " takes more memory than there is");
   } catch (const std::exception& e) {
     return failure(ErrorCode::invalid_input, file.string() + " is damaged (" + e.what() + "); import the case again");
   }

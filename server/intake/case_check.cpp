@@ -16,12 +16,14 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <thread>
 #include <utility>
 
+#include "common/core/bounded_text.hpp"
 #include "common/runtime/log.hpp"
 #include "common/volume/case.hpp"
 #include "server/intake/confine.hpp"
@@ -35,6 +37,7 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kMostSaid = 64 * 1024;
+constexpr std::uint64_t kAddressesToMemory = 4;  // allocators and threads reserve addresses that they do not use
 
 tl::unexpected<Error> cannot_start(int reason) {
   return failure(ErrorCode::internal, std::string("the process that looks cases through cannot be started: ") + std::strerror(reason));
@@ -198,8 +201,8 @@ Result<Case> unpack_and_read(const fs::path& archive, const fs::path& sent, cons
   if (const auto unpacked = unpack_case(archive, quota, put); !unpacked) return tl::unexpected(unpacked.error());
   if (const Result<void> closed = files.close(); !closed) return tl::unexpected(closed.error());
   Result<Case> read = Case::load(sent);
-  if (!read) return failure(ErrorCode::invalid_input, "the case is not sound: " + read.error().message);
-  return read;
+  if (read || read.error().code == ErrorCode::exhausted) return read;
+  return failure(ErrorCode::invalid_input, "the case is not sound: " + read.error().message);
 }
 
 }  // namespace
@@ -223,7 +226,8 @@ Result<CheckedCase> check_case(const fs::path& program, const fs::path& archive,
   Child child(id);
   out.close();
   // Before it has read a byte of the case, or nearly; what it can do until then is what it can do anyway.
-  child.limit(RLIMIT_AS, quota.memory_bytes);
+  child.limit(RLIMIT_DATA, quota.memory_bytes);
+  child.limit(RLIMIT_AS, kAddressesToMemory * quota.memory_bytes);
   child.limit(RLIMIT_FSIZE, quota.unpacked_bytes);
   child.limit(RLIMIT_CPU, static_cast<std::uint64_t>(2 * quota.time.count()));
 
@@ -264,9 +268,12 @@ int run_case_check(const fs::path& archive, const fs::path& folder, const std::s
       answer = {{"error", kept.error().message}, {"code", word_of(kept.error().code)}};
     else
       answer = {{"hash", to_hex(read->hash())}, {"title", read->info().title}, {"memory_bytes", read->memory_bytes()}};
+  } catch (const std::bad_alloc&) {
+    answer = {{"error", "the case takes more memory to read than it may"}, {"code", word_of(ErrorCode::exhausted)}};
   } catch (const std::exception& broken) {
     answer = {{"error", std::string("the case is not sound: it cannot be read: ") + broken.what()}};
   }
+  if (answer.contains("error")) answer["error"] = bounded_text(answer["error"].get<std::string>());
   answer["files_held"] = held.files;
   answer["calls_held"] = held.calls;
   const std::string line = answer.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace) + "\n";

@@ -26,6 +26,7 @@ SILENT_S = 0.002    # a door without TLS speaks first, and at once
 TLS_ALERT, MOST_ALERT_BYTES = 0x15, 16
 HTTP2 = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes([0, 0, 0, 4, 0, 0, 0, 0, 0])
 FUZZ_SOAK = 10_000_000  # of every target
+DAMAGED_SMALL, DAMAGED_LARGE = 1000, 10
 FUZZED = re.compile(r"^fuzzed: (\w+) (\d+) inputs; ")
 
 
@@ -186,5 +187,18 @@ def fuzz(target, inputs, run):
     return {f"fuzzed_{target}": registry.Measured(done, None, threads=many)}
 
 
-GROUPS = {"knocking": knocking,
+def damaged_cases(run):
+    """Cases with a few bytes changed, uploaded."""
+    run.say(f"{DAMAGED_SMALL} damaged small cases and {DAMAGED_LARGE} large ones")
+    out = json.loads(run.output("osteon-case-changes", DAMAGED_SMALL, DAMAGED_LARGE))
+    run.tables.append(("damaged cases", list(out.items())))
+    return {
+        "damaged_cases": (out["changed"], None),
+        "damaged_cases_taken": (out["other"], None),
+        "damaged_cases_memory": (out["peak_mib"], None),
+        "damaged_cases_sentence": (out["longest_sentence_bytes"], None),
+    }
+
+
+GROUPS = {"knocking": knocking, "damaged_cases": damaged_cases,
           **{f"fuzz_{target}": functools.partial(fuzz, target, inputs) for target, _, _, inputs in registry.FUZZED}}

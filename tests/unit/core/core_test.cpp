@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "common/core/bounded_text.hpp"
 #include "common/core/check.hpp"
 #include "common/core/digest.hpp"
 #include "common/core/id.hpp"
@@ -51,6 +52,22 @@ TEST(Units, AddAndCompareWithinTheirKind) {
 }
 
 TEST(CheckDeathTest, SaysWhichPromiseWasBroken) { EXPECT_DEATH(OSTEON_CHECK(1 + 1 == 3), "broken promise: 1 \\+ 1 == 3"); }
+
+TEST(WithoutPaths, LeavesTheLastNames) {
+  EXPECT_EQ(without_paths("cannot write /srv/rooms/anna.journal: no space"), "cannot write anna.journal: no space");
+  EXPECT_EQ(without_paths("(rooms/a.journal), \"/x/y z/b/\"; c"), "(a.journal), \"y b\"; c");
+  EXPECT_EQ(without_paths("cannot rename /x/sound.partial-4711 to /x/sound"), "cannot rename sound to sound");
+  EXPECT_EQ(without_paths("/"), "");
+  EXPECT_EQ(without_paths("a room"), "a room");
+}
+
+TEST(BoundedText, IsOneLineOfSoManyBytes) {
+  EXPECT_EQ(bounded_text("a bone, ä"), "a bone, ä");
+  EXPECT_EQ(bounded_text("a\nb\x1b[2J\x7f\t\xc2\x9b"), "a b [2J    ");
+  EXPECT_EQ(bounded_text(std::string(5000, 'x')).size(), kMostErrorBytes + 4);
+  EXPECT_EQ(bounded_text("abcdef", 3), "abc ...");
+  EXPECT_EQ(bounded_text("abä", 3), "ab ...") << "a letter in halves";
+}
 
 }  // namespace
 }  // namespace osteon
