@@ -85,9 +85,10 @@ Result<std::unique_ptr<Upload>> CaseStore::begin() {
     --open_;
     return failure(ErrorCode::exhausted, "the server's folder of cases is full; ask the operator to delete some");
   }
-  const fs::path place = folder_ / (std::string(kIncoming) + std::to_string(::getpid()) + "-" + std::to_string(++next_));
+  fs::path place;
   std::error_code error;
-  fs::create_directory(place, error);
+  do place = folder_ / (std::string(kIncoming) + std::to_string(++next_));
+  while (!fs::create_directory(place, error) && !error);
   if (error) {
     --open_;
     return disk(place, error.message());

@@ -13,6 +13,7 @@
 
 #include "common/access/role_table.hpp"
 #include "common/core/check.hpp"
+#include "common/runtime/log.hpp"
 #include "server/net/gate.hpp"
 #include "server/net/out_stream.inl"
 #include "server/net/peer_claims.hpp"
@@ -141,7 +142,9 @@ inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const g
   return room;
 }
 
+// The log keeps the paths.
 inline Status status_of(const Error& error) {
+  if (without_paths(error.message) != error.message) log::warn("a call failed", {{"reason", error.message}});
   std::string said = short_words(error.message);
   switch (error.code) {
     case ErrorCode::invalid_input: return invalid(std::move(said));

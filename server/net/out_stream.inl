@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/core/bounded_text.hpp"
 #include "server/net/gate.hpp"
 #include "server/net/outbox.hpp"
 
@@ -41,14 +42,9 @@ std::optional<Message> parse(const ByteBuffer& bytes) {
 }
 
 // What a status says may quote what came, however long that is. A client's gRPC reads 8 kB of it, with three bytes for each of
-// some letters, and after more it reads no answer on that line.
-inline std::string short_words(std::string why) {
-  constexpr std::size_t kMost = 1000;
-  if (why.size() <= kMost) return why;
-  std::size_t size = kMost;
-  while (size > 0 && (static_cast<unsigned char>(why[size]) & 0xc0u) == 0x80u) --size;  // no letter in halves
-  why.resize(size);
-  return why + " ...";
+// some letters, and after more it reads no answer on that line. Where files lie here is nobody's business there.
+inline std::string short_words(std::string_view why) {
+  return bounded_text(without_paths(why), 1000);
 }
 
 inline Status invalid(std::string why) { return {StatusCode::INVALID_ARGUMENT, short_words(std::move(why))}; }

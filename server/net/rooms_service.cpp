@@ -110,7 +110,10 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
       response->set_chain(wire::to_wire(report->head.chain));
       response->set_field_hash(wire::to_wire(report->replayed.field_hash));
       response->set_checkpoints(static_cast<std::uint32_t>(report->checkpoints));
-      for (const std::string& fault : report->faults) response->add_faults(fault);
+      for (const std::string& fault : report->faults) {
+        log::warn("a room is damaged", {{"room", request->name()}, {"fault", fault}});
+        response->add_faults(short_words(fault));
+      }
       return Status(Status::OK);
     });
   }

@@ -393,7 +393,7 @@ class RoomServiceImpl final : public RoomBase {
       room->host().find_pieces();
       const SavedFields saved = room->host().saved_fields();
       if (const Result<void> written = save_fields(file, saved); !written)
-        return reactor->Finish({StatusCode::INTERNAL, written.error().message});
+        return reactor->Finish(status_of(written.error()));
       response->set_room_seq(saved.room_seq.value);
       response->set_field_hash(wire::to_wire(field_hash(saved.leaves, room->host().bone().pitch_mm())));
       response->set_file(file.string());

@@ -78,6 +78,45 @@ TEST_F(Uploads, WhatIsNoSoundCaseIsOneSentenceAndNothingIsKept) {
   EXPECT_EQ(kept(), 1U);
 }
 
+// Where files lie on the server, and in which process, is nobody's business elsewhere. The log keeps it.
+TEST_F(Uploads, ErrorsNameNoPathsAndNoProcesses) {
+  const std::string pid = std::to_string(stage_.server().pid());
+  std::vector<std::string> told;
+  const auto expect_told = [&](const RunResult& refused, const std::string& what) {
+    EXPECT_NE(refused.exit_code, 0) << what;
+    // What the client says of its own files is its own business.
+    for (const fs::path& folder : {rooms_.path(), uploads_.path()})
+      EXPECT_EQ(refused.err.find(folder.string()), std::string::npos) << what << ": " << refused.err;
+    EXPECT_EQ(refused.err.find(pid), std::string::npos) << what << ": " << refused.err;
+    EXPECT_EQ(refused.err.find('/'), std::string::npos) << what << ": " << refused.err;
+    EXPECT_NE(refused.err.find(what), std::string::npos) << refused.err;
+  };
+  const RunResult sent = ask("cases", {"upload", stage_ / "other"});
+  ASSERT_EQ(sent.exit_code, 0) << sent.err;
+  const std::string hash = sent.out.substr(0, 64);
+  for (const std::string room : {"damaged", "gone"})
+    ASSERT_EQ(ask("rooms", {"create", room, "--case-hash", hash}).exit_code, 0);
+  ASSERT_EQ(ask("rooms", {"backup", "damaged", "once.backup"}).exit_code, 0);
+  expect_told(ask("rooms", {"backup", "damaged", "once.backup"}), "once.backup");
+  for (const std::string room : {"damaged", "gone"}) ASSERT_EQ(ask("rooms", {"close", room}).exit_code, 0);
+
+  std::vector<fs::path> journals;
+  for (const auto& entry : fs::directory_iterator(rooms_.path()))
+    if (entry.path().filename().string().starts_with("damaged") && entry.path().extension() != ".backup") journals.push_back(entry.path());
+  ASSERT_FALSE(journals.empty());
+  for (const fs::path& journal : journals) std::ofstream(journal, std::ios::trunc) << "no journal";
+  expect_told(ask("rooms", {"resume", "damaged"}), "no journal");
+
+  fs::remove(uploads_ / hash / "bone.vdb");
+  expect_told(ask("rooms", {"resume", "gone"}), "bone.vdb");
+  fs::create_directory(stage_ / "bad");
+  fs::copy_file(stage_ / "other" / "case.json", stage_ / "bad" / "case.json");
+  std::ofstream(stage_ / "bad" / "bone.vdb") << std::string(5000, 'x');
+  expect_told(ask("cases", {"upload", stage_ / "bad"}), "not sound");
+
+  EXPECT_NE(stage_.server().err().find(rooms_.path().string()), std::string::npos) << "the log keeps the paths";
+}
+
 TEST(UploadsNotTaken, AServerWithoutAFolderForThemSaysSo) {
   const Stage stage(16.0);
   const RunResult refused = run(program("osteon-server"), {"cases", "upload", stage / "case", "--plain", "--server", stage.address()}, 60s);
