@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/core/bounded_text.hpp"
 #include "common/field/kernel.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/progress.hpp"
@@ -26,6 +27,7 @@
 #include "server/journal/journal_file.hpp"
 #include "server/journal/signing.hpp"
 #include "server/journal/upkeep.hpp"
+#include "server/net/forgetting.hpp"
 #include "server/net/journal_rows.hpp"
 #include "server/net/room_files.hpp"
 
@@ -44,7 +46,9 @@ struct Arguments {
   bool branches = false, alone = false;
 };
 
-void say(const std::string& what, const std::string& value) { std::printf("%-12s %s\n", (what + ":").c_str(), value.c_str()); }
+void say(const std::string& what, const std::string& value) {
+  std::printf("%-12s %s\n", (what + ":").c_str(), bounded_text(value).c_str());
+}
 void say_unsigned() {
   say("note", "not signed: there is no signing.key beside the journal; give --signing-key FILE");
 }
@@ -382,11 +386,14 @@ Result<void> list_people(const Arguments& given) {
 }
 
 // Of one number: who that was, where the journal knows it. Of many: nobody, since they may be at work in other rooms.
-Result<void> forget_in_audit_too(const Arguments& given, const std::string& label) {
-  if (label.empty()) return {};
-  const Result<std::size_t> gone = erase_person(system_disk(), folder_of(given.file) / kAuditLogFile, label);
-  if (!gone) return tl::unexpected(gone.error());
-  if (*gone > 0) say("audit log", std::to_string(*gone) + " identities forgotten (what they did stays, under pseudonyms)");
+Result<void> forget_in_audit_too(const Arguments& given, const std::vector<std::string>& names) {
+  std::size_t forgotten = 0;
+  for (const std::string& name : names) {
+    const Result<std::size_t> gone = erase_person(system_disk(), folder_of(given.file) / kAuditLogFile, name);
+    if (!gone) return tl::unexpected(gone.error());
+    forgotten += *gone;
+  }
+  if (forgotten > 0) say("audit log", std::to_string(forgotten) + " identities forgotten (what they did stays, under pseudonyms)");
   return {};
 }
 
@@ -394,27 +401,26 @@ Result<void> forget(const Arguments& given) {
   if ((given.person == 0) == !given.days)
     return failure(ErrorCode::invalid_input, "forget needs either --person NUMBER, as \"people\" lists it, or --older-than DAYS");
   const auto today = std::chrono::duration_cast<std::chrono::days>(std::chrono::system_clock::now().time_since_epoch());
-  std::string label;
+  std::vector<std::string> names;
   const Result<void> done = change_journal(given, [&](Journal& journal) -> Result<void> {
     // Also where nobody was to be forgotten: a name may be in what cannot be read.
     if (const Error* closed = journal.closed_because()) return tl::unexpected(*closed);
-    if (given.person != 0) {
-      const Result<std::vector<Person>> people = journal.people();
-      if (!people) return tl::unexpected(people.error());
-      const auto one = std::ranges::find(*people, std::to_string(given.person), &Person::pseudonym);
-      if (one != people->end()) label = one->label;
-    }
-    const Result<std::size_t> forgotten =
-        given.person == 0 ? journal.forget_people_before(static_cast<std::int32_t>(today.count()) - *given.days)
-                          : journal.forget_person(std::to_string(given.person));
+    const auto came_before = [&](const Person& person) {
+      return given.days && person.joined_day < static_cast<std::int32_t>(today.count()) - *given.days;
+    };
+    const Result<Forgotten> forgotten = forget_people(journal, came_before, given.person);
     if (!forgotten) return tl::unexpected(forgotten.error());
-    if (given.person != 0 && *forgotten == 0)
+    if (const Result<void> gone = forget_owner(given.file, *forgotten); !gone) return gone;
+    if (given.person != 0 && forgotten->people == 0 && forgotten->rows == 0)
       return failure(ErrorCode::not_found, "nobody in " + given.file.string() + " has the number " +
                                                std::to_string(given.person) + "; \"people\" lists those it knows");
-    say("forgotten", std::to_string(*forgotten) + " (what they did stays, under a number; backups made before have the names)");
+    say("forgotten", std::to_string(forgotten->people) + " (what they did stays, under a number)");
+    say("erased", "the words of " + std::to_string(forgotten->rows) + " events");
+    say("not erased", "backups and branches made before: they have names and words, or words");
+    if (given.person != 0) names = forgotten->names;
     return {};
   });
-  return done.and_then([&] { return forget_in_audit_too(given, label); });
+  return done.and_then([&] { return forget_in_audit_too(given, names); });
 }
 
 // What the audit log says of a command; nothing of those that only look.

@@ -214,6 +214,11 @@ Result<void> Journal::begin_signing() {
       std::find_if(all->rbegin(), all->rend(), [&](const SignedRows& one) { return keys->trusts(one.key); });
   const RoomSeq head = state.head.place;
   const bool any = last != all->rend();
+  const Result<bool> erased = is_vouched_for(kErasedRegister);
+  if (!erased) return tl::unexpected(erased.error());
+  if (any && !*erased)
+    return failure(ErrorCode::unavailable,
+                   state.path.string() + ": somebody without this server's key has replaced rows of it; go on from a backup");
   if (any && last->head.place == head) {
     state.signed_since = last->since;
     return {};
@@ -480,7 +485,7 @@ Result<void> Journal::set_beside(const Registers& registers, const std::vector<P
     Result<void> done;
     for (const auto& [name, value] : registers) {
       OSTEON_CHECK(name != kGenesisRegister && name != kFooterRegister && name != kGenerationRegister &&
-                   name != kIdRegister && name != kKeysRegister);
+                   name != kIdRegister && name != kKeysRegister && name != kErasedRegister);
       if (done) done = state_->file.set_register(name, value);
     }
     for (const Person& person : people)
@@ -528,6 +533,10 @@ Result<std::size_t> Journal::forget_person(std::string_view pseudonym) {
 
 Result<std::size_t> Journal::forget_people_before(std::int32_t day) {
   return keep_people([&](const Person& person) { return person.joined_day >= day; });
+}
+
+Result<std::size_t> Journal::forget_people_if(const std::function<bool(const Person&)>& whom) {
+  return keep_people([&](const Person& person) { return !whom(person); });
 }
 
 Result<void> Journal::tidy() {

@@ -254,6 +254,7 @@ Result<JournalFile> JournalFile::of_database(const fs::path& file, Disk& disk, D
   const auto generation = opened.find_register(kGenerationRegister), footer = opened.find_register(kFooterRegister);
   const auto id = opened.find_register(kIdRegister);
   if (id && *id) opened.id_ = **id;
+  static_cast<void>(opened.read_erased());  // inspect() says what is wrong with it
   if (generation && *generation) opened.generation_ = decode_number(**generation).value_or(0);
   const auto closed = footer && *footer ? decode_footer(**footer) : std::nullopt;
   opened.needs_log_ = opened.generation_ != 0 && !(closed && closed->clean);
@@ -386,7 +387,7 @@ Walk JournalFile::walk(const JournalHead& before, RoomSeq last,
     row.place.value = static_cast<std::uint64_t>(statement->integer(0));
     row.at_ns = statement->integer(1);
     row.bytes = statement->bytes(2);
-    const JournalHead next = next_head(walked.head, row);
+    const JournalHead next = next_in_chain(walked.head, row);
     if (row.place.value != walked.head.place.value + 1 || statement->bytes(3) != as_text(next.chain)) {
       walked.stopped = Error{ErrorCode::invalid_input, file_.string() + ": row " + std::to_string(walked.head.place.value + 1) +
                                                            " does not fit the chain of hashes" + std::string(kRemedy)};
@@ -611,6 +612,8 @@ void JournalFile::inspect_beside(bool files, Inspection& found) {
   const auto note = [&](const Error& error) { found.faults.push_back(error.message); };
   inspect_log(found);
   inspect_signatures(found);
+  if (!erased_.empty())
+    found.notes.push_back("words were erased from " + std::to_string(erased_.size()) + " rows; the chain keeps what their hash was");
   if (const auto bytes = find_register(kFooterRegister); !bytes) {
     note(bytes.error());
   } else if (*bytes) {
@@ -676,7 +679,7 @@ Result<void> JournalFile::add_rows(std::span<const JournalRow> rows, JournalHead
   }
   for (const JournalRow& row : rows) {
     OSTEON_CHECK(row.place.value == head.place.value + 1);
-    head = next_head(head, row);
+    head = next_in_chain(head, row);
     const Result<void> put = insert_->integer(0, static_cast<std::int64_t>(row.place.value))
                                  .integer(1, row.at_ns)
                                  .blob(2, row.bytes)

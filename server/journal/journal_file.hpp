@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -54,6 +55,15 @@ struct SealedRegister {
   std::string name, value, seal;
 };
 
+// A row of which something was erased.
+struct ErasedRow {
+  Digest chain;  // at the row, as it was written
+  Digest bytes;  // of what stands in its place
+};
+using ErasedRows = std::map<std::uint64_t, ErasedRow>;  // by place
+[[nodiscard]] std::string encode_erased(const ErasedRows& rows);
+[[nodiscard]] std::optional<ErasedRows> decode_erased(std::string_view bytes);
+
 struct Walk {
   JournalHead head;              // of the last row that fitted
   std::optional<Error> stopped;  // why the next one does not
@@ -85,6 +95,11 @@ class JournalFile {
   [[nodiscard]] Result<void> make_id();
   // The newest generation of its log that is known; 0: it never had a log.
   [[nodiscard]] std::uint64_t generation() const { return std::max(generation_, log_.generation); }
+
+  // Rows of which something was erased, as a register of the journal says. The chain goes on over them.
+  [[nodiscard]] const ErasedRows& erased() const { return erased_; }
+  // Of the journal that this is a growing copy of.
+  void take_erased(const ErasedRows& rows) { erased_ = rows; }
 
   // Rows after `before` up to `last`, each held against the chain, as long as `take` returns true.
   [[nodiscard]] Walk walk(const JournalHead& before, RoomSeq last,
@@ -119,6 +134,8 @@ class JournalFile {
   [[nodiscard]] Result<void> note_generation(const LogStart& start);  // which ends what a footer said
   [[nodiscard]] Result<void> add_checkpoint(const Checkpoint& checkpoint);
   [[nodiscard]] Result<void> add_person(const Person& person);
+  // Puts these bytes in place of those that the rows have.
+  [[nodiscard]] Result<void> erase(std::span<const JournalRow> instead);
 
  private:
   JournalFile(std::filesystem::path file, Disk& disk, Database database)
@@ -131,6 +148,9 @@ class JournalFile {
   [[nodiscard]] Result<JournalHead> stored_head();
   // Inserts the rows that its log has beyond its last one.
   [[nodiscard]] Result<void> take_log();
+  [[nodiscard]] Result<void> read_erased();
+  // As next_head(), and of an erased row what its chain was.
+  [[nodiscard]] JournalHead next_in_chain(const JournalHead& before, const JournalRow& row) const;
   // To the tables of the current version, within a transaction.
   [[nodiscard]] Result<void> upgrade();
   void inspect_signatures(Inspection& found);
@@ -149,6 +169,7 @@ class JournalFile {
   std::string id_;
   std::uint64_t generation_ = 0;
   bool needs_log_ = false;  // it was not closed cleanly since the generation began
+  ErasedRows erased_;
   LogContents log_;
   JournalHead stored_head_;  // of the rows without those of the log
 };
@@ -156,7 +177,7 @@ class JournalFile {
 inline constexpr std::string_view kGenesisRegister = "genesis", kFooterRegister = "footer",
                                   kEpochRegister = "server_epoch", kRecoveredRegister = "recovered",
                                   kGenerationRegister = "log generation", kIdRegister = "journal id",
-                                  kKeysRegister = "signing keys";
+                                  kKeysRegister = "signing keys", kErasedRegister = "erased rows";
 
 // A head that is kept as a register, with a mark.
 struct Footer {

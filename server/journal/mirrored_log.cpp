@@ -377,6 +377,18 @@ Result<void> MirroredLog::append(std::span<const JournalRow> rows, const Journal
   return {};
 }
 
+Result<void> MirroredLog::wipe() {
+  const std::string zeros(std::size_t{1} << 16, '\0');
+  for (Member* member : {&log_, &mirror_}) {
+    for (std::uint64_t at = member->end; at < member->written; at += zeros.size()) {
+      const std::string_view piece = std::string_view(zeros).substr(0, std::min<std::uint64_t>(zeros.size(), member->written - at));
+      if (Result<void> put = member->file->write_at(at, piece); !put) return put;
+    }
+    if (Result<void> synced = sync(*member); !synced) return synced;
+  }
+  return {};
+}
+
 std::uint64_t MirroredLog::used_bytes() const { return log_.end - std::min<std::uint64_t>(log_.end, kFirstSector); }
 bool MirroredLog::is_full() const { return log_.end >= capacity_; }
 

@@ -76,6 +76,9 @@ class MirroredLog {
   [[nodiscard]] Result<void> append(std::span<const JournalRow> rows, const JournalHead& head,
                                     const std::optional<Signature>& signature = {});
 
+  // Zeros behind the entries of both files: earlier generations may have left theirs there.
+  [[nodiscard]] Result<void> wipe();
+
   [[nodiscard]] std::uint64_t used_bytes() const;  // of entries, in one of the files
   [[nodiscard]] bool is_full() const;
 

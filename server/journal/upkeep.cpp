@@ -176,6 +176,8 @@ struct JournalCopying {
                                   {.disk = state.disk, .keys = state.signs_rows ? state.keys : nullptr});
     if (!target) return tl::unexpected(target.error());
     state.target = std::move(*target);
+    // Their chain is that of the rows as they were. A branch has another chain, of what stands there now.
+    if (!state.only) JournalInside::of(*state.target).file.take_erased(state.source->erased());
     return {};
   }
 

@@ -5,6 +5,7 @@
 
 #include "common/field/field_hash.hpp"
 #include "server/journal/journal_file.hpp"
+#include "server/net/forgetting.hpp"
 #include "server/net/room_keeper.hpp"
 
 namespace osteon {
@@ -165,14 +166,19 @@ Result<std::vector<Person>> RoomKeeper::people() {
 }
 
 Result<bool> RoomKeeper::forget(std::uint32_t person) {
-  return with_journal([&](Journal& journal) { return journal.forget_person(std::to_string(person)); })
-      .map([](std::size_t forgotten) { return forgotten > 0; });
+  return with_journal([&](Journal& journal) { return forget_people(journal, [](const Person&) { return false; }, person); })
+      .and_then([&](const Forgotten& forgotten) {
+        return forget_owner(file_, forgotten).map([&] { return forgotten.people + forgotten.rows > 0; });
+      });
 }
 
 Result<std::size_t> RoomKeeper::forget_old() {
   return with_journal([&](Journal& journal) -> Result<std::size_t> {
     if (retention_days_ <= 0) return 0;
-    return journal.forget_people_before(today_() - retention_days_);
+    const std::int32_t day = today_() - retention_days_;
+    return forget_people(journal, [&](const Person& person) { return person.joined_day < day; }).and_then([&](const Forgotten& forgotten) {
+      return forget_owner(file_, forgotten).map([&] { return forgotten.people; });
+    });
   });
 }
 

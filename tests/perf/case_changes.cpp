@@ -33,7 +33,7 @@ long peak_mib() {
   return used.ru_maxrss / 1024;
 }
 
-// Solid, of densities that nothing compresses: a file of 56 MB.
+// Solid, of densities that nothing compresses: a file of 52 MiB.
 Result<Case> large_case() {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> density(0.2f, 1.0f);

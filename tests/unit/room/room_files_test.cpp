@@ -159,6 +159,54 @@ TEST_F(RoomFilesTest, WhoJoinedTooLongAgoIsForgotten) {
   EXPECT_FALSE(anywhere("Anna Alt"));
 }
 
+// What one person said, drew as words and called moments, and what was decided about and said to it.
+TEST_F(RoomFilesTest, WordsGoWithThePersonAndTheChainStays) {
+  KeptCuts kept(kFile, &disk_, "femur");
+  ASSERT_EQ(kept.keeper->person("Anna Alt").value(), 1u);
+  ASSERT_EQ(kept.keeper->person("Bela Neu").value(), 2u);
+  Room& room = *kept.room;
+  const AuthorId anna = room.join(MemberKind::surgeon, 1, {}, Role::trainee);
+  const AuthorId bela = room.join(MemberKind::watcher, 2, {}, Role::instructor);
+  ASSERT_TRUE(room.mark(anna, "mark of Zwetschge"));
+  ASSERT_TRUE(room.say(anna, {}, "spoken Zwetschge"));
+  ASSERT_TRUE(room.say(bela, anna, "said to her: Zwetschge"));
+  ASSERT_TRUE(room.say(bela, {}, "as anna alt said"));
+  ASSERT_TRUE(room.say(bela, {}, "anna altmann is somebody else"));
+  ASSERT_TRUE(room.supervise(bela, anna, {.stopped = true, .words = "stopped for Zwetschge"}));
+  Annotation drawn;
+  drawn.kind = AnnotationKind::label;
+  drawn.points = {{1, 2, 3}};
+  drawn.words = "label Zwetschge";
+  ASSERT_TRUE(room.annotate(anna, drawn));
+  drawn.words = "of another";
+  ASSERT_TRUE(room.annotate(bela, drawn));
+  kept.cut(3);
+  const JournalHead head = kept.keeper->head();
+  const Digest bone = room.field_hash();
+  ASSERT_TRUE(anywhere("Zwetschge"));
+
+  ASSERT_TRUE(kept.keeper->forget(1).value());
+  for (const char* gone : {"Zwetschge", "Anna Alt", "as anna alt said"}) EXPECT_FALSE(anywhere(gone)) << gone;
+  for (const char* stays : {"Bela Neu", "of another", "anna altmann is somebody else"})
+    EXPECT_TRUE(anywhere(stays)) << stays;
+  EXPECT_EQ(kept.keeper->head(), head);
+  EXPECT_FALSE(kept.keeper->forget(1).value()) << "nothing is left to forget";
+
+  // The room goes on, and what it was is made again from its rows.
+  kept.cut(2);
+  const Digest later = room.field_hash();
+  ASSERT_TRUE(kept.keeper->close());
+  kept.keeper.reset();
+  const auto report = verify_journal(kFile, &disk_);
+  ASSERT_TRUE(report);
+  EXPECT_THAT(report->faults, IsEmpty());
+  EXPECT_THAT(report->notes, ElementsAre(HasSubstr("words were erased from")));
+  kept.open(kFile);
+  EXPECT_EQ(kept.room->field_hash(), later);
+  EXPECT_EQ(test::replay_of(test::rows_of(*kept.keeper, head.place)).field_hash(), bone);
+  EXPECT_FALSE(anywhere("Zwetschge"));
+}
+
 TEST_F(RoomFilesTest, APersonGetsAllThatThereIsOfIt) {
   KeptCuts kept(kFile, &disk_, "femur");
   ASSERT_EQ(kept.keeper->person("Anna \"A\"\n").value(), 1u);

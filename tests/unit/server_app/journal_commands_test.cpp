@@ -7,7 +7,9 @@
 #include <iterator>
 
 #include "common/volume/field_file.hpp"
+#include "server/journal/signing.hpp"
 #include "server/journal/upkeep.hpp"
+#include "server/net/room_owners.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/room/kept_room.hpp"
@@ -196,6 +198,35 @@ TEST_F(JournalCommands, ForgettingWhoCameBeforeTodayLeavesTheOthers) {
   EXPECT_THAT(server("people", {}).out, AllOf(HasSubstr("Bert"), HasSubstr("Cora")));
   done("forget", {"--older-than", "0"});
   EXPECT_THAT(server("people", {}).out, AllOf(Not(HasSubstr("Bert")), HasSubstr("Cora")));
+}
+
+// Names and words are in no file of the folder, and copies of the journal have neither.
+TEST_F(JournalCommands, WhoIsForgottenLeavesNoWords) {
+  const auto keys = load_or_make_signing_keys(dir_ / "signing.key");
+  ASSERT_TRUE(keys) << keys.error().message;
+  const auto anywhere = [&](const std::string& text) {
+    return std::ranges::any_of(fs::recursive_directory_iterator(dir_.path()), [&](const fs::directory_entry& one) {
+      return one.is_regular_file() && bytes_of(one.path()).find(text) != std::string::npos;
+    });
+  };
+  const auto hash_of = [](const std::string& said) { return said.substr(said.find("field hash"), 80); };
+  const std::string mark(20, 'x'), before = hash_of(server("replay", {"--case", (dir_ / "case").string()}).out);
+  ASSERT_TRUE(note_owner(file_, "Anna"));
+  ASSERT_TRUE(anywhere(mark) && anywhere("Anna"));
+
+  const RunResult forgotten = server("forget", {"--person", "1"});
+  ASSERT_EQ(forgotten.exit_code, 0) << forgotten.err;
+  EXPECT_THAT(forgotten.out, HasSubstr("the words of 44 events"));
+  EXPECT_FALSE(anywhere(mark) || anywhere("Anna"));
+  done("verify", {});
+  EXPECT_EQ(hash_of(server("replay", {"--case", (dir_ / "case").string()}).out), before);
+  for (const std::string& copy : {std::string("backup"), std::string("recover")}) {
+    done(copy, {(dir_ / copy).string()});
+    EXPECT_EQ(run(program("osteon-server"), {"verify", (dir_ / copy).string()}).exit_code, 0) << copy;
+  }
+  done("branch", {(dir_ / "branched").string()});
+  EXPECT_TRUE(verify_journal(dir_ / "branched")->sound());
+  EXPECT_FALSE(anywhere(mark) || anywhere("Anna"));
 }
 
 TEST_F(JournalCommands, ASecondBackupNamesTheFirst) {

@@ -1,0 +1,100 @@
+// Rows of which something was erased. The chain keeps their hash, and a sealed register says what stands in their
+// place.
+#include <utility>
+
+#include "common/core/check.hpp"
+#include "server/journal/bytes.hpp"
+#include "server/journal/journal_state.hpp"
+
+namespace osteon {
+namespace {
+
+constexpr std::size_t kEntryBytes = 8 + 2 * sizeof(Digest::bytes);
+
+Digest digest_of_row(std::string_view bytes) {
+  Hasher hasher;
+  hasher.text(bytes);
+  return hasher.finish();
+}
+
+}  // namespace
+
+std::string encode_erased(const ErasedRows& rows) {
+  std::string bytes;
+  for (const auto& [place, row] : rows)
+    bytes += encode_number(place) + std::string(as_text(row.chain)) + std::string(as_text(row.bytes));
+  return bytes;
+}
+
+std::optional<ErasedRows> decode_erased(std::string_view bytes) {
+  if (bytes.size() % kEntryBytes != 0) return std::nullopt;
+  ErasedRows rows;
+  for (; !bytes.empty(); bytes.remove_prefix(kEntryBytes))
+    rows[*decode_number(bytes.substr(0, 8))] = {*digest_of(bytes.substr(8, 32)), *digest_of(bytes.substr(40, 32))};
+  return rows;
+}
+
+Result<void> JournalFile::read_erased() {
+  const auto stored = find_register(kErasedRegister);
+  if (!stored) return tl::unexpected(stored.error());
+  if (!*stored) return {};
+  std::optional<ErasedRows> rows = decode_erased(**stored);
+  if (!rows) return damaged("its register " + std::string(kErasedRegister));
+  erased_ = std::move(*rows);
+  return {};
+}
+
+JournalHead JournalFile::next_in_chain(const JournalHead& before, const JournalRow& row) const {
+  const auto erased = erased_.find(row.place.value);
+  if (erased != erased_.end() && erased->second.bytes == digest_of_row(row.bytes))
+    return {row.place, erased->second.chain};
+  return next_head(before, row);
+}
+
+Result<void> JournalFile::erase(std::span<const JournalRow> instead) {
+  auto statement = database_.prepare("UPDATE rows SET bytes = ? WHERE place = ?");
+  if (!statement) return tl::unexpected(statement.error());
+  for (const JournalRow& row : instead) {
+    const auto chain = chain_at(row.place);
+    if (!chain) return tl::unexpected(chain.error());
+    OSTEON_CHECK(chain->has_value());
+    if (Result<void> put = statement->blob(0, row.bytes).integer(1, static_cast<std::int64_t>(row.place.value)).run();
+        !put)
+      return put;
+    erased_[row.place.value] = {**chain, digest_of_row(row.bytes)};
+  }
+  return set_register(kErasedRegister, encode_erased(erased_));
+}
+
+Result<std::size_t> Journal::erase_rows(const std::function<std::optional<std::string>(const JournalRow&)>& without) {
+  State& state = *state_;
+  if (state.closed) return tl::unexpected(*state.closed);
+  std::vector<JournalRow> instead;
+  const Result<void> read_all = read(RoomSeq{1}, [&](const JournalRow& row) {
+    if (auto bytes = without(row)) instead.push_back({row.place, row.at_ns, std::move(*bytes)});
+    return true;
+  });
+  if (!read_all) return tl::unexpected(read_all.error());
+  if (instead.empty()) return 0;
+  const auto signed_rows = state.file.signed_rows();
+  if (!signed_rows) return tl::unexpected(signed_rows.error());
+  if (!signed_rows->empty() && !state.options.keys)
+    return failure(ErrorCode::denied, state.path.string() +
+                                          " was signed by its server, which has to sign what is erased too; "
+                                          "give its key with --signing-key FILE");
+  Database& database = state.file.database();
+  // Pages that the rows once were on may hold copies of them, and so may the log's file behind its end.
+  const Result<void> done = write([&] {
+    return state.file.erase(instead)
+        .and_then([&] { return keep_signature(); })
+        .and_then([&] { return database.commit(); })
+        .and_then([&] { return database.run("VACUUM"); })
+        .and_then([&] { return database.begin(); })
+        .and_then([&] { return carry(); })
+        .and_then([&] { return state.log->wipe(); });
+  });
+  if (!done) return tl::unexpected(done.error());
+  return instead.size();
+}
+
+}  // namespace osteon

@@ -1,0 +1,104 @@
+#include "server/net/forgetting.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <utility>
+#include <variant>
+
+#include "server/net/journal_rows.hpp"
+#include "server/net/room_owners.hpp"
+
+namespace osteon {
+namespace {
+
+std::string lower(std::string_view text) {
+  std::string low(text);
+  for (char& c : low)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return low;
+}
+
+bool is_letter(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || static_cast<unsigned char>(c) >= 0x80;
+}
+
+bool has_word(std::string_view text, std::string_view word) {
+  for (std::size_t at = text.find(word); at != text.npos; at = text.find(word, at + 1)) {
+    const std::size_t end = at + word.size();
+    if ((at == 0 || !is_letter(text[at - 1])) && (end == text.size() || !is_letter(text[end]))) return true;
+  }
+  return false;
+}
+
+std::uint32_t number_of(const Person& person) {
+  std::uint32_t number = 0;
+  std::from_chars(person.pseudonym.data(), person.pseudonym.data() + person.pseudonym.size(), number);
+  return number;
+}
+
+// The words of a row, where it has some.
+std::string* words_in(RoomRow& row) {
+  if (auto* mark = std::get_if<MarkRow>(&row.what)) return &mark->label;
+  if (auto* said = std::get_if<WordsRow>(&row.what)) return &said->words;
+  if (auto* one = std::get_if<SuperviseRow>(&row.what)) return &one->supervision.words;
+  if (auto* one = std::get_if<AnnotationRow>(&row.what); one != nullptr && one->drawn) return &one->drawn->words;
+  return nullptr;
+}
+
+}  // namespace
+
+bool WordEraser::names_one(std::string_view words) const {
+  const std::string low = lower(words);
+  return std::ranges::any_of(names_,
+                             [&](const std::string& name) { return !name.empty() && has_word(low, lower(name)); });
+}
+
+std::optional<std::string> WordEraser::operator()(const JournalRow& row) {
+  Result<RoomRow> read = row_from_bytes(row.place, std::chrono::nanoseconds(row.at_ns), row.bytes);
+  if (!read) return std::nullopt;
+  if (const auto* join = std::get_if<JoinRow>(&read->what); join != nullptr && people_.contains(join->person))
+    authors_.insert(join->author);
+  std::string* words = words_in(*read);
+  if (words == nullptr || words->empty() || *words == kErasedWords) return std::nullopt;
+  bool theirs = is_of(read->author) || names_one(*words);
+  if (const auto* said = std::get_if<WordsRow>(&read->what)) theirs = theirs || is_of(said->to);
+  if (const auto* one = std::get_if<SuperviseRow>(&read->what)) theirs = theirs || is_of(one->subject);
+  if (const auto* one = std::get_if<AnnotationRow>(&read->what)) theirs = theirs || is_of(one->drawn->author);
+  if (!theirs) return std::nullopt;
+  *words = kErasedWords;
+  return to_bytes(*read);
+}
+
+Result<Forgotten> forget_people(Journal& journal, const std::function<bool(const Person&)>& whom,
+                                std::uint32_t number) {
+  const Result<std::vector<Person>> all = journal.people();
+  if (!all) return tl::unexpected(all.error());
+  std::set<std::uint32_t> people;
+  std::vector<std::string> names, pseudonyms;
+  for (const Person& person : *all)
+    if (whom(person) || (number != 0 && number_of(person) == number)) {
+      people.insert(number_of(person));
+      names.push_back(person.label);
+      pseudonyms.push_back(person.pseudonym);
+    }
+  if (number != 0) people.insert(number);  // whose name may be forgotten already
+  if (people.empty()) return Forgotten{};
+  const Result<std::size_t> rows = journal.erase_rows(WordEraser(std::move(people), names));
+  if (!rows) return tl::unexpected(rows.error());
+  Forgotten forgotten{0, *rows, names};
+  if (pseudonyms.empty()) return forgotten;
+  const Result<std::size_t> gone = journal.forget_people_if(
+      [&](const Person& person) { return std::ranges::find(pseudonyms, person.pseudonym) != pseudonyms.end(); });
+  if (!gone) return tl::unexpected(gone.error());
+  forgotten.people = *gone;
+  return forgotten;
+}
+
+Result<void> forget_owner(const std::filesystem::path& journal, const Forgotten& forgotten) {
+  const std::string owner = owner_of(journal);
+  if (owner.empty() || std::ranges::find(forgotten.names, owner) == forgotten.names.end()) return {};
+  return note_owner(journal, {});
+}
+
+}  // namespace osteon
