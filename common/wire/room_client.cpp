@@ -21,6 +21,8 @@ using Clock = std::chrono::steady_clock;
 constexpr int kMaxReceiveBytes = 4 * 1024 * 1024;  // a piece of a case is 1 MiB, a mesh message about 256 kB
 constexpr auto kAnswerTime = 5s;                   // for one request to a server that was reached
 constexpr auto kAgainTime = 1s;                    // for one attempt to come back to a server that was lost
+// For one attempt to connect: TCP, TLS and HTTP/2 take four round trips. gRPC calls this time a back-off.
+constexpr int kConnectMs = 3000;
 // A server that is silent so long is asked whether it lives, and gone if it has not answered for some time. The server allows
 // pings from kShortestPingMs on (server/net/room_server.cpp). A hand goes on feeling its own replica of the bone: it waits
 // longer than its RoomWatch does.
@@ -79,7 +81,7 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address, const st
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 50);
-  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 200);
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kConnectMs);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 200);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kPingMs);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kind == ClientKind::haptic ? kHandsPingAnswerMs : kPingAnswerMs);
