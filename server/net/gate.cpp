@@ -178,16 +178,17 @@ std::optional<Refusal> Gate::judge_handshake(std::string_view chain_pem) {
       refusal = Refusal{"flood", true, "too many calls came from you; wait ten seconds"};
   }
   if (!refusal) return {};
-  // The name in a chain that does not hold is only what somebody says.
+  // The name in a chain that does not hold is only what somebody says. A revoked one holds otherwise.
+  const bool is_verified = chain || chain.error().fault == ChainFault::revoked;
   std::string who =
       certificate ? certificate->user + ", certificate " + certificate->serial : "a certificate without a name";
-  if (!chain && certificate) who = "a stranger who says to be " + who;
+  if (!is_verified && certificate) who = "a stranger who says to be " + who;
   const std::string from = connections_ ? some_addresses(*connections_) : "";
   refusals_.note(refusal->reason, who, refusal->sentence, from);
   if (trail_) {
     AuditEvent event{.who = {.address = from}, .action = "handshake", .result = kRefused, .detail = std::string(refusal->reason)};
     if (certificate) {
-      event.who.person = chain ? certificate->user : std::string(kClaimed) + certificate->user;
+      event.who.person = is_verified ? certificate->user : std::string(kClaimed) + certificate->user;
       event.who.certificate = certificate->serial;
     }
     trail_->record(std::move(event));

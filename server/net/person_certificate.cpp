@@ -73,9 +73,14 @@ std::optional<std::vector<Crl>> lists_of(std::string_view pem) { return all_of<C
 // As strong as the TLS of Debian asks for: 112 bits, no SHA-1.
 constexpr int kSecurityLevel = 2;
 
-// A list out of its time is used on, and an authority without a list revokes nobody by one.
+// A list out of its time is used on, and an authority without a list revokes nobody by one. OpenSSL asks for revocations before it
+// looks at signatures and times: it goes on, so that only a certificate that is sound otherwise is called revoked.
 int accept_old_lists(int ok, X509_STORE_CTX* context) {
   const int error = X509_STORE_CTX_get_error(context);
+  if (error == X509_V_ERR_CERT_REVOKED) {
+    *static_cast<bool*>(X509_STORE_CTX_get_app_data(context)) = true;
+    return 1;
+  }
   const bool is_old = error == X509_V_ERR_CRL_HAS_EXPIRED || error == X509_V_ERR_CRL_NOT_YET_VALID;
   return is_old || error == X509_V_ERR_UNABLE_TO_GET_CRL ? 1 : ok;
 }
@@ -138,10 +143,12 @@ tl::expected<void, ChainRefusal> check_client_chain(std::string_view chain_pem, 
   X509_VERIFY_PARAM* rules = X509_STORE_CTX_get0_param(context.get());
   X509_VERIFY_PARAM_set_auth_level(rules, kSecurityLevel);
   X509_VERIFY_PARAM_set_time(rules, static_cast<std::time_t>(now.time_since_epoch().count()));
+  bool is_revoked = false;
+  X509_STORE_CTX_set_app_data(context.get(), &is_revoked);
   const bool holds = X509_verify_cert(context.get()) == 1;
-  const int error = X509_STORE_CTX_get_error(context.get());
+  const int error = holds ? X509_V_ERR_CERT_REVOKED : X509_STORE_CTX_get_error(context.get());
   ERR_clear_error();
-  if (holds) return {};
+  if (holds && !is_revoked) return {};
   return tl::unexpected(refusal_of(error));
 }
 

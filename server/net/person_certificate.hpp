@@ -25,6 +25,7 @@ struct Authorities {
   std::string revocation_lists;  // CRLs of these authorities (RFC 5280, section 5); empty: there are none
   friend bool operator==(const Authorities&, const Authorities&) = default;
 };
+// revoked: nothing else is wrong with it, so that the person is known.
 enum class ChainFault { unreadable, unknown_authority, not_yet_valid, expired, revoked, purpose, other };
 struct ChainRefusal {
   ChainFault fault = ChainFault::other;

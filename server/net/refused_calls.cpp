@@ -11,6 +11,7 @@
 
 #include "server/audit/audit_trail.hpp"
 #include "server/net/connections.hpp"
+#include "server/net/peer_claims.hpp"
 
 namespace osteon {
 namespace {
@@ -58,7 +59,7 @@ class CallNotes final : public grpc::experimental::Interceptor {
       const auto* trailers = methods->GetSendTrailingMetadata();
       const bool noted = trailers != nullptr && trailers->contains(kRefusalTrailer);
       if (const std::string_view reason = reason_of(status.error_code()); !noted && !reason.empty())
-        refusals_.note(reason, address_of(call_.server_context()->peer()),
+        refusals_.note(reason, peer_claims(*call_.server_context()).address,
                        std::string(call_.method()) + ": " + status.error_message());
     }
     methods->Proceed();

@@ -12,6 +12,7 @@
 #include "common/runtime/log.hpp"
 #include "server/net/audited_calls.hpp"
 #include "server/net/call_flood.hpp"
+#include "server/net/cipher_order.hpp"
 #include "server/net/gate.hpp"
 #include "server/net/health_watch.hpp"
 #include "server/net/host_port.hpp"
@@ -63,10 +64,11 @@ Result<std::unique_ptr<LinkServer>> hear_datagrams(const DoorOptions& doors, con
 
 constexpr int kMaxReceiveBytes = 4 * 1024 * 1024;  // a cut of 64 knots is below 4 kB, a tool made from a mesh a few MB
 constexpr int kMaxSendBytes = 4 * 1024 * 1024;     // a piece of a case is 1 MiB
-constexpr int kKeepaliveMs = 10'000;               // a peer that answers no ping that long is gone
 constexpr int kShortestPingMs = 500;               // clients may ask that often whether the server lives
 constexpr int kMostStreams = 64;                   // of one connection
 constexpr int kMostMetadataBytes = 8 * 1024;       // of one call; a ticket is below 1 kB
+// Calls that are begun and reset are bounded after each read (call_flood.hpp); a read of gRPC's 4 MiB has 20 000 of them.
+constexpr int kMostReadBytes = 64 * 1024;
 constexpr int kHandshakeMs = 5'000;                // for those who have not shown who they are
 constexpr std::size_t kMostTransportBytes = std::size_t{512} << 20;  // of all connections, in gRPC
 constexpr const char* kStopping = "the server is stopping; come again in a few seconds";
@@ -128,6 +130,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   impl->handshakes = std::make_unique<HandshakeWatch>(impl->rooms->refusals, impl->listener->connections());
   std::shared_ptr<grpc::ServerCredentials> credentials = grpc::InsecureServerCredentials();  // shared with gRPC
   if (!doors.certificates.empty()) {
+    if (Result<void> preferred = prefer_own_cipher_order(); !preferred) return tl::unexpected(preferred.error());
     Result<std::unique_ptr<Gate>> gate = Gate::open(doors.certificates, impl->rooms->refusals);
     if (!gate) return tl::unexpected(gate.error());
     impl->gate = std::move(*gate);
@@ -170,11 +173,12 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   if (impl->proxy_listener)
     impl->proxy_acceptor = builder.experimental().AddExternalConnectionAcceptor(
         grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, grpc::InsecureServerCredentials());
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, static_cast<int>(doors.keepalive.count()));
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, static_cast<int>(doors.keepalive.count()));
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kShortestPingMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kMostReadBytes);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMostStreams);
   builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, kMostMetadataBytes);
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMs);
