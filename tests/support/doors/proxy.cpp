@@ -6,6 +6,8 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <fstream>
+#include <iterator>
 #include <stdexcept>
 #include <vector>
 
@@ -32,7 +34,28 @@ sockaddr_in loopback(int port) {
   return at;
 }
 
-// One that was free a moment ago: HAProxy does not say which one the system gave it.
+bool answers(int port) {
+  const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const sockaddr_in at = loopback(port);
+  const bool connected = ::connect(socket, reinterpret_cast<const sockaddr*>(&at), sizeof at) == 0;
+  ::close(socket);
+  return connected;
+}
+
+// Throws where one of the words is not there.
+void write_changed(const std::filesystem::path& from, const std::filesystem::path& to, const Proxy::Changes& changes) {
+  std::ifstream in(from);
+  std::string text{std::istreambuf_iterator<char>(in), {}};
+  for (const auto& [what, by] : changes) {
+    const std::size_t at = text.find(what);
+    if (at == std::string::npos) throw std::runtime_error(from.string() + " does not say " + what);
+    text.replace(at, what.size(), by);
+  }
+  std::ofstream(to) << text;
+}
+
+}  // namespace
+
 int free_port() {
   const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in at = loopback(0);
@@ -43,40 +66,32 @@ int free_port() {
   return ntohs(at.sin_port);
 }
 
-bool answers(int port) {
-  const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  const sockaddr_in at = loopback(port);
-  const bool connected = ::connect(socket, reinterpret_cast<const sockaddr*>(&at), sizeof at) == 0;
-  ::close(socket);
-  return connected;
-}
-
-}  // namespace
-
 std::string Proxy::missing() { return haproxy().empty() ? "haproxy is not installed; deploy/install does that" : ""; }
 
-Proxy::Proxy(const std::filesystem::path& certificates, const std::filesystem::path& socket) : certificates_(certificates) {
+Proxy::Proxy(const std::filesystem::path& certificates, const std::filesystem::path& socket, const Changes& changes) {
+  const std::filesystem::path configuration = dir_ / "haproxy.cfg", admin = dir_ / "admin.sock";
+  write_changed(OSTEON_DEPLOY "/haproxy.cfg", configuration, changes);
   constexpr int kTries = 5;  // another program may take the port first
   for (int i = 0; i < kTries; ++i) {
     const int port = free_port();
     address_ = "127.0.0.1:" + std::to_string(port);
     ProcessOptions options;
     options.environment = {{"OSTEON_LISTEN", address_},
-                           {"OSTEON_CERTIFICATES", certificates_.string()},
+                           {"OSTEON_CERTIFICATES", certificates.string()},
                            {"OSTEON_PROXY_SOCKET", socket.string()},
-                           {"OSTEON_ADMIN_SOCKET", (dir_ / "admin.sock").string()}};
+                           {"OSTEON_ADMIN_SOCKET", admin.string()}};
     options.as_given = true;
-    process_.emplace(haproxy(), std::vector<std::string>{"-db", "-f", OSTEON_DEPLOY "/haproxy.cfg"}, options);
-    if (wait_until([&] { return !process_->running() || answers(port); }, 20s) && process_->running()) return;
+    process_.emplace(haproxy(), std::vector<std::string>{"-db", "-f", configuration}, options);
+    if (!wait_until([&] { return !process_->running() || answers(port); }, 20s) || !process_->running()) continue;
+    options.environment.clear();
+    revoked_.emplace(OSTEON_DEPLOY "/proxy-revoked", std::vector<std::string>{"--watch", admin, certificates}, options);
+    return;
   }
   throw std::runtime_error("haproxy does not start: " + log());
 }
 
-void Proxy::tell_who_was_revoked() {
-  ProcessOptions options;
-  options.as_given = true;
-  const RunResult told = run(OSTEON_DEPLOY "/proxy-revoked", {dir_ / "admin.sock", certificates_}, 20s, options);
-  if (told.exit_code != 0) throw std::runtime_error("deploy/proxy-revoked failed: " + told.err);
+bool Proxy::is_told_of(int revoked) {
+  return revoked_->wait_for_out("knows of " + std::to_string(revoked) + " revoked", 20s);
 }
 
 }  // namespace osteon::test

@@ -1,6 +1,7 @@
 #include "tests/support/doors/raw_http2.hpp"
 
 #include <arpa/inet.h>
+#include <linux/filter.h>
 #include <netinet/in.h>
 #include <openssl/ssl.h>
 #include <poll.h>
@@ -73,6 +74,7 @@ RawHttp2::RawHttp2(const std::string& address, const std::filesystem::path& pers
   static const auto ignored = ::signal(SIGPIPE, SIG_IGN);
   (void)ignored;
   SSL_CTX* context = tls_->context.get();
+  SSL_CTX_set_security_level(context, 0);  // whoever comes with a weak key does not mind
   static constexpr unsigned char kAlpn[] = {2, 'h', '2'};
   SSL_CTX_set_alpn_protos(context, kAlpn, sizeof kAlpn);
   if (!person.empty() && (SSL_CTX_use_certificate_chain_file(context, (person / "person.pem").c_str()) != 1 ||
@@ -115,9 +117,11 @@ bool RawHttp2::call(std::uint32_t stream, const std::string& path, const Headers
   return send(frame(kHeaders, kEndHeaders, stream, block));
 }
 
-bool RawHttp2::send_empty_message(std::uint32_t stream) {
+bool RawHttp2::send_message(std::uint32_t stream, const std::string& bytes) {
   constexpr std::uint8_t kData = 0, kEndStream = 0x1;
-  return send(frame(kData, kEndStream, stream, std::string(5, '\0')));  // not compressed, no bytes
+  // Not compressed, then its length in four bytes.
+  const std::string head{'\0', '\0', '\0', static_cast<char>(bytes.size() >> 8), static_cast<char>(bytes.size())};
+  return send(frame(kData, kEndStream, stream, head + bytes));
 }
 
 bool RawHttp2::reset(std::uint32_t stream) {
@@ -138,6 +142,13 @@ std::optional<Http2Frame> RawHttp2::read(std::chrono::milliseconds patience) {
                   tls_->arrived.substr(kHead, size())};
   tls_->arrived.erase(0, kHead + size());
   return next;
+}
+
+void RawHttp2::go_deaf() {
+  sock_filter drop_all{.code = BPF_RET | BPF_K, .jt = 0, .jf = 0, .k = 0};
+  const sock_fprog program{.len = 1, .filter = &drop_all};
+  if (::setsockopt(tls_->socket, SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof program) != 0)
+    throw std::runtime_error("the system attaches no filter");
 }
 
 bool RawHttp2::closed_within(std::chrono::milliseconds patience) {

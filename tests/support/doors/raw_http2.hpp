@@ -30,12 +30,15 @@ class RawHttp2 {
   using Headers = std::vector<std::pair<std::string, std::string>>;
   // HEADERS of a call of gRPC, with `more` after those that each has. False: the connection is closed.
   bool call(std::uint32_t stream, const std::string& path, const Headers& more = {});
-  // The one message of a call, with nothing in it, and the end of what this side says.
-  bool send_empty_message(std::uint32_t stream);
+  // The one message of a call, here with nothing in it, and the end of what this side says.
+  bool send_empty_message(std::uint32_t stream) { return send_message(stream, {}); }
+  bool send_message(std::uint32_t stream, const std::string& bytes);
   bool reset(std::uint32_t stream);
   bool send(const std::string& bytes);
   // The next frame; nothing once the connection is closed or nothing came for that long.
   std::optional<Http2Frame> read(std::chrono::milliseconds patience);
+  // From now on this machine's system drops whatever arrives, without a word: as where a cable was pulled.
+  void go_deaf();
   // True once the server has closed the connection; waits that long for it.
   bool closed_within(std::chrono::milliseconds patience);
 

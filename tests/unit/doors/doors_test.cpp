@@ -261,7 +261,7 @@ TEST_F(DoorsBehindAProxy, AreShutToWhoWasRevokedAndToOtherAuthorities) {
   test::RawHttp2 before(address(), people_.person("anna"));
   ASSERT_TRUE(before.read(5s).has_value());
   people_.certs({"revoke", "anna"});
-  proxy_->tell_who_was_revoked();
+  ASSERT_TRUE(proxy_->is_told_of(1));
   EXPECT_FALSE(test::RawHttp2(address(), people_.person("anna")).read(5s).has_value()) << "a new connection";
   (void)before.call(1, "/osteon.v1.RoomService/GetStatus");
   EXPECT_TRUE(before.closed_within(test::kPatience)) << "the connection that was open";
