@@ -44,6 +44,10 @@ class Child:
             self._lines.put(line.rstrip("\n"))
 
     @property
+    def pid(self):
+        return self._process.pid
+
+    @property
     def exit_code(self):
         """None while it runs; minus the signal's number where one ended it."""
         return self._process.poll()

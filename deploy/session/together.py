@@ -75,14 +75,17 @@ class Doors:
         self._run(ROOT / "deploy" / "certs", "--into", self._folder, "server", "localhost", "127.0.0.1")
         self.server = ["--certificates", self._folder / "server"]
 
-    def person(self, name, role):
+    def person(self, name, role, room=ROOM):
         self._run(ROOT / "deploy" / "certs", "--into", self._folder, "person", name)
         ticket = self._run(self._programs / "osteon-server", "ticket", "--key", self._folder / "authority" / "tickets.key",
-                           "--room", ROOM, "--user", name, "--role", role, "--hours", "1")
+                           "--room", room, "--user", name, "--role", role, "--hours", "1")
         file = self._folder / "people" / name / "ticket"
         file.write_text(ticket, encoding="utf-8")
         file.chmod(0o600)
         return ["--certificates", file.parent, "--ticket", file]
+
+    def revoke(self, name):
+        self._run(ROOT / "deploy" / "certs", "--into", self._folder, "revoke", name)
 
     @staticmethod
     def _run(*command):

@@ -1,0 +1,44 @@
+"""One attacker: insider_attack.py killing|resets HOST PORT SOURCE PERSON SECONDS; prints how often it tried.
+
+PERSON is the folder of a certificate; empty: none is shown."""
+import ssl
+import sys
+import time
+from pathlib import Path
+
+import raw_http2
+
+GET_STATUS = "/osteon.v1.RoomService/GetStatus"
+RESETS = 20_000  # over a connection
+PAUSE_S = 1.0    # before it comes again: more often the proxy lets no address connect
+
+
+def attack_once(kind, address, source, person):
+    with raw_http2.Connection(address, person, patience_s=5.0, source=source) as line:
+        if kind == "killing":
+            line.finish(line.call(GET_STATUS, (("grpclb_client_stats", "x"),)))
+            return
+        # In parts, so that the end of the connection is noticed.
+        for _ in range(RESETS // 500):
+            line.resets(GET_STATUS, 500)
+
+
+def attack(kind, host, port, source, person, seconds):
+    until, times = time.monotonic() + seconds, 0
+    while time.monotonic() < until:
+        try:
+            attack_once(kind, (host, port), source, person)
+        except (OSError, ssl.SSLError):
+            pass  # it was closed, as it should be
+        times += 1
+        time.sleep(PAUSE_S)
+    print(times)
+
+
+def main():
+    kind, host, port, source, person, seconds = sys.argv[1:]
+    attack(kind, host, int(port), source, Path(person) if person else None, float(seconds))
+
+
+if __name__ == "__main__":
+    main()
