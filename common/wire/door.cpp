@@ -5,20 +5,15 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <fstream>
-#include <iterator>
+#include <system_error>
+
+#include "common/wire/certificate_files.hpp"
 
 namespace osteon::wire {
 namespace {
 
 constexpr const char* kWays =
     "--certificates DIR with --ticket FILE, as whoever runs the server gives them to you, or --plain for a server on this machine";
-
-Result<std::string> read_all(const std::filesystem::path& file, const char* what) {
-  std::ifstream in(file, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(in), {}};
-  if (in && !text.empty()) return text;
-  return failure(ErrorCode::not_found, file.string() + ", " + what + ", cannot be read; ask whoever runs the server for it");
-}
 
 }  // namespace
 
@@ -34,9 +29,12 @@ Result<Door> door_of(const DoorArguments& arguments) {
   if (arguments.plain) return Door{};
   if (arguments.certificates.empty() || arguments.ticket.empty()) return failure(ErrorCode::invalid_input, std::string("say how to come to the server: ") + kWays);
   Door door{.certificates = arguments.certificates, .ticket = arguments.ticket};
-  if (const Result<std::string> ticket = read_all(door.ticket, "the ticket"); !ticket) return tl::unexpected(ticket.error());
-  for (const char* file : {"ca.pem", "person.pem", "person.key"})
-    if (const Result<std::string> read = read_all(door.certificates / file, "of --certificates"); !read) return tl::unexpected(read.error());
+  std::error_code unknown;
+  if (!std::filesystem::is_regular_file(door.ticket, unknown) || ticket_text(door).empty())
+    return failure(ErrorCode::not_found, door.ticket.string() + ", the ticket, is missing or empty; ask whoever runs " +
+                                             "the server for it");
+  if (const Result<ProbeFiles> files = read_certificate_files(door.certificates); !files)
+    return tl::unexpected(files.error());
   return door;
 }
 
@@ -59,12 +57,10 @@ Result<std::shared_ptr<grpc::ChannelCredentials>> credentials_of(const Door& doo
     if (is_loopback(address.substr(0, address.rfind(':')))) return grpc::InsecureChannelCredentials();
     return failure(ErrorCode::invalid_input, "plain text goes to a server on this machine alone, and " + address + " is another; give --certificates DIR with --ticket FILE");
   }
-  const Result<std::string> authority = read_all(door.certificates / "ca.pem", "the authority's certificate"),
-                            certificate = read_all(door.certificates / "person.pem", "your certificate"),
-                            key = read_all(door.certificates / "person.key", "your key");
-  for (const auto* file : {&authority, &certificate, &key})
-    if (!*file) return tl::unexpected(file->error());
-  return grpc::SslCredentials({.pem_root_certs = *authority, .pem_private_key = *key, .pem_cert_chain = *certificate});
+  const Result<ProbeFiles> files = read_certificate_files(door.certificates);
+  if (!files) return tl::unexpected(files.error());
+  return grpc::SslCredentials(
+      {.pem_root_certs = files->authority, .pem_private_key = files->key, .pem_cert_chain = files->certificate});
 }
 
 std::string ticket_text(const Door& door) {

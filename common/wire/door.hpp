@@ -27,12 +27,13 @@ struct DoorArguments {
 };
 // --plain, --certificates and --ticket.
 void add_door_options(CLI::App& app, DoorArguments& arguments);
-// Errors: invalid_input (neither or both ways were given), not_found (a file is not there); the sentence says what to give.
+// Errors: invalid_input (neither or both ways were given), those of read_certificate_files, not_found (no ticket); the
+// sentence says what to give.
 [[nodiscard]] Result<Door> door_of(const DoorArguments& arguments);
 
 // Whether only this machine is reached there: localhost, [::1] or four numbers that begin with 127.
 [[nodiscard]] bool is_loopback(const std::string& host);
-// Errors: not_found (a file of `door`), invalid_input (plain text to `address`, HOST:PORT, of another machine).
+// Errors: those of read_certificate_files, invalid_input (plain text to `address`, HOST:PORT, of another machine).
 [[nodiscard]] Result<std::shared_ptr<grpc::ChannelCredentials>> credentials_of(const Door& door, const std::string& address);
 // As it goes with a call; empty where there is none to be read.
 [[nodiscard]] std::string ticket_text(const Door& door);

@@ -5,10 +5,13 @@
 
 #include <algorithm>
 #include <mutex>
+#include <optional>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "common/field/kernel.hpp"
+#include "common/wire/connection_fault.hpp"
 #include "common/wire/convert.hpp"
 #include "osteon/v1/room.grpc.pb.h"
 
@@ -95,22 +98,27 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address, const st
 
 bool is_host_port(const std::string& address) {
   const std::size_t colon = address.rfind(':');
-  if (colon == std::string::npos || colon == 0) return false;
+  if (colon == std::string::npos || colon == 0 || address.find('/') != std::string::npos) return false;
   const std::string port = address.substr(colon + 1);
   return !port.empty() && port.size() <= 5 && std::all_of(port.begin(), port.end(), [](char c) { return c >= '0' && c <= '9'; }) &&
          std::stoi(port) > 0 && std::stoi(port) <= 65535;
 }
 
-Error nobody_answers(const std::string& address, std::chrono::milliseconds patience, const Door& door) {
-  const std::string seconds = std::to_string(patience.count() / 1000) +
-                              (patience.count() % 1000 ? "." + std::to_string(patience.count() % 1000 / 100) : "");
-  return {ErrorCode::unavailable, "no Osteon server answers at " + address + " within " + seconds +
-                                      " s; start osteon-server there or give its address with --server" +
-                                      (door.certificates.empty() ? ", or --certificates where it asks for them"
-                                                                 : ", or certificates of its own authority with --certificates")};
+// gRPC's words for an answer in HTTP alone, of a proxy or of a server that knows no gRPC.
+std::optional<Error> error_of_http(const std::string& said, const std::string& server) {
+  constexpr std::string_view kStatus = "http2 header with status: ";
+  const std::size_t at = said.find(kStatus);
+  if (at == std::string::npos) return {};
+  const std::string status = said.substr(at + kStatus.size());
+  if (status.starts_with("502") || status.starts_with("503") || status.starts_with("504"))
+    return Error{ErrorCode::unavailable, server + " is a proxy that reaches no Osteon server behind it (HTTP " + status +
+                                             "); see whether osteon-server runs there, with the proxy's --proxy-socket"};
+  return Error{ErrorCode::unsupported, server + " is no Osteon server, but another one (HTTP " + status +
+                                           "); give with --server the port that osteon-server printed"};
 }
 
 Error error_of(const grpc::Status& status, const std::string& server) {
+  if (std::optional<Error> http = error_of_http(status.error_message(), server)) return std::move(*http);
   switch (status.error_code()) {
     case grpc::StatusCode::FAILED_PRECONDITION: return {ErrorCode::unsupported, status.error_message()};
     case grpc::StatusCode::INVALID_ARGUMENT: return {ErrorCode::invalid_input, status.error_message()};
@@ -128,15 +136,23 @@ Result<std::shared_ptr<grpc::Channel>> reach(const std::string& address, const s
                                              std::chrono::milliseconds patience, const std::function<bool()>& stop, const Door& door) {
   if (!is_host_port(address))
     return failure(ErrorCode::invalid_input, "the server's address " + address +
-                                                 " is not HOST:PORT; give the one that osteon-server prints, such as 127.0.0.1:50151");
+                                                 " is not HOST:PORT; give the one that osteon-server prints, such as " +
+                                                 "127.0.0.1:50151, without http:// and without a path");
   const Result<std::shared_ptr<grpc::ChannelCredentials>> credentials = credentials_of(door, address);
   if (!credentials) return tl::unexpected(credentials.error());
   std::shared_ptr<grpc::Channel> channel = make_channel(address, *credentials, kind, room, door);
   // In short waits, so that a person who gives up is heard.
   const auto until = Clock::now() + patience;
+  bool has_looked = false;
   while (!channel->WaitForConnected(std::chrono::system_clock::now() + 50ms)) {
     if (stop && stop()) return failure(ErrorCode::cancelled, "stopped before the server at " + address + " answered");
-    if (Clock::now() >= until) return tl::unexpected(nobody_answers(address, patience, door));
+    const bool is_over = Clock::now() >= until;
+    const bool has_failed = !has_looked && channel->GetState(false) == GRPC_CHANNEL_TRANSIENT_FAILURE;
+    if (!is_over && !has_failed) continue;
+    // At the first failure and at the end: nobody waits for what does not get better by waiting.
+    has_looked = true;
+    ConnectionFault fault = connection_fault(address, door);
+    if (is_over || fault.lasts) return tl::unexpected(std::move(fault.error));
   }
   return channel;
 }

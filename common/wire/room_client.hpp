@@ -34,8 +34,9 @@ struct JoinedRoom {
   std::string secret;                      // proves that a later connection is this one's
 };
 
-// A channel to the server, over which no room is named. Errors: invalid_input (`address` is not HOST:PORT), unavailable (nobody
-// answers there within `patience`, one sentence with the remedy), cancelled (`stop` returned true), and those of credentials_of.
+// A channel to the server, over which no room is named. Errors: invalid_input (`address` is not HOST:PORT), those of
+// connection_fault (no connection within `patience`, or one that waiting does not bring), cancelled (`stop` returned
+// true), and those of credentials_of.
 [[nodiscard]] Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, ClientKind kind,
                                                                   std::chrono::milliseconds patience, const std::function<bool()>& stop,
                                                                   const Door& door = {});

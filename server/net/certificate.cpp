@@ -6,8 +6,11 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "common/runtime/files.hpp"
+#include "common/runtime/log.hpp"
+#include "common/wire/x509.hpp"
 
 namespace osteon {
 
@@ -21,6 +24,22 @@ Result<double> certificate_days_left(const std::filesystem::path& pem) {
   if (!certificate || ASN1_TIME_diff(&days, &seconds, nullptr, X509_get0_notAfter(certificate.get())) != 1)
     return failure(ErrorCode::invalid_input, pem.string() + " holds no certificate; give a PEM file, as deploy/certs writes it");
   return days + seconds / 86400.0;
+}
+
+void log_server_certificate(const std::filesystem::path& pem, std::chrono::sys_seconds now) {
+  const Result<std::string> text = read_file(pem);
+  const std::vector<wire::X509Ptr> chain = wire::certificates_of(text ? *text : std::string());
+  if (chain.empty()) return;  // which is told elsewhere
+  const wire::Validity valid = wire::validity_of(*chain.front());
+  const std::string machines = wire::machines_of(*chain.front());
+  log::info("server certificate", {{"for", machines}, {"until", wire::text_of(valid.ends)}});
+  const auto warn = [](const std::string& said) { log::warn("server certificate", {{"said", said}}); };
+  if (now >= valid.ends)
+    warn("it expired at " + wire::text_of(valid.ends) + ", and no client takes it; make a new one with deploy/certs server");
+  if (now < valid.begins)
+    warn("it holds only from " + wire::text_of(valid.begins) + " on, and no client takes it; set this machine's clock");
+  if (machines == wire::kNoMachine)
+    warn("it is for no machine, and no client takes it; make one with deploy/certs server NAME...");
 }
 
 }  // namespace osteon

@@ -10,6 +10,7 @@
 #include <atomic>
 #include <fstream>
 #include <iterator>
+#include <system_error>
 #include <utility>
 
 #include "common/runtime/log.hpp"
@@ -29,6 +30,11 @@ Result<std::string> read_all(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(in), {}};
   if (in && !text.empty()) return text;
+  std::error_code unknown;
+  const std::filesystem::path folder = file.parent_path();
+  if (std::filesystem::exists(folder / "person.pem", unknown) || std::filesystem::exists(folder / "people", unknown))
+    return failure(ErrorCode::not_found, folder.string() + " is no folder of a server; give the one that deploy/certs " +
+                                             "server made, such as certs/server");
   return failure(ErrorCode::not_found, file.string() + " cannot be read; deploy/certs makes what --certificates needs");
 }
 

@@ -70,6 +70,13 @@ bool may_connect(int descriptor) {
   return peer.uid == ::geteuid() || peer.uid == 0;
 }
 
+// By the first byte that it sent: a record of a handshake (RFC 8446, section 5.1). No call of plain text begins so.
+bool speaks_tls(int descriptor) {
+  constexpr char kHandshake = 22;
+  char first = 0;
+  return ::recv(descriptor, &first, 1, MSG_PEEK | MSG_DONTWAIT) == 1 && first == kHandshake;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Listener>> Listener::open(const std::string& host, int port, std::size_t most) {
@@ -141,6 +148,13 @@ Listener::~Listener() {
   if (wake_ >= 0) ::close(wake_);
 }
 
+void Listener::watch_for_tls(std::function<void()> note) {
+  note_tls_ = std::move(note);
+  // Clients speak first: the system hands a connection on when its first bytes are there, or after about a second.
+  const int seconds = 1;
+  for (const int socket : sockets_) ::setsockopt(socket, IPPROTO_TCP, TCP_DEFER_ACCEPT, &seconds, sizeof seconds);
+}
+
 void Listener::start(std::function<void(int, int)> take) {
   take_ = std::move(take);
   thread_ = std::thread([this] { run(); });
@@ -189,6 +203,7 @@ void Listener::accept_from(int listening) {
     const int yes = 1;
     ::setsockopt(descriptor, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
     ++accepted_;
+    if (note_tls_ && speaks_tls(descriptor)) note_tls_();
     take_(listening, descriptor);
   }
 }

@@ -39,6 +39,8 @@ class Listener {
   // One that it listens on, in numbers and without brackets. Of a name that has several, of IPv4: whoever looks up the name for
   // datagrams takes that.
   [[nodiscard]] const std::string& address() const { return address_; }
+  // For a server of plain text: `note` hears of each client that speaks TLS, on the listener's thread. Before start().
+  void watch_for_tls(std::function<void()> note);
   // From now on `take(listening, descriptor)` is called with every connection, which it owns; on a thread of the listener's own.
   void start(std::function<void(int listening, int descriptor)> take);
   void stop();  // accepts no more; once
@@ -57,6 +59,7 @@ class Listener {
   std::string address_;
   std::filesystem::path path_;  // of a Unix socket; empty: there is none
   std::function<void(int, int)> take_;
+  std::function<void()> note_tls_;  // empty: nobody asks
   Connections connections_;  // that were handed on
   std::atomic<std::uint64_t> accepted_ = 0, refused_ = 0, failed_ = 0;
   std::thread thread_;

@@ -23,16 +23,40 @@ using grpc::experimental::InterceptionHookPoints;
 std::mutex watches_mutex;
 std::vector<HandshakeWatch*> watches;
 
+// What OpenSSL says of a handshake that failed, and what that means here.
+struct HandshakeFault {
+  std::string_view openssl, kind, sentence;
+};
+constexpr HandshakeFault kHandshakeFaults[] = {
+    {"http request", "plain text", "it speaks plain text; a client needs --certificates and --ticket"},
+    {"wrong version number", "plain text", "it speaks plain text; a client needs --certificates and --ticket"},
+    {"peer did not return a certificate", "no certificate",
+     "it shows no certificate; make one with deploy/certs person NAME"},
+    {"alert certificate expired", "refuses this server's certificate: expired",
+     "for it this server's certificate has expired; make a new one with deploy/certs server NAME..."},
+    {"alert unknown ca", "refuses this server's certificate: authority",
+     "it does not know the authority of this server; give that person ca.pem of this server"},
+    {"alert bad certificate", "refuses this server's certificate: name",
+     "this server's certificate has another name than the client came by, or does not hold yet; make one for all names "
+     "with deploy/certs server NAME..."},
+    {"alert unsupported certificate", "refuses this server's certificate: purpose",
+     "it takes this server's certificate for one of another purpose; make one with deploy/certs server NAME..."},
+};
+
 void hear(gpr_log_func_args* line) {
   if (line->message == nullptr) return;
   const std::string_view said(line->message);
   if (!said.starts_with("Handshake failed")) return;
   // Of OpenSSL's "error:0A00009C:SSL routines::http request": nothing in it is the stranger's own.
   const std::size_t routine = said.rfind("::");
-  const std::string who =
-      "a stranger: " + std::string(routine == std::string_view::npos ? said : said.substr(routine + 2));
+  std::string_view kind = routine == std::string_view::npos ? said : said.substr(routine + 2), sentence = said;
+  for (const HandshakeFault& known : kHandshakeFaults)
+    if (said.find(known.openssl) != std::string_view::npos) {
+      kind = known.kind;
+      sentence = known.sentence;
+    }
   const std::lock_guard lock(watches_mutex);
-  for (HandshakeWatch* watch : watches) watch->note(who, said);
+  for (HandshakeWatch* watch : watches) watch->note("a stranger: " + std::string(kind), sentence);
 }
 
 std::string_view reason_of(StatusCode code) {

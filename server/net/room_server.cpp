@@ -12,6 +12,7 @@
 #include "common/runtime/log.hpp"
 #include "server/net/audited_calls.hpp"
 #include "server/net/call_flood.hpp"
+#include "server/net/certificate.hpp"
 #include "server/net/cipher_order.hpp"
 #include "server/net/gate.hpp"
 #include "server/net/health_watch.hpp"
@@ -133,6 +134,8 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
     if (Result<void> preferred = prefer_own_cipher_order(); !preferred) return tl::unexpected(preferred.error());
     Result<std::unique_ptr<Gate>> gate = Gate::open(doors.certificates, impl->rooms->refusals);
     if (!gate) return tl::unexpected(gate.error());
+    log_server_certificate(doors.certificates / "server.pem",
+                           std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now()));
     impl->gate = std::move(*gate);
     impl->rooms->gate = impl->gate.get();
     impl->gate->set_most_ticket_life(doors.most_ticket_life);
@@ -214,6 +217,11 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
       acceptor->HandleNewConnection(&connection);
     };
   };
+  if (!impl->gate)
+    impl->listener->watch_for_tls([watch = impl->handshakes.get()] {
+      watch->note("a stranger: TLS", "it speaks TLS, and this server plain text; give the server --certificates DIR, or "
+                                     "the client --plain");
+    });
   impl->listener->start(hand_to(impl->acceptor.get()));
   if (impl->proxy_listener) impl->proxy_listener->start(hand_to(impl->proxy_acceptor.get()));
   impl->health =
