@@ -3,6 +3,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
 #include <fstream>
 #include <system_error>
@@ -14,6 +15,19 @@ namespace {
 
 constexpr const char* kWays =
     "--certificates DIR with --ticket FILE, as whoever runs the server gives them to you, or --plain for a server on this machine";
+
+// Without the line's end. Empty: there is nothing, or it cannot be read.
+std::string first_word(const std::filesystem::path& file) {
+  std::error_code unknown;
+  std::string text;
+  if (std::filesystem::is_regular_file(file, unknown)) std::ifstream(file) >> text;
+  return text;
+}
+
+// gRPC ends the process of whoever sends other bytes in a header.
+bool is_ascii(const std::string& text) {
+  return std::ranges::all_of(text, [](char c) { return c > ' ' && c <= '~'; });
+}
 
 }  // namespace
 
@@ -29,10 +43,13 @@ Result<Door> door_of(const DoorArguments& arguments) {
   if (arguments.plain) return Door{};
   if (arguments.certificates.empty() || arguments.ticket.empty()) return failure(ErrorCode::invalid_input, std::string("say how to come to the server: ") + kWays);
   Door door{.certificates = arguments.certificates, .ticket = arguments.ticket};
-  std::error_code unknown;
-  if (!std::filesystem::is_regular_file(door.ticket, unknown) || ticket_text(door).empty())
+  const std::string ticket = first_word(door.ticket);
+  if (ticket.empty())
     return failure(ErrorCode::not_found, door.ticket.string() + ", the ticket, is missing or empty; ask whoever runs " +
                                              "the server for it");
+  if (!is_ascii(ticket))
+    return failure(ErrorCode::invalid_input, door.ticket.string() + ", the ticket, is no plain text (it may be " +
+                                                 "UTF-16, or begin with a byte order mark); save it as ASCII");
   if (const Result<ProbeFiles> files = read_certificate_files(door.certificates); !files)
     return tl::unexpected(files.error());
   return door;
@@ -64,11 +81,8 @@ Result<std::shared_ptr<grpc::ChannelCredentials>> credentials_of(const Door& doo
 }
 
 std::string ticket_text(const Door& door) {
-  if (door.ticket.empty()) return {};
-  std::ifstream in(door.ticket);
-  std::string text;
-  in >> text;  // without the line's end
-  return text;
+  const std::string ticket = door.ticket.empty() ? std::string() : first_word(door.ticket);
+  return is_ascii(ticket) ? ticket : std::string();
 }
 
 }  // namespace osteon::wire

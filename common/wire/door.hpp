@@ -35,7 +35,7 @@ void add_door_options(CLI::App& app, DoorArguments& arguments);
 [[nodiscard]] bool is_loopback(const std::string& host);
 // Errors: those of read_certificate_files, invalid_input (plain text to `address`, HOST:PORT, of another machine).
 [[nodiscard]] Result<std::shared_ptr<grpc::ChannelCredentials>> credentials_of(const Door& door, const std::string& address);
-// As it goes with a call; empty where there is none to be read.
+// As it goes with a call; empty where there is none to be read, or not in ASCII.
 [[nodiscard]] std::string ticket_text(const Door& door);
 
 }  // namespace osteon::wire

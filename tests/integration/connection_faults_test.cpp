@@ -7,6 +7,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <fstream>
 #include <future>
@@ -17,6 +18,7 @@
 #include <set>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "common/wire/connection_fault.hpp"
@@ -332,9 +334,12 @@ TEST_F(ConnectionFaults, AreEachASentenceOfItsOwnAtBothEnds) {
   std::map<std::string, std::string> said = say_all(mistakes);
   said["slow"] = wire::connection_fault(stage_.address(), people_.door("anna", Role::observer, "room")).error.message;
   mistakes.push_back({"slow", stage_.address(), {}});
-  wire::DoorArguments no_ticket{.certificates = people_.person("anna"), .ticket = stage_ / "none"};
-  said["no ticket"] = wire::door_of(no_ticket).error().message;
-  mistakes.push_back({"no ticket", stage_.address(), {}});
+  const fs::path marked = people_.ticket_file("\xef\xbb\xbf" "osteon1.AAAA.AAAA");
+  EXPECT_EQ(wire::ticket_text({.certificates = {}, .ticket = marked}), "") << "which would end the client";
+  for (const auto& [what, file] : {std::pair{"no ticket", stage_ / "none"}, {"ticket of another encoding", marked}}) {
+    said[what] = wire::door_of({.plain = false, .certificates = people_.person("anna"), .ticket = file}).error().message;
+    mistakes.push_back({what, stage_.address(), {}});
+  }
 
   const std::vector<Listed> page = listed();
   ASSERT_GT(page.size(), 30u) << OSTEON_TROUBLESHOOTING;
