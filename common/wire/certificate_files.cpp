@@ -19,7 +19,8 @@ Result<std::string> read(const fs::path& folder, const char* name, const char* w
   const fs::path file = folder / name;
   std::error_code unknown;
   if (!fs::is_directory(folder, unknown))
-    return failure(ErrorCode::not_found, folder.string() + " is no folder; give with --certificates the one that holds " +
+    return failure(ErrorCode::not_found, folder.string() +
+                                             " is no folder; give with --certificates the one that holds " +
                                              "ca.pem, person.pem and person.key");
   // The two mistakes that are made with what deploy/certs writes.
   if (!fs::exists(file, unknown) && fs::exists(folder / "server.key", unknown))
@@ -27,14 +28,15 @@ Result<std::string> read(const fs::path& folder, const char* name, const char* w
                                              "--certificates, such as certs/people/anna");
   const bool is_authoritys = fs::exists(folder / "people", unknown) || fs::exists(folder / "ca.key", unknown);
   if (!fs::exists(file, unknown) && is_authoritys)
-    return failure(ErrorCode::not_found, folder.string() + " is a folder of the authority; give that of a person with " +
+    return failure(ErrorCode::not_found, folder.string() +
+                                             " is a folder of the authority; give that of a person with " +
                                              "--certificates, such as certs/people/anna");
   std::ifstream in(file, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(in), {}};
   if (in && !text.empty()) return text;
-  return failure(ErrorCode::not_found, file.string() + ", " + what +
-                                           (fs::exists(file, unknown) ? ", is empty or cannot be read" : ", is missing") +
-                                           kAsk);
+  return failure(ErrorCode::not_found,
+                 file.string() + ", " + what +
+                     (fs::exists(file, unknown) ? ", is empty or cannot be read" : ", is missing") + kAsk);
 }
 
 // Binary, as Windows exports certificates: one ASN.1 sequence that is as long as it says.
@@ -52,19 +54,22 @@ tl::unexpected<Error> no_certificate(const fs::path& file, const std::string& te
     return failure(ErrorCode::invalid_input,
                    name + " is binary (DER) and has to be text (PEM); convert it with: openssl x509 -inform DER -in " +
                        name + " -out NEW.pem");
-  return failure(ErrorCode::invalid_input,
-                 name + " holds no certificate: no part begins with -----BEGIN CERTIFICATE----- and can be read" + kAsk);
+  return failure(
+      ErrorCode::invalid_input,
+      name + " holds no certificate: no part begins with -----BEGIN CERTIFICATE----- and can be read" + kAsk);
 }
 
 tl::unexpected<Error> no_key(const fs::path& file, const std::string& text) {
   const std::string name = file.string();
   if (text.find("ENCRYPTED") != std::string::npos)
-    return failure(ErrorCode::invalid_input, name + " is protected by a pass phrase, which no program asks for; write " +
+    return failure(ErrorCode::invalid_input, name +
+                                                 " is protected by a pass phrase, which no program asks for; write " +
                                                  "it without one with: openssl pkey -in " + name + " -out NEW.key");
   if (is_der(text))
-    return failure(ErrorCode::invalid_input,
-                   name + " is a binary key (DER) and has to be text (PEM); convert it with: openssl pkey -inform DER -in " +
-                       name + " -out NEW.key");
+    return failure(
+        ErrorCode::invalid_input,
+        name + " is a binary key (DER) and has to be text (PEM); convert it with: openssl pkey -inform DER -in " +
+            name + " -out NEW.key");
   return failure(ErrorCode::invalid_input,
                  name + " holds no key: no part begins with -----BEGIN PRIVATE KEY----- and can be read" + kAsk);
 }
@@ -93,9 +98,10 @@ Result<ProbeFiles> read_certificate_files(const fs::path& folder) {
   if (std::ranges::any_of(chain, fits))
     return failure(ErrorCode::invalid_input, (folder / "person.pem").string() +
                                                  " begins with another certificate than yours; put yours first in it");
-  return failure(ErrorCode::invalid_input, (folder / "person.key").string() +
-                                               " is not the key of the certificate in person.pem beside it; take both " +
-                                               "from the folder that you were given");
+  return failure(ErrorCode::invalid_input,
+                 (folder / "person.key").string() +
+                     " is not the key of the certificate in person.pem beside it; take both " +
+                     "from the folder that you were given");
 }
 
 }  // namespace osteon::wire

@@ -20,22 +20,26 @@ constexpr auto kPatience = 3s;
 ConnectionFault for_now(std::string sentence) { return {{ErrorCode::unavailable, std::move(sentence)}, false}; }
 ConnectionFault lasting(ErrorCode code, std::string sentence) { return {{code, std::move(sentence)}, true}; }
 
-std::string now_text() {
-  return text_of(std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now()));
-}
+std::string now_text() { return text_of(std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now())); }
 std::string clock_text() { return "this machine's clock says " + now_text(); }
 
 // What an alert of TLS (RFC 8446, section 6.2) says of the certificate that was shown; X509_V_OK: nothing.
 int fault_of_alert(int alert) {
   switch (alert) {
-    case SSL_AD_CERTIFICATE_EXPIRED: return X509_V_ERR_CERT_HAS_EXPIRED;
-    case SSL_AD_CERTIFICATE_REVOKED: return X509_V_ERR_CERT_REVOKED;
-    case SSL_AD_UNKNOWN_CA: return X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT;
-    case SSL_AD_UNSUPPORTED_CERTIFICATE: return X509_V_ERR_INVALID_PURPOSE;
+    case SSL_AD_CERTIFICATE_EXPIRED:
+      return X509_V_ERR_CERT_HAS_EXPIRED;
+    case SSL_AD_CERTIFICATE_REVOKED:
+      return X509_V_ERR_CERT_REVOKED;
+    case SSL_AD_UNKNOWN_CA:
+      return X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT;
+    case SSL_AD_UNSUPPORTED_CERTIFICATE:
+      return X509_V_ERR_INVALID_PURPOSE;
     case SSL_AD_BAD_CERTIFICATE:  // which OpenSSL says also of one that does not hold yet
     case SSL_AD_CERTIFICATE_UNKNOWN:
-    case SSL_AD_ACCESS_DENIED: return X509_V_ERR_APPLICATION_VERIFICATION;
-    default: return X509_V_OK;
+    case SSL_AD_ACCESS_DENIED:
+      return X509_V_ERR_APPLICATION_VERIFICATION;
+    default:
+      return X509_V_OK;
   }
 }
 
@@ -58,10 +62,14 @@ class Diagnosis {
       case Reached::nothing:
         return for_now("the name " + host_ + " has no address here (" + probe_.system +
                        "); check its spelling in --server, or give an IP address");
-      case Reached::name: return not_connected();
-      case Reached::machine: return no_tls();
-      case Reached::tls: return is_plain() ? tls_for_plain() : tls_failed();
-      case Reached::server: return slow();
+      case Reached::name:
+        return not_connected();
+      case Reached::machine:
+        return no_tls();
+      case Reached::tls:
+        return is_plain() ? tls_for_plain() : tls_failed();
+      case Reached::server:
+        return slow();
     }
     return slow();
   }
@@ -71,10 +79,12 @@ class Diagnosis {
 
   [[nodiscard]] ConnectionFault not_connected() const {
     if (probe_.is_refused)
-      return for_now("nothing listens at " + address_ + ", though a machine answers there; start osteon-server on it, or " +
+      return for_now("nothing listens at " + address_ +
+                     ", though a machine answers there; start osteon-server on it, or " +
                      "give with --server the address that it printed");
     if (probe_.is_silent)
-      return for_now("no machine answers at " + address_ + "; see whether it is on, whether a firewall lets that port " +
+      return for_now("no machine answers at " + address_ +
+                     "; see whether it is on, whether a firewall lets that port " +
                      "through, and whether --server is right");
     return for_now("there is no way to " + address_ + " from this machine (" + probe_.system +
                    "); check the network, and the address in --server");
@@ -86,21 +96,25 @@ class Diagnosis {
     constexpr char kSettings = 4;
     if (first.size() > 3 && first[0] == 0 && first[3] == kSettings) {
       if (is_plain()) return slow();
-      return lasting(ErrorCode::invalid_input, "the server at " + address_ + " speaks plain text, and you come with a " +
-                                                   "certificate; give --plain in place of --certificates and --ticket, " +
-                                                   "or start the server with --certificates");
+      return lasting(ErrorCode::invalid_input,
+                     "the server at " + address_ + " speaks plain text, and you come with a " +
+                         "certificate; give --plain in place of --certificates and --ticket, " +
+                         "or start the server with --certificates");
     }
     if (!first.empty()) return not_osteon();
     if (probe_.is_closed)
-      return for_now("what listens at " + address_ + " closes the connection without a word; it is no Osteon server, or " +
+      return for_now("what listens at " + address_ +
+                     " closes the connection without a word; it is no Osteon server, or " +
                      "one that is full: see --most-connections of the server and the limits of a proxy");
-    return for_now("what listens at " + address_ + " takes the connection and says nothing; it is no Osteon server, or " +
+    return for_now("what listens at " + address_ +
+                   " takes the connection and says nothing; it is no Osteon server, or " +
                    "one that hangs: look at its log, or start it anew");
   }
 
   [[nodiscard]] ConnectionFault not_osteon() const {
-    return lasting(ErrorCode::unsupported, "what answers at " + address_ + " is no Osteon server, but another program (such " +
-                                               "as a web server); give with --server the port that osteon-server printed");
+    return lasting(ErrorCode::unsupported,
+                   "what answers at " + address_ + " is no Osteon server, but another program (such " +
+                       "as a web server); give with --server the port that osteon-server printed");
   }
 
   [[nodiscard]] ConnectionFault slow() const {
@@ -109,7 +123,8 @@ class Diagnosis {
   }
 
   [[nodiscard]] ConnectionFault tls_for_plain() const {
-    return lasting(ErrorCode::invalid_input, "the server at " + address_ + " asks for a certificate, and you come with " +
+    return lasting(ErrorCode::invalid_input, "the server at " + address_ +
+                                                 " asks for a certificate, and you come with " +
                                                  "--plain; give --certificates DIR with --ticket FILE in its place");
   }
 
@@ -128,12 +143,14 @@ class Diagnosis {
     const Validity valid = probe_.shown ? validity_of(*probe_.shown) : Validity{};
     const auto denied = [](std::string sentence) { return lasting(ErrorCode::denied, std::move(sentence)); };
     if (is_unknown_authority(probe_.verify_error))
-      return denied("the certificate of the server at " + address_ + " is not of the authority in " + authority +
-                    ": it is not your server, or ca.pem is of another; check --server, and ask whoever runs the server " +
-                    "for its ca.pem");
+      return denied(
+          "the certificate of the server at " + address_ + " is not of the authority in " + authority +
+          ": it is not your server, or ca.pem is of another; check --server, and ask whoever runs the server " +
+          "for its ca.pem");
     if (probe_.verify_depth > 0 && probe_.verify_error == X509_V_ERR_CERT_HAS_EXPIRED)
-      return denied("the authority in " + authority + " has expired; whoever runs the server makes a new one, and new " +
-                    "certificates for all (" + clock_text() + ")");
+      return denied("the authority in " + authority +
+                    " has expired; whoever runs the server makes a new one, and new " + "certificates for all (" +
+                    clock_text() + ")");
     switch (probe_.verify_error) {
       case X509_V_ERR_CERT_HAS_EXPIRED:
         return denied("the certificate of the server at " + address_ + " expired at " + text_of(valid.ends) +
@@ -144,17 +161,18 @@ class Diagnosis {
       case X509_V_ERR_HOSTNAME_MISMATCH:
       case X509_V_ERR_IP_ADDRESS_MISMATCH:
         return denied("the certificate of the server at " + address_ + " is for " + machines_of(*probe_.shown) +
-                      " and not for " + host_ + "; give such a name with --server, or whoever runs the server makes a " +
-                      "certificate for " + host_ + " too, with deploy/certs server");
+                      " and not for " + host_ +
+                      "; give such a name with --server, or whoever runs the server makes a " + "certificate for " +
+                      host_ + " too, with deploy/certs server");
       default:
-        return denied("the certificate of the server at " + address_ + " cannot be accepted: " +
-                      X509_verify_cert_error_string(probe_.verify_error) +
+        return denied("the certificate of the server at " + address_ +
+                      " cannot be accepted: " + X509_verify_cert_error_string(probe_.verify_error) +
                       "; whoever runs the server makes one with deploy/certs server");
     }
   }
 
-  // Of our own certificate: by the alert of TLS that came, or by its own text where the server said nothing. This is how
-  // a server of ours ends a handshake that it refuses: the reason stands in its log alone.
+  // Of our own certificate: by the alert of TLS that came, or by its own text where the server said nothing. This is
+  // how a server of ours ends a handshake that it refuses: the reason stands in its log alone.
   [[nodiscard]] ConnectionFault own_fault() const {
     const std::vector<X509Ptr> chain = certificates_of(files_.certificate);
     int fault = fault_of_alert(probe_.alert);
@@ -173,7 +191,8 @@ class Diagnosis {
       case X509_V_ERR_CERT_NOT_YET_VALID:
         return denied(own + "holds only from " + text_of(valid.begins) + " on; set the clocks of both machines (" +
                       clock_text() + ")");
-      case X509_V_ERR_CERT_REVOKED: return denied(own + "was revoked; ask whoever runs the server for a new one");
+      case X509_V_ERR_CERT_REVOKED:
+        return denied(own + "was revoked; ask whoever runs the server for a new one");
       case X509_V_ERR_INVALID_PURPOSE:
         return denied(own + "is not for a person; whoever runs the server makes one with deploy/certs person");
       default:
@@ -185,7 +204,8 @@ class Diagnosis {
   }
 
   [[nodiscard]] ConnectionFault handshake_failed() const {
-    const std::string why = probe_.alert >= 0 ? SSL_alert_desc_string_long(probe_.alert) : "it does not come to its end";
+    const std::string why =
+        probe_.alert >= 0 ? SSL_alert_desc_string_long(probe_.alert) : "it does not come to its end";
     return for_now("the TLS handshake with " + address_ + " fails (" + why + "); look at the server's log");
   }
 
@@ -198,6 +218,8 @@ class Diagnosis {
 
 }  // namespace
 
-ConnectionFault connection_fault(const std::string& address, const Door& door) { return Diagnosis(address, door).find(); }
+ConnectionFault connection_fault(const std::string& address, const Door& door) {
+  return Diagnosis(address, door).find();
+}
 
 }  // namespace osteon::wire

@@ -207,8 +207,7 @@ class Tls {
       probe_.is_silent = got < 0;
       probe_.is_closed = got == 0;
       if (got <= 0) return false;
-      probe_.first_bytes.append(
-          some, std::min(kFirstBytes - probe_.first_bytes.size(), static_cast<std::size_t>(got)));
+      probe_.first_bytes.append(some, std::min(kFirstBytes - probe_.first_bytes.size(), static_cast<std::size_t>(got)));
       BIO_write(in_, some, got);
     }
     const int reason = ERR_GET_REASON(ERR_peek_error());

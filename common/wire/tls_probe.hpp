@@ -13,11 +13,11 @@ struct ProbeFiles {
 
 struct Probe {
   enum class Reached {
-    nothing,   // the name has no address
-    name,      // no connection
-    machine,   // a connection, and no TLS
-    tls,       // TLS up to what `alert`, `verify_error` and `closed` say
-    server,    // an HTTP/2 frame came over TLS
+    nothing,  // the name has no address
+    name,     // no connection
+    machine,  // a connection, and no TLS
+    tls,      // TLS up to what `alert`, `verify_error` and `closed` say
+    server,   // an HTTP/2 frame came over TLS
   };
   Reached reached = Reached::nothing;
   std::string system;       // why there is no address or connection, in the system's words

@@ -18,7 +18,6 @@
 #include <set>
 #include <string>
 #include <thread>
-#include <utility>
 #include <vector>
 
 #include "common/wire/connection_fault.hpp"
@@ -45,7 +44,8 @@ std::string content(const fs::path& file) {
 
 // A text in which what is in capitals stands for anything.
 std::regex pattern_of(const std::string& text) {
-  static const std::set<std::string> kAnything{"ADDRESS", "DATE", "DIR", "FILE", "HOST", "NAME", "NAMES", "REASON", "ROOM", "STATUS"};
+  static const std::set<std::string> kAnything{"ADDRESS", "DATE",  "DIR",    "FILE", "HOST",
+                                               "NAME",    "NAMES", "REASON", "ROOM", "STATUS"};
   static const std::regex kWord("[A-Z]+|[^A-Z]");
   std::string pattern;
   for (auto at = std::sregex_iterator(text.begin(), text.end(), kWord); at != std::sregex_iterator(); ++at) {
@@ -155,7 +155,8 @@ class ConnectionFaults : public ::testing::Test {
   };
   Served serve(const std::string& name, std::vector<std::string> more) {
     const fs::path file = stage_ / (name + ".address");
-    std::vector<std::string> arguments{"--case", stage_ / "case", "--address-file", file, "--summary", stage_ / (name + ".json")};
+    std::vector<std::string> arguments{"--case", stage_ / "case", "--address-file",
+                                       file,     "--summary",     stage_ / (name + ".json")};
     arguments.insert(arguments.end(), more.begin(), more.end());
     Served served{std::make_unique<Process>(stage_.start("osteon-server", arguments)), {}};
     served.address = wait_for_address(file, 60s).value_or("127.0.0.1:1");
@@ -195,7 +196,8 @@ class ConnectionFaults : public ::testing::Test {
     std::map<std::string, std::future<std::string>> saying;
     for (const Mistake& one : mistakes)
       saying[one.what] = std::async(std::launch::async, [&one] {
-        const auto joined = wire::join_room(one.address, wire::ClientKind::viewer, "who", 300ms, {}, one.room, one.door);
+        const auto joined =
+            wire::join_room(one.address, wire::ClientKind::viewer, "who", 300ms, {}, one.room, one.door);
         return joined ? std::string("it joined") : joined.error().message;
       });
     std::map<std::string, std::string> said;
@@ -301,8 +303,8 @@ std::vector<ConnectionFaults::Mistake> ConnectionFaults::of_tickets() {
   const auto ticket = [&](const std::string& what, const fs::path& file) -> Mistake& {
     // Each by a person of its own: the log has one line for a person and reason.
     const std::string person = "t" + std::to_string(all.size());
-    return all.emplace_back(Mistake{what, stage_.address(), {.certificates = people_.person(person), .ticket = file},
-                                    &stage_.server()});
+    return all.emplace_back(
+        Mistake{what, stage_.address(), {.certificates = people_.person(person), .ticket = file}, &stage_.server()});
   };
   ticket("ticket expired", people_.ticket("t0", "room", Role::observer, -5s));
   ticket("ticket of somebody else", people_.ticket("anna", "room", Role::observer));
@@ -334,10 +336,14 @@ TEST_F(ConnectionFaults, AreEachASentenceOfItsOwnAtBothEnds) {
   std::map<std::string, std::string> said = say_all(mistakes);
   said["slow"] = wire::connection_fault(stage_.address(), people_.door("anna", Role::observer, "room")).error.message;
   mistakes.push_back({"slow", stage_.address(), {}});
-  const fs::path marked = people_.ticket_file("\xef\xbb\xbf" "osteon1.AAAA.AAAA");
+  const fs::path marked = people_.ticket_file(
+      "\xef\xbb\xbf"
+      "osteon1.AAAA.AAAA");
   EXPECT_EQ(wire::ticket_text({.certificates = {}, .ticket = marked}), "") << "which would end the client";
-  for (const auto& [what, file] : {std::pair{"no ticket", stage_ / "none"}, {"ticket of another encoding", marked}}) {
-    said[what] = wire::door_of({.plain = false, .certificates = people_.person("anna"), .ticket = file}).error().message;
+  const std::map<std::string, fs::path> tickets{{"no ticket", stage_ / "none"}, {"ticket of another encoding", marked}};
+  for (const auto& [what, file] : tickets) {
+    said[what] =
+        wire::door_of({.plain = false, .certificates = people_.person("anna"), .ticket = file}).error().message;
     mistakes.push_back({what, stage_.address(), {}});
   }
 
@@ -356,7 +362,8 @@ TEST_F(ConnectionFaults, AreEachASentenceOfItsOwnAtBothEnds) {
     EXPECT_EQ(log.empty(), one.server == nullptr) << one.what;
     if (!one.server || log.empty()) continue;
     EXPECT_TRUE(wait_until([&] { return has_refusal(one.server->err(), log); }, kPatience))
-        << one.what << ": " << log << "\n" << one.server->err();
+        << one.what << ": " << log << "\n"
+        << one.server->err();
     EXPECT_THAT(sentence, testing::Not(testing::HasSubstr(people_.server().string()))) << "a path of the server";
   }
   // Only a proxy says those that are left.
@@ -377,8 +384,10 @@ TEST_F(ConnectionFaults, AreTheSameSentencesThroughAProxy) {
   for (Mistake& one : mistakes) one.address = proxy.address();
   mistakes.push_back({"plain text", proxy.address(), {}});
   mistakes.push_back({"no server behind it", alone.address(), people_.door("anna", Role::observer, "room")});
-  mistakes.push_back({"ticket expired", proxy.address(),
-                      {.certificates = people_.person("dora"), .ticket = people_.ticket("dora", "room", Role::observer, -5s)}});
+  mistakes.push_back(
+      {"ticket expired",
+       proxy.address(),
+       {.certificates = people_.person("dora"), .ticket = people_.ticket("dora", "room", Role::observer, -5s)}});
   const std::map<std::string, std::string> said = say_all(mistakes);
   const std::map<std::string, std::string> expected{
       {"own expired", "has expired: it holds until"},
@@ -392,7 +401,9 @@ TEST_F(ConnectionFaults, AreTheSameSentencesThroughAProxy) {
   const std::vector<Listed> page = listed();
   for (const auto& [what, part] : expected) {
     EXPECT_THAT(said.at(what), testing::HasSubstr(part)) << what;
-    EXPECT_EQ(std::ranges::count_if(page, [&](const Listed& row) { return std::regex_match(said.at(what), pattern_of(row.sentence)); }), 1)
+    EXPECT_EQ(std::ranges::count_if(
+                  page, [&](const Listed& row) { return std::regex_match(said.at(what), pattern_of(row.sentence)); }),
+              1)
         << what << ": " << said.at(what);
   }
   // The proxy's log says from where, and which fault by openssl verify's number.
