@@ -84,6 +84,24 @@ bool good_name(const std::string& name) {
                              [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-' || c == '.'; });
 }
 
+// UTF-8 without control characters: anything else could be neither written to a tool file nor sent.
+bool is_plain_text(std::string_view text) {
+  while (!text.empty()) {
+    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+    const std::size_t size = byte(0) < 0x80 ? 1 : byte(0) < 0xe0 ? 2 : byte(0) < 0xf0 ? 3 : 4;
+    if (size > text.size() || byte(0) < 0x20 || byte(0) == 0x7f || byte(0) > 0xf4 || (size > 1 && byte(0) < 0xc2)) return false;
+    char32_t code = size == 1 ? byte(0) : byte(0) & (0x7fu >> size);
+    for (std::size_t i = 1; i < size; ++i) {
+      if ((byte(i) & 0xc0) != 0x80) return false;
+      code = code << 6 | (byte(i) & 0x3f);
+    }
+    constexpr char32_t kLeast[] = {0, 0, 0xa0, 0x800, 0x10000};  // by size; 0x80 to 0x9f are controls
+    if (code < kLeast[size] || code > 0x10ffff || (code >= 0xd800 && code < 0xe000)) return false;
+    text.remove_prefix(size);
+  }
+  return true;
+}
+
 std::string at_most(const char* field, double value, const std::string& what, double limit) {
   return std::string("\"") + field + "\" is " + written(value) + " mm, wider than " + what + " of " + written(limit) +
          " mm; make it narrower";
@@ -367,8 +385,8 @@ std::optional<std::string> tool_fault(const Tool& tool) {
     return "its kind is unknown; use a newer version of this program";
   if (!good_name(tool.name))
     return "\"name\" is \"" + tool.name + "\"; use up to 64 lower-case letters, digits, '-' and '.', a letter or digit first";
-  if (tool.title.empty() || tool.title.size() > 200)
-    return "\"title\" must have from 1 to 200 letters; write what people shall read";
+  if (tool.title.empty() || tool.title.size() > 200 || !is_plain_text(tool.title))
+    return "\"title\" must have from 1 to 200 letters in UTF-8 without control characters; write what people shall read";
   for (const FieldRule& rule : field_rules(tool.kind))
     if (auto fault = value_fault(rule, get_field(tool, rule))) return fault;
   if (tool.cut_level < 0 || tool.cut_level >= kLevels)

@@ -386,9 +386,9 @@ Result<Case> Case::load(const std::filesystem::path& folder) {
   Digest named;
   try {
     const json j = json::parse(in);
-    const int version = j.at("schema_version").get<int>();
+    const json& version = j.at("schema_version");  // compared as it is: any number may stand there
     if (version != kCaseSchemaVersion)
-      return failure(ErrorCode::unsupported, file.string() + ": schema_version is " + std::to_string(version) + ", but this program reads version " +
+      return failure(ErrorCode::unsupported, file.string() + ": schema_version is " + version.dump().substr(0, 20) + ", but this program reads version " +
                          std::to_string(kCaseSchemaVersion) + "; import the case again with this program's osteon-import");
     info.title = j.at("title").get<std::string>();
     info.source = j.at("source").get<std::string>();

@@ -19,6 +19,8 @@
 namespace osteon {
 namespace {
 
+constexpr float kFarthest_mm = 1e5f;  // from the origin: beyond it samples have no number
+
 Result<void> check(const TriangleMesh& mesh, double pitch_mm, std::size_t most_triangles, double largest_mm) {
   char text[200];
   if (mesh.triangles.empty()) return failure(ErrorCode::invalid_input, "the mesh has no triangles");
@@ -30,8 +32,14 @@ Result<void> check(const TriangleMesh& mesh, double pitch_mm, std::size_t most_t
     for (const std::uint32_t vertex : t)
       if (vertex >= mesh.positions_mm.size()) return failure(ErrorCode::invalid_input, "the mesh has triangles without corners");
   for (const auto& p : mesh.positions_mm)
-    for (const float x : p)
+    for (const float x : p) {
       if (!std::isfinite(x)) return failure(ErrorCode::invalid_input, "the mesh has corners that are not numbers");
+      if (std::abs(x) > kFarthest_mm) {
+        std::snprintf(text, sizeof text, "the mesh has a corner %.3g mm from the origin, more than %.3g mm; move it to the origin", std::abs(static_cast<double>(x)),
+                      static_cast<double>(kFarthest_mm));
+        return failure(ErrorCode::invalid_input, text);
+      }
+    }
   const Vec3 size = bounds(mesh).size_mm();
   if (size.maxCoeff() > largest_mm) {
     std::snprintf(text, sizeof text, "the mesh is %.3g mm long, more than %.3g mm; its unit must be the millimetre", size.maxCoeff(),

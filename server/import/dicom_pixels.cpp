@@ -15,6 +15,7 @@ namespace osteon::import {
 namespace {
 
 constexpr double kBrightPadding_hu = 100.0;
+constexpr double kLargestStored = 65535.0;
 constexpr std::int16_t kPadding_hu = -1024;  // air
 
 namespace fs = std::filesystem;
@@ -80,9 +81,10 @@ Result<void> read_pixels(const DicomHeader& h, const fs::path& file, const std::
 
   // Signed values may lack their sign in the bits above the stored ones.
   const bool is_signed = image.GetPixelFormat().GetPixelRepresentation() == 1;
-  const int unused = is_signed ? 16 - static_cast<int>(image.GetPixelFormat().GetBitsStored()) : 0;
+  const int unused = is_signed ? std::clamp(16 - static_cast<int>(image.GetPixelFormat().GetBitsStored()), 0, 15) : 0;
   // Padding counts as air, but only where it would be bright: some files name a value that their pixels have too.
-  const bool has_padding = h.padding.size() == 1 && h.padding[0] * h.slope[0] + h.intercept[0] > kBrightPadding_hu;
+  const bool has_padding = h.padding.size() == 1 && std::abs(h.padding[0]) <= kLargestStored &&
+                           h.padding[0] * h.slope[0] + h.intercept[0] > kBrightPadding_hu;
   const auto padding =
       has_padding ? static_cast<std::uint16_t>(static_cast<std::int64_t>(h.padding[0])) : std::uint16_t{0};
   for (std::size_t i = 0; i < pixels; ++i) {

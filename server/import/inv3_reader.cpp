@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <memory>
+#include <new>
 #include <pugixml.hpp>
 #include <string>
 
@@ -19,6 +20,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kChunk = 1 << 20;
 constexpr std::size_t kLargestPlist = 16 << 20;
 constexpr int kLargestAxis = 1 << 14;
+constexpr std::size_t kFirstValues = std::size_t{1} << 20;  // for which memory is taken before any has come
 
 struct CloseArchive {
   void operator()(archive* a) const { archive_read_free(a); }
@@ -141,7 +143,7 @@ Result<Project> read_project(const fs::path& file) {
 
 }  // namespace
 
-Result<CtScan> read_inv3(const fs::path& file, const KeepGoing& keep_going) {
+Result<CtScan> read_inv3(const fs::path& file, const KeepGoing& keep_going) try {
   std::error_code error;
   if (!fs::exists(file, error)) return failure(ErrorCode::not_found, "there is no file " + file.string() + "; give an InVesalius project or a DICOM folder");
   // Two passes, since the matrix may come before the list that says its shape.
@@ -166,18 +168,25 @@ Result<CtScan> read_inv3(const fs::path& file, const KeepGoing& keep_going) {
   if (archive_entry_size(*entry) != static_cast<std::int64_t>(expected))
     return failure(ErrorCode::invalid_input, file.string() + ": " + project->matrix_name + " has " + std::to_string(archive_entry_size(*entry)) +
                                                  " bytes where the shape in main.plist needs " + std::to_string(expected) + "; export it again");
-  volume.values.resize(volume.count());
-  auto* bytes = reinterpret_cast<char*>(volume.values.data());
+  // Memory grows with the bytes that come, not with what the file claims.
   std::size_t got = 0;
   while (got < expected) {
     if (!keep_going(static_cast<double>(got) / static_cast<double>(expected)))
       return failure(ErrorCode::cancelled, "stopped while reading " + file.string());
-    const auto n = archive_read_data(a->get(), bytes + got, std::min(kChunk, expected - got));
+    std::size_t room = volume.values.size() * sizeof(std::int16_t);
+    if (got == room) {
+      volume.values.resize(std::min(volume.count(), std::max(kFirstValues, 2 * volume.values.size())));
+      room = volume.values.size() * sizeof(std::int16_t);
+    }
+    auto* bytes = reinterpret_cast<char*>(volume.values.data());
+    const auto n = archive_read_data(a->get(), bytes + got, std::min(kChunk, room - got));
     if (n <= 0) return tl::unexpected(damaged(file, a->get()));
     got += static_cast<std::size_t>(n);
   }
   scan.source = "InVesalius CT, " + imaging::describe(volume);
   return scan;
+} catch (const std::bad_alloc&) {
+  return failure(ErrorCode::exhausted, file.string() + " takes more memory than this machine has; export thicker slices");
 }
 
 }  // namespace osteon::import

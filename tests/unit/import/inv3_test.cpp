@@ -71,6 +71,37 @@ TEST(Inv3, RefusesATruncatedArchiveWhereverItEnds) {
   }
 }
 
+// A tar of one file that claims `size` bytes, as GNU tar writes what has no room in octal digits.
+std::string tar_entry(const std::string& name, std::uint64_t size) {
+  std::string head = name;
+  head.resize(512, '\0');
+  head.replace(100, 7, "0000644");
+  for (int i = 0; i < 8; ++i) head[135 - i] = static_cast<char>(size >> 8 * i & 0xff);
+  head[124] = '\x80';
+  head.replace(148, 8, 8, ' ');
+  head[156] = '0';
+  head.replace(257, 8, std::string("ustar  \0", 8));
+  unsigned sum = 0;
+  for (const char c : head) sum += static_cast<unsigned char>(c);
+  char digits[8];
+  std::snprintf(digits, sizeof digits, "%06o", sum);
+  head.replace(148, 7, digits, 7);
+  return head;
+}
+
+TEST(Inv3, AMatrixThatClaimsTwoTerabytesTakesNoMemory) {
+  const test::TempDir folder;
+  std::string list =
+      "<plist><dict><key>matrix</key><dict><key>dtype</key><string>int16</string><key>filename</key><string>matrix.dat</string>"
+      "<key>shape</key><array><integer>4000</integer><integer>16384</integer><integer>16384</integer></array></dict>"
+      "<key>spacing</key><array><real>1</real><real>1</real><real>1</real></array></dict></plist>";
+  const std::string head = tar_entry("main.plist", list.size());
+  list.resize(512 * ((list.size() + 511) / 512), '\0');
+  std::ofstream(folder / "a.inv3", std::ios::binary)
+      << head << list << tar_entry("matrix.dat", std::uint64_t{4000} * 16384 * 16384 * 2) << std::string(4096, '\0');
+  expect_refused(folder / "a.inv3", "is truncated or damaged");
+}
+
 TEST(Inv3, NamesTheFieldThatIsWrong) {
   const test::TempDir folder;
   const auto refused = [&](const Inv3& project, const std::string& why) {

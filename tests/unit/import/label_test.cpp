@@ -160,6 +160,36 @@ TEST_F(Labels, ColoursOnTheCommandLine) {
   for (const char* wrong : {"", "1,2", "1,2,3,4", "1,2,256", "-1,2,3", "1,2,3:", "1,2,3:x", "1,2,3:0", "1,2,3:9", "red"}) EXPECT_FALSE(parse_bone_colour(wrong)) << wrong;
 }
 
+std::uint32_t png_checksum(std::string_view bytes) {
+  std::uint32_t crc = ~0u;
+  for (const char byte : bytes) {
+    crc ^= static_cast<unsigned char>(byte);
+    for (int bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ (crc & 1 ? 0xedb88320u : 0u);
+  }
+  return ~crc;
+}
+
+// Lets the header of a PNG claim a size that its pixels do not have.
+void claim_size(const fs::path& file, std::uint32_t width, std::uint32_t height) {
+  std::string header = "IHDR";
+  const auto add = [&](std::uint32_t value) {
+    for (int shift = 24; shift >= 0; shift -= 8) header += static_cast<char>(value >> shift & 0xff);
+  };
+  add(width), add(height);
+  std::fstream stream(file, std::ios::binary | std::ios::in | std::ios::out);
+  std::string rest(5, '\0');
+  stream.seekg(24).read(rest.data(), 5);
+  header += rest;
+  add(png_checksum(header));
+  stream.seekp(12).write(header.data(), static_cast<std::streamsize>(header.size()));
+}
+
+TEST_F(Labels, ASliceThatClaimsMorePixelsThanASliceHasTakesNoMemory) {
+  ASSERT_NO_FATAL_FAILURE(write_stack(folder_ / "huge", 6, 6, 1, [](int, int, int) { return kBone; }));
+  claim_size(folder_ / "huge" / "plane000.png", 20000, 20000);
+  expect_refused("huge", "plane000.png is 20000x20000, more than the 64 million pixels");
+}
+
 TEST_F(Labels, BadStacksAreOneSentence) {
   expect_refused("absent", "absent", ErrorCode::not_found);
   fs::create_directory(folder_ / "empty");

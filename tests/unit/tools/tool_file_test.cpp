@@ -101,6 +101,8 @@ TEST(ToolFile, EveryBadInputIsNamedWithFileFieldAndRemedy) {
       {with(drill, "name", "name: Drill 3"), {"\"name\" is \"Drill 3\"", "lower-case"}},
       {with(drill, "name", "name: ../x"), {"\"name\"", "lower-case"}},
       {with(drill, "title", "title: \"\""), {"\"title\""}},
+      {with(drill, "title", "title: \"\\t\""), {"\"title\"", "control characters"}},
+      {with(drill, "title", "title: Bohrer\xe4\xf6"), {"\"title\"", "UTF-8"}},
       {with(drill, "diameter_mm", ""), {"\"diameter_mm\" is missing", "from 0.5 to 25"}},
       {with(drill, "diameter_mm", "diameter_mm: 0"), {"\"diameter_mm\" is 0", "from 0.5 to 25"}},
       {with(drill, "diameter_mm", "diameter_mm: -3"), {"\"diameter_mm\" is -3", "from 0.5 to 25"}},

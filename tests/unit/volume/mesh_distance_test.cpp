@@ -98,6 +98,7 @@ TEST(MeshDistance, RefusesWhatIsNoSolidOrTooLarge) {
   refused(sphere_mesh(100.0, {0, 0, 0}, 1), 0.1, "million");
   refused(sphere_mesh(0.01, {0, 0, 0}, 1), 0.5, "less than one sample");
   refused(sphere_mesh(4.0, {0, 0, 0}, 1), 0.0, "pitch");
+  refused(sphere_mesh(200.0, {1e10, 0, 0}, 1), 1.0, "mm from the origin");  // its samples have no numbers of 32 bits
   TriangleMesh broken = sphere_mesh(4.0, {0, 0, 0}, 1);
   broken.positions_mm[0][1] = std::nanf("");
   refused(broken, 0.5, "not numbers");

@@ -77,6 +77,9 @@ TEST(Case, RefusesWhatIsNotACaseInOneSentenceNamingIt) {
   for (const char* name : {"version", "tampered", "broken", "cut-off"}) ASSERT_TRUE(bone.save(temp / name));
   replace_in(temp / "version" / "case.json", "\"schema_version\": 1", "\"schema_version\": 99");
   EXPECT_NE(message("version").find("99"), std::string::npos);
+  // Undefined as an int: the sanitizers see it.
+  replace_in(temp / "version" / "case.json", "\"schema_version\": 99", "\"schema_version\": 1e17");
+  EXPECT_NE(message("version").find("schema_version is 1e+17"), std::string::npos);
   replace_in(temp / "tampered" / "case.json", "\"pitch_mm\": 0.5", "\"pitch_mm\": 0.6");
   EXPECT_NE(message("tampered").find("content_hash"), std::string::npos);
   replace_in(temp / "broken" / "case.json", "{", "");
