@@ -16,6 +16,7 @@
 #include "tests/fuzz/calls_messages.hpp"
 #include "tests/fuzz/calls_target.hpp"
 #include "tests/fuzz/datagram_target.hpp"
+#include "tests/fuzz/import_targets.hpp"
 #include "tests/fuzz/journal_target.hpp"
 #include "tests/fuzz/requests_target.hpp"
 #include "tests/fuzz/samples.hpp"
@@ -220,7 +221,18 @@ std::vector<Target> targets() {
           {"annotation", parse_and_convert<v1::Annotation>, {bytes_of(wire::to_wire(an_annotation()).SerializeAsString())}},
           requests_target(),
           calls_target(),
-          upload_target()};
+          upload_target(),
+          mesh_target(),
+          tool_file_target(),
+          carve_script_target(),
+          legend_target(),
+          case_info_target(),
+          bone_volume_target(),
+          cut_fields_target(),
+          dicom_target(),
+          inv3_target(),
+          scan_archive_target(),
+          label_slice_target()};
 }
 
 }  // namespace osteon::fuzz

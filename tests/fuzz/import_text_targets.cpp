@@ -1,0 +1,76 @@
+// Text that a person writes for the import: a tool, a list of cuts, a legend.
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "common/core/check.hpp"
+#include "common/tools/tool_file.hpp"
+#include "server/import/carve_script.hpp"
+#include "server/import/label_stack.hpp"
+#include "tests/fuzz/import_files.hpp"
+#include "tests/fuzz/import_targets.hpp"
+
+namespace osteon::fuzz {
+namespace {
+
+// What is accepted has the same hash when it is written and read again.
+void read_tool(std::span<const std::uint8_t> data) {
+  const auto tool = parse_tool({reinterpret_cast<const char*>(data.data()), data.size()}, "tool.yaml");
+  if (!tool) return expect_bounded(tool.error());
+  const auto again = parse_tool(to_yaml(*tool), "again.yaml");
+  OSTEON_CHECK(again && again->hash() == tool->hash());
+}
+
+void read_script(std::span<const std::uint8_t> data) {
+  static const InputFile file("script.yaml");
+  const auto steps = import::read_carve_script(file.write(data));
+  if (!steps) return expect_bounded(steps.error());
+  for (const import::CarveStep& step : *steps) {
+    OSTEON_CHECK(!step.path.empty());
+    for (const Pose& pose : step.path) OSTEON_CHECK(pose.position_mm.allFinite());
+  }
+}
+
+void read_legend(std::span<const std::uint8_t> data) {
+  static const InputFile file("legend.yaml");
+  const auto legend = import::read_legend(file.write(data));
+  if (!legend) return expect_bounded(legend.error());
+  OSTEON_CHECK(!legend->bones.empty());
+  for (const import::BoneColour& bone : legend->bones) OSTEON_CHECK(bone.density_g_cm3 > 0.0 && bone.density_g_cm3 <= 3.0);
+}
+
+Target text_target(std::string name, void (*read)(std::span<const std::uint8_t>), std::vector<Bytes> seeds) {
+  Target target{std::move(name), read, std::move(seeds)};
+  target.change = change_number;
+  target.mutations = 200;
+  return target;
+}
+
+}  // namespace
+
+Target tool_file_target() {
+  std::vector<Bytes> seeds;
+  std::set<ToolKind> kinds;  // one of each
+  for (const Tool& tool : builtin_tools())
+    if (kinds.insert(tool.kind).second) seeds.push_back(bytes_of_text(to_yaml(tool)));
+  return text_target("tool_file", read_tool, std::move(seeds));
+}
+
+Target carve_script_target() {
+  return text_target("carve_script", read_script,
+                     {bytes_of_text("steps:\n"
+                                    "  - {tool: burr-round-5, from: [10, 0, 5], to: [20, 0, 5], axis: [0, 0, -1], level: 1}\n"
+                                    "  - tool: saw-oscillating-1\n"
+                                    "    path:\n"
+                                    "      - {at: [0, 0, 0], axis: [0, 0, -1], across: [1, 0, 0]}\n"
+                                    "      - {at: [0, 8, -6], axis: [0, 0, -1], across: [1, 0, 0]}\n"),
+                      bytes_of_text("steps: [{tool: drill-3.2, at: [1, 2, 3], axis: [0, 1, -1]}]\n")});
+}
+
+Target legend_target() {
+  return text_target("legend", read_legend,
+                     {bytes_of_text("tolerance: 4\nbones:\n  - {name: cortical, colour: [255, 249, 219], density_g_cm3: 1.9}\n"
+                                    "  - {name: cancellous, colour: [200, 1, 0]}\n")});
+}
+
+}  // namespace osteon::fuzz

@@ -1,0 +1,56 @@
+// Label volumes: a PNG slice.
+#include <png.h>
+
+#include <array>
+#include <string>
+
+#include "common/core/check.hpp"
+#include "server/import/label_import.hpp"
+#include "tests/fuzz/import_files.hpp"
+#include "tests/fuzz/import_targets.hpp"
+
+namespace osteon::fuzz {
+namespace {
+
+constexpr int kWidth = 6, kHeight = 5;
+constexpr std::size_t kSmall = 4096;  // voxels: what is larger is read, and made no case
+
+Bytes a_slice(png_uint_32 format) {
+  constexpr std::array<png_byte, 4> kBone{255, 249, 219, 255};
+  const std::size_t channels = PNG_IMAGE_SAMPLE_CHANNELS(format);
+  std::vector<png_byte> pixels;
+  for (int i = 0; i < kWidth * kHeight; ++i)
+    for (std::size_t channel = 0; channel < channels; ++channel) pixels.push_back(i % 7 == 0 ? png_byte{0} : kBone[channel]);
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = kWidth;
+  image.height = kHeight;
+  image.format = format;
+  const InputFile file("slice1.png");
+  const auto path = file.write({});
+  OSTEON_CHECK(png_image_write_to_file(&image, path.c_str(), 0, pixels.data(), 0, nullptr) != 0);
+  return bytes_of_file(path);
+}
+
+void read_slice(std::span<const std::uint8_t> data) {
+  static const InputFile file("slice1.png");
+  static const import::LabelLegend legend;
+  file.write(data);
+  const auto going = [](double) { return true; };
+  auto stack = import::read_label_stack(file.folder(), legend, Vec3(0.5, 0.75, 1.0), going);
+  if (!stack) return expect_bounded(stack.error());
+  if (stack->volume.labels.values.size() > kSmall) return;
+  const auto made = import::import_labels(std::move(*stack), legend, {.pitch_mm = {}, .title = "Labels", .smoothing = {}}, going);
+  if (!made) return expect_bounded(made.error());
+  OSTEON_CHECK(made->labelled_mm3 > 0.0 && made->bone.volume_mm3() > 0.0);
+}
+
+}  // namespace
+
+Target label_slice_target() {
+  Target target{"label_slice", read_slice, {a_slice(PNG_FORMAT_RGBA), a_slice(PNG_FORMAT_RGB), a_slice(PNG_FORMAT_GRAY)}};
+  target.mutations = 50;
+  return target;
+}
+
+}  // namespace osteon::fuzz

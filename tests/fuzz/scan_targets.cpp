@@ -1,0 +1,204 @@
+// Scans: a DICOM slice, an InVesalius project, and archives of slices.
+#include <gdcmTrace.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csetjmp>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/core/check.hpp"
+#include "server/import/archive_files.hpp"
+#include "server/import/dicom_pixels.hpp"
+#include "server/import/dicom_series.hpp"
+#include "server/import/inv3_reader.hpp"
+#include "server/import/isolated_reader.hpp"
+#include "tests/fuzz/archive_bytes.hpp"
+#include "tests/fuzz/import_files.hpp"
+#include "tests/fuzz/import_targets.hpp"
+
+namespace osteon::fuzz {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kExplicit = "1.2.840.10008.1.2.1";
+constexpr const char* kImplicit = "1.2.840.10008.1.2";
+constexpr int kRows = 4, kColumns = 5;
+
+bool keep_going(double) { return true; }
+
+// Elements of a data set, little endian.
+class DataSet {
+ public:
+  explicit DataSet(bool explicit_vr) : explicit_vr_(explicit_vr) {}
+  DataSet& add(std::uint16_t group, std::uint16_t element, const char* vr, std::string value) {
+    if (value.size() % 2 != 0) value += std::string_view(vr) == "UI" ? '\0' : ' ';
+    number(group, 2), number(element, 2);
+    if (explicit_vr_) bytes_ += vr;
+    if (explicit_vr_ && std::string_view(vr) == "OW") bytes_ += std::string(2, '\0');
+    number(value.size(), explicit_vr_ && std::string_view(vr) != "OW" ? 2 : 4);
+    bytes_ += value;
+    return *this;
+  }
+  DataSet& add_number(std::uint16_t group, std::uint16_t element, std::uint16_t value) {
+    return add(group, element, "US", {static_cast<char>(value & 0xff), static_cast<char>(value >> 8)});
+  }
+  [[nodiscard]] const std::string& bytes() const { return bytes_; }
+
+ private:
+  void number(std::size_t value, int count) {
+    for (int i = 0; i < count; ++i) bytes_ += static_cast<char>(value >> 8 * i & 0xff);
+  }
+  bool explicit_vr_;
+  std::string bytes_;
+};
+
+std::string a_slice(const std::string& syntax) {
+  const std::string ct = "1.2.840.10008.5.1.4.1.1.2";
+  DataSet meta(true);
+  meta.add(2, 2, "UI", ct).add(2, 3, "UI", "1.2.3.4.5").add(2, 0x10, "UI", syntax);
+  DataSet data(syntax == kExplicit);
+  data.add(8, 8, "CS", "ORIGINAL\\PRIMARY\\AXIAL").add(8, 0x16, "UI", ct).add(8, 0x18, "UI", "1.2.3.4.5").add(8, 0x60, "CS", "CT");
+  data.add(8, 0x103e, "LO", "HEAD 1.0").add(0x18, 0x1210, "SH", "H60s");
+  data.add(0x20, 0x0e, "UI", "1.2.3.4").add(0x20, 0x11, "IS", "1").add(0x20, 0x32, "DS", "-10\\-20\\30");
+  data.add(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0").add_number(0x28, 2, 1).add(0x28, 4, "CS", "MONOCHROME2");
+  data.add_number(0x28, 0x10, kRows).add_number(0x28, 0x11, kColumns).add(0x28, 0x30, "DS", "0.5\\0.75");
+  data.add_number(0x28, 0x100, 16).add_number(0x28, 0x101, 12).add_number(0x28, 0x102, 11).add_number(0x28, 0x103, 0);
+  data.add(0x28, 0x1052, "DS", "-1024").add(0x28, 0x1053, "DS", "1");
+  std::string pixels;
+  for (int i = 0; i < kRows * kColumns; ++i) pixels += {static_cast<char>(i), static_cast<char>(i % 16)};
+  data.add(0x7fe0, 0x10, "OW", pixels);
+  const auto length = static_cast<char>(meta.bytes().size());
+  const std::string head = DataSet(true).add(2, 0, "UL", {length, 0, 0, 0}).bytes();
+  return std::string(128, '\0') + "DICM" + head + meta.bytes() + data.bytes();
+}
+
+// As the slice and one 2 mm beside it would be read: headers, series, and the pixels of what can be imported.
+void read_slice(const fs::path& file) {
+  import::DicomHeader header = import::read_header(file);
+  import::DicomHeader beside = header;
+  beside.instance += ".1";
+  beside.file = 1;
+  if (beside.position.size() == 3) beside.position[2] += 2.0;
+  const import::FoundFiles found{.input = "scan", .archive = false, .files = {{file, "a"}, {file, "b"}}, .skipped = {}};
+  import::SkippedFiles skipped;
+  auto series = import::sort_series({header, beside}, found, skipped);
+  OSTEON_CHECK(skipped.text().size() < 4096);
+  const auto chosen = import::choose_series(series, found, skipped, {}, {});
+  if (!chosen) return expect_bounded(chosen.error());
+  const import::CtSeries& taken = series[*chosen];
+  if (taken.fault) return expect_bounded(taken.fault->error);
+  const std::size_t pixels = static_cast<std::size_t>(taken.grid.dims[0]) * static_cast<std::size_t>(taken.grid.dims[1]);
+  std::vector<std::int16_t> out(pixels);
+  const auto read = import::read_pixels(taken.slices.front(), file, "a", out);
+  if (!read) expect_bounded(read.error());
+}
+
+// GDCM aborts by assert() on some damaged files, so the import reads them in processes that may die. Here such an input is
+// left instead, and what the library held is lost.
+std::jmp_buf on_assertion;
+bool in_library = false;
+
+// What the library may allocate while it reads one input, as in the child that the import starts. Returns what was allowed before.
+rlimit allow_memory(rlim_t more_bytes) {
+  rlimit before{}, limit{};
+  ::getrlimit(RLIMIT_AS, &before);
+  std::ifstream file("/proc/self/statm");
+  rlim_t pages = 0;
+  if (!import::limits_memory() || !(file >> pages)) return before;  // sanitizers have an option for it
+  limit = before;
+  limit.rlim_cur = std::min(before.rlim_max, pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + more_bytes);
+  ::setrlimit(RLIMIT_AS, &limit);
+  return before;
+}
+
+void read_guarded(const fs::path& file) {
+  const rlimit before = allow_memory(rlim_t{256} << 20);
+  if (setjmp(on_assertion) == 0) {
+    in_library = true;
+    read_slice(file);
+    in_library = false;
+  }
+  ::setrlimit(RLIMIT_AS, &before);
+}
+
+void read_dicom(std::span<const std::uint8_t> data) {
+  static const InputFile file("slice.dcm");
+  read_guarded(file.write(data));
+}
+
+void read_project(std::span<const std::uint8_t> data) {
+  static const InputFile file("project.inv3");
+  const auto scan = import::read_inv3(file.write(data), keep_going);
+  if (!scan) return expect_bounded(scan.error());
+  OSTEON_CHECK(scan->volume.values.size() == scan->volume.count() && scan->volume.spacing_mm.minCoeff() > 0.0);
+}
+
+void read_archive(std::span<const std::uint8_t> data) {
+  // Small, so that an input can go beyond each.
+  constexpr import::ArchiveLimits kLimits{.entries = 8, .bytes = 1 << 16, .spare_bytes = 0};
+  static const InputFile file("scan");
+  const test::TempDir into;
+  const auto found = import::unpack_archive(file.write(data), into.path(), kLimits, keep_going);
+  if (!found) return expect_bounded(found.error());
+  OSTEON_CHECK(found->files.size() <= 8);
+  std::uintmax_t bytes = 0;
+  for (const import::FoundFile& unpacked : found->files) {
+    OSTEON_CHECK(unpacked.path.parent_path() == into.path());
+    bytes += fs::file_size(unpacked.path);
+    read_guarded(unpacked.path);
+  }
+  OSTEON_CHECK(bytes <= kLimits.bytes);
+}
+
+Bytes a_project(bool gzip) {
+  const std::string list =
+      "<?xml version=\"1.0\"?><plist version=\"1.0\"><dict><key>modality</key><string>CT</string><key>orientation</key><integer>1</integer>"
+      "<key>matrix</key><dict><key>dtype</key><string>int16</string><key>filename</key><string>matrix.dat</string><key>shape</key><array>"
+      "<integer>2</integer><integer>3</integer><integer>4</integer></array></dict><key>spacing</key><array><real>0.5</real><real>0.75</real>"
+      "<real>2.0</real></array></dict></plist>";
+  return an_archive({{"tmp/matrix.dat", std::string(48, 'm')}, {"tmp/main.plist", list}}, {.format = "pax", .gzip = gzip});
+}
+
+}  // namespace
+
+// [any thread] Takes the C library's place for the library's assertions alone.
+extern "C" [[noreturn]] void __assert_fail(const char* expression, const char* file, unsigned line, const char*) noexcept {
+  if (std::exchange(in_library, false)) std::longjmp(on_assertion, 1);
+  std::fprintf(stderr, "%s:%u: assertion failed: %s\n", file, line, expression);
+  std::abort();
+}
+
+Target dicom_target() {
+  gdcm::Trace::DebugOff();
+  gdcm::Trace::WarningOff();
+  gdcm::Trace::ErrorOff();
+  Target target{"dicom", read_dicom, {bytes_of_text(a_slice(kExplicit)), bytes_of_text(a_slice(kImplicit))}};
+  target.mutations = 40;
+  return target;
+}
+
+Target inv3_target() {
+  Target target{"inv3", read_project, {a_project(false), a_project(true)}};
+  target.change = change_number;
+  target.mutations = 200;
+  return target;
+}
+
+Target scan_archive_target() {
+  const std::vector<std::pair<std::string, std::string>> files{{"CD/IM1", a_slice(kExplicit)}, {"CD/README.TXT", "nothing"}};
+  Target target{"scan_archive",
+                read_archive,
+                {an_archive(files, {}), an_archive(files, {.zip_compression = "store"}), an_archive(files, {.format = "pax"}),
+                 an_archive(files, {.format = "pax", .gzip = true}), an_archive(files, {.format = "iso9660"})}};
+  target.mutations = 50;
+  return target;
+}
+
+}  // namespace osteon::fuzz
