@@ -26,7 +26,7 @@ struct TriangleDistance {
 };
 
 // From p to the triangle a, b, c, in the square of their unit. Finite for finite corners: where the triangle has no
-// area the nearest of its sides counts. Regions of the plane as in Ericson, Real-Time Collision Detection, 2005,
+// area the nearest of its sides counts. Regions of the plane as in Ericson 2005,
 // section 5.1.5.
 template <class Scalar>
 [[nodiscard]] TriangleDistance<Scalar> distance_to_triangle(const Eigen::Matrix<Scalar, 3, 1>& p,

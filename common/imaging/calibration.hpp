@@ -6,8 +6,8 @@
 
 namespace osteon::imaging {
 
-// Rho, Hobatho, Ashman: Relations of mechanical properties to density and CT numbers in human bone. Medical Engineering
-// & Physics 17(5), 1995, 347-355. They fitted one line for each bone and region. Finite element studies quote
+// Density from Hounsfield units (Rho 1995). The authors measured human bone of many regions, and
+// fitted one line for each bone and region. Finite element studies quote
 // ρ = 131 + 1.067 HU kg/m³ as theirs for cancellous bone of the proximal femur.
 // [A] It is used here for every bone, for cortex too, and for every scanner, kernel and tube voltage. Cortex is beyond
 // the densities of that fit: a scan of 1700 HU gives 1.94 g/cm³, where compact bone has 1.8 to 2.1.

@@ -25,10 +25,10 @@ struct SmoothingParams {
 
 // A field whose zero is the bone's surface: about 1 deep in bone, -1 far from it, of the labels' box.
 // Steps of binary voxels are taken out by a low-pass filter without shrinkage, a blur u <- Bu followed by its counterpart
-// u <- u + μ(u - Bu) (Taubin, A signal processing approach to fair surface design, SIGGRAPH 1995, here for a field), and
-// every voxel is held on its side of zero, so that thin walls and small cells stay (compare Whitaker, Reducing aliasing
-// artifacts in iso-surfaces of binary volumes, IEEE Volume Visualization 2000). It fails where the steps are farther
-// apart than the filter reaches, some 8 voxels: such a terrace stays, with a rounded edge.
+// u <- u + μ(u - Bu) (Taubin 1995, here for a field). Every voxel is held on its side of zero, so that thin walls and
+// small cells stay (compare Whitaker 2000).
+// The filter fails where the steps are farther apart than it reaches, some 8 voxels: such a terrace stays, with a
+// rounded edge.
 // Error: cancelled.
 [[nodiscard]] Result<DenseVolume<float>> smooth_labels(const LabelVolume& volume, const SmoothingParams& params,
                                                        const KeepGoing& keep_going);

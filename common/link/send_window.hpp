@@ -27,7 +27,7 @@ struct SendItem {
 };
 
 struct SendWindowLimits {
-  std::size_t bytes = 16 * 1024;  // of items without heads, unacknowledged (DESIGN section 5)
+  std::size_t bytes = 16 * 1024;  // of items without heads, unacknowledged
   std::size_t items = 4096;
   std::size_t bytes_per_head = 0;  // that a packet takes for a head beside its own bytes, where that is not empty
 };

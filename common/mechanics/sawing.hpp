@@ -1,7 +1,7 @@
 // Sawing after James, Pearlman and Saigal, who cut bovine cortical bone with single teeth: from 2 to 10 micrometres of
-// depth the thrust rises by 30 %, linearly, while the force along the cut stays the same (Med. Eng. Phys. 35, 2013; 1700
+// depth the thrust rises by 30 %, linearly, while the force along the cut stays the same (James 2013; 1700
 // to 7000 mm/s, where speed has no effect), and the resultant lies between 8 and 11 N from 2.5 to 10 micrometres
-// (J. Biomech. Eng. 134, 2012). [A]: the split of the resultant, the growth with density as Chi's thrust, and the share
+// (James 2012). [A]: the split of the resultant, the growth with density as Chi's thrust, and the share
 // of the teeth in a kerf that bears at a time, for the edge swings over an arc and bends.
 //
 // The depth of cut follows from volume: what the bearing teeth take at their speed is what the kerf grows by,

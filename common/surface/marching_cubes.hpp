@@ -1,5 +1,5 @@
 // Marching cubes: which edges of a cell the surface crosses, and the triangles between them.
-// Lorensen and Cline, Marching cubes, SIGGRAPH 1987; the table is derived here, not tabulated by hand.
+// Lorensen 1987; the table is derived here, not tabulated by hand.
 #pragma once
 #include <array>
 #include <cstdint>

@@ -149,7 +149,7 @@ bool read_seams(std::span<const std::uint8_t>& bytes, Seams& seams) {
   return whole_faces(seams);
 }
 
-// Unit vectors on the octahedron unfolded into a square (Meyer et al., On floating-point normal vectors, 2010).
+// Unit vectors on the octahedron unfolded into a square (Meyer 2010).
 std::array<std::uint8_t, 2> encode_normal(std::array<float, 3> n) {
   const float sum = std::abs(n[0]) + std::abs(n[1]) + std::abs(n[2]);
   if (!(sum > 0.0f)) return {128, 128};

@@ -60,7 +60,7 @@ struct CutBody {
   // Shared by all copies of one tool's body: immutable, and up to megabytes.
   std::shared_ptr<const SampledDistance> sampled;
 
-  // Box of the body in the tool's frame, kQuantum_mm, rounded outwards (the dissertation's Local Bounding Block, §6.1).
+  // Box of the body in the tool's frame, kQuantum_mm, rounded outwards (Local Bounding Block, Niu 2008, §6.1).
   std::array<std::int32_t, 3> lowest{}, highest{};
 
   [[nodiscard]] bool cuts() const { return kind != CutKind::none; }

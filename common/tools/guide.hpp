@@ -1,5 +1,5 @@
 // What a guide does to a tool that goes through it: a drill's axis stays within the sleeve's play, a saw blade within its
-// slot (§6.2 of the dissertation, figures 6.4 and 9.9).
+// slot (Niu 2008, §6.2, figures 6.4 and 9.9).
 #pragma once
 #include <optional>
 #include <vector>

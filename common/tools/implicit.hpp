@@ -1,4 +1,4 @@
-// Implicit solids (§6.1 of the dissertation): signed distances, put together from primitives by union, intersection and
+// Implicit solids (Niu 2008, §6.1): signed distances, put together from primitives by union, intersection and
 // difference. Negative inside and 1-Lipschitz everywhere, since every primitive is, and minimum and maximum keep it.
 #pragma once
 #include <functional>

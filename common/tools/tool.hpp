@@ -73,22 +73,22 @@ struct Tool {
   [[nodiscard]] Digest hash() const;      // over every field
 };
 
-// The tools that come with Osteon, by name: the 24 of Appendix B of the dissertation, and some more.
+// The tools that come with Osteon, by name: the 24 of Niu 2008, Appendix B, and some more.
 [[nodiscard]] std::span<const Tool> builtin_tools();
 [[nodiscard]] Result<Tool> find_tool(std::string_view name);
 
 // The tools as they really are: distance to the whole solid (cutting part and shank) in the tool's frame, negative
-// inside, 1-Lipschitz (§6.1 of the dissertation). Exact where one convex part is nearest.
+// inside, 1-Lipschitz (Niu 2008, §6.1). Exact where one convex part is nearest.
 [[nodiscard]] double signed_distance_mm(const Tool& tool, const Vec3& point_tool_mm);
 // Unit gradient of the distance: out of the tool (eq. 6.2).
 [[nodiscard]] Vec3 normal(const Tool& tool, const Vec3& point_tool_mm);
-// Box of the whole tool in its frame (Local Bounding Block, §6.1) and round it at a pose (World Bounding Block), mm.
+// Box of the whole tool in its frame (Local Bounding Block, Niu 2008, §6.1) and round it at a pose (World), mm.
 [[nodiscard]] Box local_bounds(const Tool& tool);
 [[nodiscard]] Box world_bounds(const Tool& tool, const Pose& pose_bone_tool);
 
 struct SamplePoint {
   Vec3 position_mm;   // on the surface, tool frame
-  Vec3 inward;        // unit normal into the tool (§6.1)
+  Vec3 inward;        // unit normal into the tool (Niu 2008, §6.1)
   double area_mm2;    // of the surface it stands for
   bool active;        // on the cutting part
 };

@@ -1,4 +1,4 @@
-// Each tool's solid as implicit functions and their union, intersection and difference (§6.1, figure 6.2).
+// Each tool's solid as implicit functions and their union, intersection and difference (Niu 2008, §6.1).
 #pragma once
 #include "common/tools/implicit.hpp"
 #include "common/tools/tool.hpp"

@@ -1,4 +1,4 @@
-// Collision of a tool's sample points with bone, in two ways: on the segmentation cells of the dissertation (§7.2), and by
+// Collision of a tool's sample points with bone, in two ways: on segmentation cells (Niu 2008, §7.2), and by
 // the distance field. The first knows of a sample only whether it is bone (1) or not (0).
 #pragma once
 #include <cstdint>
@@ -52,7 +52,7 @@ class BoneDistance {
   std::vector<float> values_;
 };
 
-// The first of a tool's points that is on or in the bone, as in the algorithm of §7.2; none when the tool is free.
+// The first of a tool's points that is on or in the bone, as in Niu 2008, §7.2; none when the tool is free.
 [[nodiscard]] std::optional<std::size_t> first_contact(const BoneCells& bone, MixedCell rule, std::span<const SamplePoint> points,
                                                        const Pose& pose_bone_tool);
 [[nodiscard]] std::optional<std::size_t> first_contact(const BoneDistance& bone, std::span<const SamplePoint> points,

@@ -19,7 +19,7 @@
 
 // The surface is meshed by dual contouring in its simplest form: every cell with a crossing has one point, the mean of
 // the crossings on its edges, and every crossed lattice edge has a quad between the points of the four cells around it
-// (Gibson, Constrained elastic surface nets, 1998). Only samples of the narrow band get a distance. Those nearer than a
+// (Gibson 1998). Only samples of the narrow band get a distance. Those nearer than a
 // voxel look at every triangle beside them. The others get the nearest point of the surface from their neighbours,
 // layer by layer outwards, and then look at the triangles around it: of two sheets they may take the other where a
 // facet of the one is nearer than its corners (2 samples of 1000 of a skull are more than 0.01 voxel off by that).

@@ -1,4 +1,4 @@
-// The two ways of the dissertation (§5.5) to raise the resolution where a tool is. Method 2, only where the tool is, is
+// The two ways of Niu 2008, §5.5, to raise the resolution where a tool is. Method 2, only where the tool is, is
 // CutField itself. Method 1 is here, for comparison: the whole sub-volume that the tool touches, once.
 #pragma once
 #include <map>
@@ -9,7 +9,7 @@
 
 namespace osteon {
 
-// A sub-volume is a cube of this many samples of level 0, about the 30000 voxels that §5.3 found best.
+// A sub-volume is a cube of this many samples of level 0, about the 30000 voxels that Niu 2008, §5.3, found best.
 inline constexpr std::int32_t kSubVolumeSamples = 32;
 
 struct RefineReport {

@@ -20,7 +20,7 @@ ROOM = "theatre"
 TRAINEES = {"anna": "trainee", "ben": "trainee"}
 INSTRUCTOR = "berg"
 OBSERVER = "class"
-# Most that force on the device may grow in a millisecond without the hand having moved (DESIGN §6), and the stiffest coupling.
+# Most that force on the device may grow in a millisecond without the hand having moved, and the stiffest coupling.
 SLEW_N_PER_MS = 0.5
 COUPLING_N_PER_MM = 50.0
 ROUNDING_N = 2e-3  # of forces that are recorded as single floats

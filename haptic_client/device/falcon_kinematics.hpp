@@ -1,7 +1,7 @@
 // Novint Falcon: encoder counts to the grip's place and back, and the torques that show a force there. Three equal legs,
 // each an arm that the motor turns and a parallelogram that carries the grip, so that the grip moves without turning.
-// R. E. Stamper, "A three degree of freedom parallel manipulator with only translational degrees of freedom", PhD 97-4,
-// University of Maryland, 1997; lengths and counts as public drivers of the device have them. Metres and radians here,
+// The geometry is that of Stamper 1997. Lengths and counts are those of public drivers of the device.
+// Metres and radians here,
 // in the device's own frame: z out of its face to the user, x right, y up.
 #pragma once
 #include <array>

@@ -21,7 +21,7 @@ struct StepReport {
   int cuts = 0;                           // that were made
   int metal_refused = 0;                  // others, which would have taken metal away
   double removed_mm3 = 0;                 // by cutting, from all bodies; pieces that came apart are not counted
-  std::int64_t visited = 0, computed = 0, modified = 0;  // samples of all bodies together, §5.4
+  std::int64_t visited = 0, computed = 0, modified = 0;  // samples of all bodies together (Niu 2008, §5.4)
   double cut_ms_median = 0, cut_ms_p99 = 0, cut_ms_most = 0;
   double frame_ms_median = 0, frame_ms_most = 0;  // of meshing body 0's blocks that kCutsPerFrame cuts changed
   double fragment_ms = 0;                 // of keeping the components and looking for pieces

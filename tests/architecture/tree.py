@@ -1,4 +1,4 @@
-"""The rules of DESIGN section 2 for source files: who may include whom, which headers are heavy, how long files are."""
+"""The rules for source files: who may include whom, which headers are heavy, how long files are."""
 import re
 from pathlib import Path
 

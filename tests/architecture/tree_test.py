@@ -3,6 +3,7 @@ import os
 import unittest
 from pathlib import Path
 
+import references
 import tree
 
 ROOT = Path(os.environ.get("OSTEON_SOURCE_DIR", Path(__file__).resolve().parents[2]))
@@ -30,6 +31,14 @@ class TheTree(unittest.TestCase):
             return tree.declaration_faults(path, cmake.read_text() if cmake.exists() else "",
                                            source.read_text() if source.exists() else None)
         self.assertEqual(self.all_faults(check), [])
+
+    def test_every_source_is_listed(self):
+        listed = (ROOT / references.LIST).read_text(encoding="utf-8")
+        examples = (references.LIST, "tests/architecture/references.py", "tests/architecture/tree_test.py")
+        files = [f for f in references.text_files(ROOT) if relative(f) not in examples]
+        faults = [fault for f in files
+                  for fault in references.reference_faults(relative(f), f.read_text(encoding="utf-8"), listed)]
+        self.assertEqual(faults, [])
 
 
 class TheRules(unittest.TestCase):
@@ -83,6 +92,19 @@ class TheRules(unittest.TestCase):
         first = '#include "server/app/x.hpp"\n#include <vector>\n'
         self.assertFalse(tree.declaration_faults("server/app/x.hpp", "", first))
         self.assertTrue(tree.declaration_faults("server/app/x.hpp", "", "#include <vector>\n" + first))
+
+    def test_a_source_that_is_not_listed_is_noticed(self):
+        listed = "- **Chi 2005**: X. Chi, a paper.\n| RFC 8032 | signatures |\n"
+
+        def faults(text):
+            return references.reference_faults("x.hpp", text, listed)
+        self.assertFalse(faults("// Chi et al. 2005, RFC 8032"))
+        self.assertTrue(faults("// Chi et al. 2006"))
+        self.assertTrue(faults("// as Yang and\n// Chen (2003) do"))
+        self.assertTrue(faults("// RFC 9999"))
+        self.assertTrue(faults("// as in §5.4"))
+        self.assertFalse(faults("// Chi 2005, §2"))
+        self.assertTrue(faults("// DESIGN section 5"))
 
 
 if __name__ == "__main__":

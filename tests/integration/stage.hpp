@@ -40,7 +40,7 @@ class ScriptedViewer {
 
 class Stage {
  public:
-  // Imports the layered block of force-laws.md and starts a server on it.
+  // Imports the layered block (5, 20, 5 mm) and starts a server on it.
   explicit Stage(double width_mm = 40.0, std::vector<std::string> server_arguments = {});
   // The same on a case that `make_case` leaves in the folder that it is given.
   explicit Stage(const std::function<void(const std::filesystem::path&)>& make_case,

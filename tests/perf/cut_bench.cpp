@@ -165,7 +165,7 @@ void cold(benchmark::State& state, Cut (*cut_at)(const Vec3&), Heap heap) {
   state.counters["new_pages"] = static_cast<double>(pages) / count;
 }
 
-// The plain way, §5.4 of the dissertation: walk the voxels of the World Bounding Block, here of the swept tool and grown
+// The plain way (Niu 2008, §5.4): walk the voxels of the World Bounding Block, here of the swept tool and grown
 // by the band; reject those outside the Local Bounding Block, compute the tool's distance for the others, and write the
 // lower of it and the voxel's value by an accessor. For balls, and turned bodies that move along their axis.
 class PlainCut {

@@ -15,7 +15,7 @@ using osteon::test::Crossed;
 using osteon::test::OverseenHand;
 using osteon::test::OverseenRun;
 
-constexpr double kBudget_mj = 0.01;  // of one contact, DESIGN §6
+constexpr double kBudget_mj = 0.01;  // of one contact
 
 ZoneLimit ball(const Vec3& centre_mm, double radius_mm) {
   return {quantise({centre_mm, Eigen::Quaterniond::Identity()}).position, static_cast<std::int32_t>(radius_mm / kQuantum_mm)};
