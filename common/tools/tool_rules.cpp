@@ -89,7 +89,8 @@ bool is_plain_text(std::string_view text) {
   while (!text.empty()) {
     const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
     const std::size_t size = byte(0) < 0x80 ? 1 : byte(0) < 0xe0 ? 2 : byte(0) < 0xf0 ? 3 : 4;
-    if (size > text.size() || byte(0) < 0x20 || byte(0) == 0x7f || byte(0) > 0xf4 || (size > 1 && byte(0) < 0xc2)) return false;
+    if (size > text.size() || byte(0) < 0x20 || byte(0) == 0x7f || byte(0) > 0xf4 || (size > 1 && byte(0) < 0xc2))
+      return false;
     char32_t code = size == 1 ? byte(0) : byte(0) & (0x7fu >> size);
     for (std::size_t i = 1; i < size; ++i) {
       if ((byte(i) & 0xc0) != 0x80) return false;
@@ -386,7 +387,8 @@ std::optional<std::string> tool_fault(const Tool& tool) {
   if (!good_name(tool.name))
     return "\"name\" is \"" + tool.name + "\"; use up to 64 lower-case letters, digits, '-' and '.', a letter or digit first";
   if (tool.title.empty() || tool.title.size() > 200 || !is_plain_text(tool.title))
-    return "\"title\" must have from 1 to 200 letters in UTF-8 without control characters; write what people shall read";
+    return "\"title\" must have from 1 to 200 letters in UTF-8 without control characters; write what people shall "
+           "read";
   for (const FieldRule& rule : field_rules(tool.kind))
     if (auto fault = value_fault(rule, get_field(tool, rule))) return fault;
   if (tool.cut_level < 0 || tool.cut_level >= kLevels)

@@ -33,14 +33,15 @@ constexpr const char* kInfoFile = "case.json";
 constexpr const char* kVolumeFile = "bone.vdb";
 constexpr std::uintmax_t kMostInfoBytes = 1 << 20;
 const std::vector<std::string> kGridNames{"surface", "density", "clearance", "bone", "tissue"};
-// A case of a temporal bone at 0.1 mm takes 0.5 GiB, and five times its file. A file that declares more than all this is damaged
-// or hostile; a file of up to 64 MiB stays below 1 GiB.
+// A case of a temporal bone at 0.1 mm takes 0.5 GiB, and five times its file. A file that declares more than all this
+// is damaged or hostile; a file of up to 64 MiB stays below 1 GiB.
 constexpr std::uint64_t kCaseMemoryBytes = std::uint64_t{768} << 20, kMemoryToFile = 12, kMostCaseLeaves = 4'000'000;
 
 VdbLimits limits_for(const std::filesystem::path& file) {
   std::error_code error;
   const std::uintmax_t bytes = std::filesystem::file_size(file, error);
-  const std::uint64_t memory = error ? kCaseMemoryBytes : std::max<std::uint64_t>(kCaseMemoryBytes, kMemoryToFile * bytes);
+  const std::uint64_t memory =
+      error ? kCaseMemoryBytes : std::max<std::uint64_t>(kCaseMemoryBytes, kMemoryToFile * bytes);
   return {.memory_bytes = memory, .leaves = kMostCaseLeaves, .grids = 16};
 }
 
@@ -381,15 +382,18 @@ Result<Case> Case::load(const std::filesystem::path& folder) {
     return failure(ErrorCode::invalid_input, folder.string() + " is not a case: it has no " + kInfoFile + "; make one with osteon-import");
   std::error_code unknown;
   if (std::filesystem::file_size(file, unknown) > kMostInfoBytes && !unknown)
-    return failure(ErrorCode::invalid_input, file.string() + " is longer than any case description; import the case again");
+    return failure(ErrorCode::invalid_input,
+                   file.string() + " is longer than any case description; import the case again");
   CaseInfo info;
   Digest named;
   try {
     const json j = json::parse(in);
     const json& version = j.at("schema_version");  // compared as it is: any number may stand there
     if (version != kCaseSchemaVersion)
-      return failure(ErrorCode::unsupported, file.string() + ": schema_version is " + version.dump().substr(0, 20) + ", but this program reads version " +
-                         std::to_string(kCaseSchemaVersion) + "; import the case again with this program's osteon-import");
+      return failure(ErrorCode::unsupported, file.string() + ": schema_version is " + version.dump().substr(0, 20) +
+                                                 ", but this program reads version " +
+                                                 std::to_string(kCaseSchemaVersion) +
+                                                 "; import the case again with this program's osteon-import");
     info.title = j.at("title").get<std::string>();
     info.source = j.at("source").get<std::string>();
     info.pitch_mm = j.at("pitch_mm").get<double>();

@@ -13,8 +13,9 @@
 namespace osteon {
 
 // Counts of samples as in Niu 2008, §5.4, where whole leaves are passed over. Computed ones are those whose distance
-// was evaluated. That a leaf lies beyond the tool's band, wholly within it, or has nothing left that this cut could lower
-// is seen at its middle, so its samples are visited only; those wholly within it are modified without being computed.
+// was evaluated. That a leaf lies beyond the tool's band, wholly within it, or has nothing left that this cut could
+// lower is seen at its middle, so its samples are visited only; those wholly within it are modified without being
+// computed.
 struct CutReport {
   std::int64_t visited = 0;    // of the leaves of the swept tool's world bounding block, grown by the band
   std::int64_t computed = 0;

@@ -351,7 +351,8 @@ Result<SavedFields> load_fields(const fs::path& file) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return failure(ErrorCode::not_found, "there is no file " + file.string());
   if (const auto sealed = check_seal(file); !sealed) return tl::unexpected(sealed.error());
-  if (const auto size = measure_vdb(file, kFieldLimits); !size) return failure(ErrorCode::invalid_input, size.error().message);
+  if (const auto size = measure_vdb(file, kFieldLimits); !size)
+    return failure(ErrorCode::invalid_input, size.error().message);
   try {
     start_openvdb();
     openvdb::io::File in(file.string());

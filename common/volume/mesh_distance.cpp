@@ -35,8 +35,9 @@ Result<void> check(const TriangleMesh& mesh, double pitch_mm, std::size_t most_t
     for (const float x : p) {
       if (!std::isfinite(x)) return failure(ErrorCode::invalid_input, "the mesh has corners that are not numbers");
       if (std::abs(x) > kFarthest_mm) {
-        std::snprintf(text, sizeof text, "the mesh has a corner %.3g mm from the origin, more than %.3g mm; move it to the origin", std::abs(static_cast<double>(x)),
-                      static_cast<double>(kFarthest_mm));
+        std::snprintf(text, sizeof text,
+                      "the mesh has a corner %.3g mm from the origin, more than %.3g mm; move it to the origin",
+                      std::abs(static_cast<double>(x)), static_cast<double>(kFarthest_mm));
         return failure(ErrorCode::invalid_input, text);
       }
     }

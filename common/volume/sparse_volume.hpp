@@ -61,16 +61,18 @@ class SparseVolume {
  private:
   friend Result<void> save_volumes(const std::filesystem::path&, double,
                                    const std::vector<std::pair<std::string, const SparseVolume*>>&);
-  friend Result<std::vector<SparseVolume>> load_volumes(const std::filesystem::path&, const std::vector<std::string>&, const VdbLimits&);
+  friend Result<std::vector<SparseVolume>> load_volumes(const std::filesystem::path&, const std::vector<std::string>&,
+                                                        const VdbLimits&);
   std::unique_ptr<Impl> impl_;
 };
 
 // A .vdb file with the named grids, each with the lattice's transform. Errors name the file.
 [[nodiscard]] Result<void> save_volumes(const std::filesystem::path& file, double pitch_mm,
                                         const std::vector<std::pair<std::string, const SparseVolume*>>& volumes);
-// The grids in the order of `names`. Nothing is allocated for a file beyond the limits. Errors: not_found, invalid_input (no
-// such grid, wrong kind, damaged file), exhausted (beyond the limits).
+// The grids in the order of `names`. Nothing is allocated for a file beyond the limits. Errors: not_found,
+// invalid_input (no such grid, wrong kind, damaged file), exhausted (beyond the limits).
 [[nodiscard]] Result<std::vector<SparseVolume>> load_volumes(const std::filesystem::path& file,
-                                                             const std::vector<std::string>& names, const VdbLimits& limits);
+                                                             const std::vector<std::string>& names,
+                                                             const VdbLimits& limits);
 
 }  // namespace osteon

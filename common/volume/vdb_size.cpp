@@ -250,8 +250,8 @@ class GridWalk {
       throw Refusal{ErrorCode::exhausted,
                     "it would take more than " + std::to_string(limits_.memory_bytes >> 20) + " MiB of memory"};
     if (counted_ > limits_.leaves)
-      throw Refusal{ErrorCode::exhausted,
-                    "a grid of it is larger than any bone: it has more than " + std::to_string(limits_.leaves) + " leaves"};
+      throw Refusal{ErrorCode::exhausted, "a grid of it is larger than any bone: it has more than " +
+                                              std::to_string(limits_.leaves) + " leaves"};
   }
 
   Bytes& bytes_;

@@ -111,8 +111,9 @@ std::optional<Error> error_of_http(const std::string& said, const std::string& s
   if (at == std::string::npos) return {};
   const std::string status = said.substr(at + kStatus.size());
   if (status.starts_with("502") || status.starts_with("503") || status.starts_with("504"))
-    return Error{ErrorCode::unavailable, server + " is a proxy that reaches no Osteon server behind it (HTTP " + status +
-                                             "); see whether osteon-server runs there, with the proxy's --proxy-socket"};
+    return Error{ErrorCode::unavailable,
+                 server + " is a proxy that reaches no Osteon server behind it (HTTP " + status +
+                     "); see whether osteon-server runs there, with the proxy's --proxy-socket"};
   return Error{ErrorCode::unsupported, server + " is no Osteon server, but another one (HTTP " + status +
                                            "); give with --server the port that osteon-server printed"};
 }

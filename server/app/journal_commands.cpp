@@ -393,7 +393,8 @@ Result<void> forget_in_audit_too(const Arguments& given, const std::vector<std::
     if (!gone) return tl::unexpected(gone.error());
     forgotten += *gone;
   }
-  if (forgotten > 0) say("audit log", std::to_string(forgotten) + " identities forgotten (what they did stays, under pseudonyms)");
+  if (forgotten > 0)
+    say("audit log", std::to_string(forgotten) + " identities forgotten (what they did stays, under pseudonyms)");
   return {};
 }
 
@@ -461,7 +462,8 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
   const auto command = [&](const char* name, const char* what, Result<void> (*run)(const Arguments&)) {
     CLI::App* sub = app.add_subcommand(name, what);
     sub->add_option("file", given->file, "The journal; no server may have it open")->required();
-    sub->callback([&chosen, given, name, run] { chosen = [given, name, run] { return run_command(name, run, *given); }; });
+    sub->callback(
+        [&chosen, given, name, run] { chosen = [given, name, run] { return run_command(name, run, *given); }; });
     return sub;
   };
   const auto copies = [&](const char* name, const char* what, Result<void> (*run)(const Arguments&)) {

@@ -424,8 +424,9 @@ int main(int argc, char** argv) {
       "File of the key that signs journals, made where it is missing; by default signing.key beside the journals");
   app.add_option("--audit", options.audit_file,
                  "File that says who did what, signed; by default audit.log beside the journals");
-  app.add_option("--audit-syslog", options.audit_syslog,
-                 "Unix datagram socket of the system's log, such as /dev/log, that is sent the same records, with names");
+  app.add_option(
+      "--audit-syslog", options.audit_syslog,
+      "Unix datagram socket of the system's log, such as /dev/log, that is sent the same records, with names");
   app.add_option("--audit-retention-days", options.audit_retention_days,
                  "After so many days records are removed from the audit log; 0: never")
       ->check(CLI::Range(0, 36500))

@@ -265,7 +265,9 @@ Result<void> check_server_config(const ServerConfig& config) {
   if (!config.signing_key.empty() && !ways[0].second && !ways[1].second)
     return wrong("--signing-key signs journals, and none is kept; give --rooms FOLDER or --journal FILE too");
   if (!config.audit_syslog.empty() && config.audit_file.empty() && !ways[0].second && !ways[1].second)
-    return wrong("--audit-syslog sends audit records, and none are kept; give --audit FILE, --rooms FOLDER or --journal FILE too");
+    return wrong(
+        "--audit-syslog sends audit records, and none are kept; give --audit FILE, --rooms FOLDER or --journal FILE "
+        "too");
   if (ways[0].second && !config.save_file.empty())
     return wrong("--rooms excludes --save, on the command line as in a --config file; leave one");
   if (config.plain && config.most_ticket_hours != 0)

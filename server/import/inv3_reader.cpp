@@ -186,7 +186,8 @@ Result<CtScan> read_inv3(const fs::path& file, const KeepGoing& keep_going) try 
   scan.source = "InVesalius CT, " + imaging::describe(volume);
   return scan;
 } catch (const std::bad_alloc&) {
-  return failure(ErrorCode::exhausted, file.string() + " takes more memory than this machine has; export thicker slices");
+  return failure(ErrorCode::exhausted,
+                 file.string() + " takes more memory than this machine has; export thicker slices");
 }
 
 }  // namespace osteon::import

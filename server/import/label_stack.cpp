@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 constexpr int kBatch = 32;
 constexpr std::size_t kMostKinds = 250;
 constexpr double kLargestVolume = 1.0e9;  // voxels
-constexpr double kLargestSlice = 6.4e7;   // pixels: a small file can claim far more, and all of them are decoded at once
+constexpr double kLargestSlice = 6.4e7;  // pixels: a small file can claim far more, and all of them are decoded at once
 constexpr double kDensest_g_cm3 = 3.0;    // enamel
 
 struct Slice {
@@ -83,7 +83,8 @@ Result<std::vector<Rgba>> read_png(const fs::path& file, int& width, int& height
   const double count = static_cast<double>(image.width) * image.height;
   if (count > kLargestSlice) {
     png_image_free(&image);
-    return failure(ErrorCode::invalid_input, file.string() + " is " + std::to_string(image.width) + "x" + std::to_string(image.height) +
+    return failure(ErrorCode::invalid_input, file.string() + " is " + std::to_string(image.width) + "x" +
+                                                 std::to_string(image.height) +
                                                  ", more than the 64 million pixels of a slice; export it smaller");
   }
   pixels.resize(static_cast<std::size_t>(image.width) * image.height);

@@ -19,7 +19,8 @@ struct IntakeQuota {
   std::uint64_t archive_bytes = std::uint64_t{2} << 30;
   std::uint64_t unpacked_bytes = std::uint64_t{8} << 30;
   std::uint64_t kept_bytes = std::uint64_t{64} << 30;  // of all cases in the folder; what is under way comes on top
-  std::uint64_t memory_bytes = std::uint64_t{960} << 20;  // of the process that looks a case through; with its program 1 GiB
+  std::uint64_t memory_bytes = std::uint64_t{960}
+                               << 20;  // of the process that looks a case through; with its program 1 GiB
   std::chrono::seconds time = std::chrono::minutes(5);    // and its time
   // Of an upload, which holds one of few places: a line that is well has something in half a minute, and 2 GiB come within two
   // hours over one of 2.4 Mbit/s.

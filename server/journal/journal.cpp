@@ -217,8 +217,9 @@ Result<void> Journal::begin_signing() {
   const Result<bool> erased = is_vouched_for(kErasedRegister);
   if (!erased) return tl::unexpected(erased.error());
   if (any && !*erased)
-    return failure(ErrorCode::unavailable,
-                   state.path.string() + ": somebody without this server's key has replaced rows of it; go on from a backup");
+    return failure(
+        ErrorCode::unavailable,
+        state.path.string() + ": somebody without this server's key has replaced rows of it; go on from a backup");
   if (any && last->head.place == head) {
     state.signed_since = last->since;
     return {};

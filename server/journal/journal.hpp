@@ -111,10 +111,12 @@ class Journal {
   [[nodiscard]] Result<std::size_t> forget_people_before(std::int32_t day);  // who joined before it
   [[nodiscard]] Result<std::size_t> forget_people_if(const std::function<bool(const Person&)>& whom);
 
-  // Puts what `without` returns in place of a row, where it returns something. Asked for all rows in their order. The chain, its
-  // signatures and what witnesses know stay. No byte of what was there before is left in the journal's files. Error denied: it is
-  // signed, and there is no key to sign this. Returns how many rows are others now. Takes as long as reading and writing them.
-  [[nodiscard]] Result<std::size_t> erase_rows(const std::function<std::optional<std::string>(const JournalRow&)>& without);
+  // Puts what `without` returns in place of a row, where it returns something. Asked for all rows in their order. The
+  // chain, its signatures and what witnesses know stay. No byte of what was there before is left in the journal's
+  // files. Error denied: it is signed, and there is no key to sign this. Returns how many rows are others now. Takes as
+  // long as reading and writing them.
+  [[nodiscard]] Result<std::size_t> erase_rows(
+      const std::function<std::optional<std::string>(const JournalRow&)>& without);
 
   // Carries the rows of the log into the database, if there are some hundred: for when the room is idle, since it takes
   // a few syncs. An error closes the journal to rows.

@@ -613,7 +613,8 @@ void JournalFile::inspect_beside(bool files, Inspection& found) {
   inspect_log(found);
   inspect_signatures(found);
   if (!erased_.empty())
-    found.notes.push_back("words were erased from " + std::to_string(erased_.size()) + " rows; the chain keeps what their hash was");
+    found.notes.push_back("words were erased from " + std::to_string(erased_.size()) +
+                          " rows; the chain keeps what their hash was");
   if (const auto bytes = find_register(kFooterRegister); !bytes) {
     note(bytes.error());
   } else if (*bytes) {

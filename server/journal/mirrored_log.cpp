@@ -381,7 +381,8 @@ Result<void> MirroredLog::wipe() {
   const std::string zeros(std::size_t{1} << 16, '\0');
   for (Member* member : {&log_, &mirror_}) {
     for (std::uint64_t at = member->end; at < member->written; at += zeros.size()) {
-      const std::string_view piece = std::string_view(zeros).substr(0, std::min<std::uint64_t>(zeros.size(), member->written - at));
+      const std::string_view piece =
+          std::string_view(zeros).substr(0, std::min<std::uint64_t>(zeros.size(), member->written - at));
       if (Result<void> put = member->file->write_at(at, piece); !put) return put;
     }
     if (Result<void> synced = sync(*member); !synced) return synced;

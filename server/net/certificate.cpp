@@ -35,7 +35,8 @@ void log_server_certificate(const std::filesystem::path& pem, std::chrono::sys_s
   log::info("server certificate", {{"for", machines}, {"until", wire::text_of(valid.ends)}});
   const auto warn = [](const std::string& said) { log::warn("server certificate", {{"said", said}}); };
   if (now >= valid.ends)
-    warn("it expired at " + wire::text_of(valid.ends) + ", and no client takes it; make a new one with deploy/certs server");
+    warn("it expired at " + wire::text_of(valid.ends) +
+         ", and no client takes it; make a new one with deploy/certs server");
   if (now < valid.begins)
     warn("it holds only from " + wire::text_of(valid.begins) + " on, and no client takes it; set this machine's clock");
   if (machines == wire::kNoMachine)

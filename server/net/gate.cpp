@@ -33,7 +33,8 @@ Result<std::string> read_all(const std::filesystem::path& file) {
   std::error_code unknown;
   const std::filesystem::path folder = file.parent_path();
   if (std::filesystem::exists(folder / "person.pem", unknown) || std::filesystem::exists(folder / "people", unknown))
-    return failure(ErrorCode::not_found, folder.string() + " is no folder of a server; give the one that deploy/certs " +
+    return failure(ErrorCode::not_found, folder.string() +
+                                             " is no folder of a server; give the one that deploy/certs " +
                                              "server made, such as certs/server");
   return failure(ErrorCode::not_found, file.string() + " cannot be read; deploy/certs makes what --certificates needs");
 }
@@ -192,7 +193,8 @@ std::optional<Refusal> Gate::judge_handshake(std::string_view chain_pem) {
   const std::string from = connections_ ? some_addresses(*connections_) : "";
   refusals_.note(refusal->reason, who, refusal->sentence, from);
   if (trail_) {
-    AuditEvent event{.who = {.address = from}, .action = "handshake", .result = kRefused, .detail = std::string(refusal->reason)};
+    AuditEvent event{
+        .who = {.address = from}, .action = "handshake", .result = kRefused, .detail = std::string(refusal->reason)};
     if (certificate) {
       event.who.person = is_verified ? certificate->user : std::string(kClaimed) + certificate->user;
       event.who.certificate = certificate->serial;
@@ -557,11 +559,12 @@ void Gate::look() {
     refusals_.count(why.reason);
     log::warn("stream ended", {{"who", stream->caller.user}, {"reason", why.reason}, {"said", why.sentence}});
     if (trail_)
-      trail_->record({.who = {stream->caller.user, stream->caller.serial, stream->caller.ticket_id, stream->caller.address},
-                      .action = std::string(call_name(stream->method)),
-                      .object = stream->room,
-                      .result = kRefused,
-                      .detail = "ended: " + std::string(why.reason)});
+      trail_->record(
+          {.who = {stream->caller.user, stream->caller.serial, stream->caller.ticket_id, stream->caller.address},
+           .action = std::string(call_name(stream->method)),
+           .object = stream->room,
+           .result = kRefused,
+           .detail = "ended: " + std::string(why.reason)});
     stream->end(why);
   }
 }

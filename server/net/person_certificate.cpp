@@ -73,8 +73,9 @@ std::optional<std::vector<Crl>> lists_of(std::string_view pem) { return all_of<C
 // As strong as the TLS of Debian asks for: 112 bits, no SHA-1.
 constexpr int kSecurityLevel = 2;
 
-// A list out of its time is used on, and an authority without a list revokes nobody by one. OpenSSL asks for revocations before it
-// looks at signatures and times: it goes on, so that only a certificate that is sound otherwise is called revoked.
+// A list out of its time is used on, and an authority without a list revokes nobody by one. OpenSSL asks for
+// revocations before it looks at signatures and times: it goes on, so that only a certificate that is sound otherwise
+// is called revoked.
 int accept_old_lists(int ok, X509_STORE_CTX* context) {
   const int error = X509_STORE_CTX_get_error(context);
   if (error == X509_V_ERR_CERT_REVOKED) {

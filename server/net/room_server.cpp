@@ -68,7 +68,8 @@ constexpr int kMaxSendBytes = 4 * 1024 * 1024;     // a piece of a case is 1 MiB
 constexpr int kShortestPingMs = 500;               // clients may ask that often whether the server lives
 constexpr int kMostStreams = 64;                   // of one connection
 constexpr int kMostMetadataBytes = 8 * 1024;       // of one call; a ticket is below 1 kB
-// Calls that are begun and reset are bounded after each read (call_flood.hpp); a read of gRPC's 4 MiB has 20 000 of them.
+// Calls that are begun and reset are bounded after each read (call_flood.hpp); a read of gRPC's 4 MiB has 20 000 of
+// them.
 constexpr int kMostReadBytes = 64 * 1024;
 constexpr int kHandshakeMs = 5'000;                // for those who have not shown who they are
 constexpr std::size_t kMostTransportBytes = std::size_t{512} << 20;  // of all connections, in gRPC
@@ -219,8 +220,9 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   };
   if (!impl->gate)
     impl->listener->watch_for_tls([watch = impl->handshakes.get()] {
-      watch->note("a stranger: TLS", "it speaks TLS, and this server plain text; give the server --certificates DIR, or "
-                                     "the client --plain");
+      watch->note("a stranger: TLS",
+                  "it speaks TLS, and this server plain text; give the server --certificates DIR, or "
+                  "the client --plain");
     });
   impl->listener->start(hand_to(impl->acceptor.get()));
   if (impl->proxy_listener) impl->proxy_listener->start(hand_to(impl->proxy_acceptor.get()));

@@ -29,7 +29,8 @@ struct DoorOptions {
   std::string udp_listen{};
   std::chrono::hours most_ticket_life{0};  // tickets that are good for longer are refused; zero: none is
   FloodLimit flood{};  // of calls over one connection
-  // After so long without a word a client is asked whether it lives; one that does not answer for as long again is gone.
+  // After so long without a word a client is asked whether it lives; one that does not answer for as long again is
+  // gone.
   std::chrono::milliseconds keepalive = std::chrono::seconds(10);
   // After which calls go over a new connection, with a new handshake and the authority's certificates as they are then. Streams go
   // on over the old one for `longest_session` more; then it is closed, and sessions come again by themselves.

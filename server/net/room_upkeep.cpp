@@ -166,7 +166,10 @@ Result<std::vector<Person>> RoomKeeper::people() {
 }
 
 Result<bool> RoomKeeper::forget(std::uint32_t person) {
-  return with_journal([&](Journal& journal) { return forget_people(journal, [](const Person&) { return false; }, person); })
+  return with_journal([&](Journal& journal) {
+           return forget_people(
+               journal, [](const Person&) { return false; }, person);
+         })
       .and_then([&](const Forgotten& forgotten) {
         return forget_owner(file_, forgotten).map([&] { return forgotten.people + forgotten.rows > 0; });
       });
@@ -176,9 +179,10 @@ Result<std::size_t> RoomKeeper::forget_old() {
   return with_journal([&](Journal& journal) -> Result<std::size_t> {
     if (retention_days_ <= 0) return 0;
     const std::int32_t day = today_() - retention_days_;
-    return forget_people(journal, [&](const Person& person) { return person.joined_day < day; }).and_then([&](const Forgotten& forgotten) {
-      return forget_owner(file_, forgotten).map([&] { return forgotten.people; });
-    });
+    return forget_people(journal, [&](const Person& person) { return person.joined_day < day; })
+        .and_then([&](const Forgotten& forgotten) {
+          return forget_owner(file_, forgotten).map([&] { return forgotten.people; });
+        });
   });
 }
 

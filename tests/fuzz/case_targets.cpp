@@ -80,8 +80,12 @@ Bytes some_fields() {
   field.apply(test::straight_cut(drill, {2, 2, 2}, {2, 2, -2}, {0, 0, -1}));
   const InputFile file("fields.vdb");
   const fs::path path = file.write({});
-  SavedFields saved{.case_hash = a_case().hash(), .kernel_version = kKernelVersion, .room_seq = {1}, .pitch_mm = kPitch_mm,
-                    .leaves = field.leaves(), .bodies = {BodyId{0}}};
+  SavedFields saved{.case_hash = a_case().hash(),
+                    .kernel_version = kKernelVersion,
+                    .room_seq = {1},
+                    .pitch_mm = kPitch_mm,
+                    .leaves = field.leaves(),
+                    .bodies = {BodyId{0}}};
   OSTEON_CHECK(save_fields(path, saved));
   Bytes bytes = bytes_of_file(path);
   bytes.resize(bytes.size() - kSeal.size() - sizeof(Digest::bytes));
@@ -91,14 +95,18 @@ Bytes some_fields() {
 }  // namespace
 
 Target case_info_target() {
-  Target target{"case_info", [](std::span<const std::uint8_t> data) { read_with(data, "case.json"); }, {CaseFolder().file("case.json")}};
+  Target target{"case_info",
+                [](std::span<const std::uint8_t> data) { read_with(data, "case.json"); },
+                {CaseFolder().file("case.json")}};
   target.change = change_number;
   target.mutations = 200;
   return target;
 }
 
 Target bone_volume_target() {
-  Target target{"bone_volume", [](std::span<const std::uint8_t> data) { read_with(data, "bone.vdb"); }, {CaseFolder().file("bone.vdb")}};
+  Target target{"bone_volume",
+                [](std::span<const std::uint8_t> data) { read_with(data, "bone.vdb"); },
+                {CaseFolder().file("bone.vdb")}};
   target.mutations = 0;  // in a test run, until load_volumes() bounds the memory that a damaged file claims
   return target;
 }

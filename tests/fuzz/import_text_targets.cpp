@@ -36,7 +36,8 @@ void read_legend(std::span<const std::uint8_t> data) {
   const auto legend = import::read_legend(file.write(data));
   if (!legend) return expect_bounded(legend.error());
   OSTEON_CHECK(!legend->bones.empty());
-  for (const import::BoneColour& bone : legend->bones) OSTEON_CHECK(bone.density_g_cm3 > 0.0 && bone.density_g_cm3 <= 3.0);
+  for (const import::BoneColour& bone : legend->bones)
+    OSTEON_CHECK(bone.density_g_cm3 > 0.0 && bone.density_g_cm3 <= 3.0);
 }
 
 Target text_target(std::string name, void (*read)(std::span<const std::uint8_t>), std::vector<Bytes> seeds) {
@@ -57,20 +58,22 @@ Target tool_file_target() {
 }
 
 Target carve_script_target() {
-  return text_target("carve_script", read_script,
-                     {bytes_of_text("steps:\n"
-                                    "  - {tool: burr-round-5, from: [10, 0, 5], to: [20, 0, 5], axis: [0, 0, -1], level: 1}\n"
-                                    "  - tool: saw-oscillating-1\n"
-                                    "    path:\n"
-                                    "      - {at: [0, 0, 0], axis: [0, 0, -1], across: [1, 0, 0]}\n"
-                                    "      - {at: [0, 8, -6], axis: [0, 0, -1], across: [1, 0, 0]}\n"),
-                      bytes_of_text("steps: [{tool: drill-3.2, at: [1, 2, 3], axis: [0, 1, -1]}]\n")});
+  return text_target(
+      "carve_script", read_script,
+      {bytes_of_text("steps:\n"
+                     "  - {tool: burr-round-5, from: [10, 0, 5], to: [20, 0, 5], axis: [0, 0, -1], level: 1}\n"
+                     "  - tool: saw-oscillating-1\n"
+                     "    path:\n"
+                     "      - {at: [0, 0, 0], axis: [0, 0, -1], across: [1, 0, 0]}\n"
+                     "      - {at: [0, 8, -6], axis: [0, 0, -1], across: [1, 0, 0]}\n"),
+       bytes_of_text("steps: [{tool: drill-3.2, at: [1, 2, 3], axis: [0, 1, -1]}]\n")});
 }
 
 Target legend_target() {
-  return text_target("legend", read_legend,
-                     {bytes_of_text("tolerance: 4\nbones:\n  - {name: cortical, colour: [255, 249, 219], density_g_cm3: 1.9}\n"
-                                    "  - {name: cancellous, colour: [200, 1, 0]}\n")});
+  return text_target(
+      "legend", read_legend,
+      {bytes_of_text("tolerance: 4\nbones:\n  - {name: cortical, colour: [255, 249, 219], density_g_cm3: 1.9}\n"
+                     "  - {name: cancellous, colour: [200, 1, 0]}\n")});
 }
 
 }  // namespace osteon::fuzz

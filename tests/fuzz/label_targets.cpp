@@ -20,7 +20,8 @@ Bytes a_slice(png_uint_32 format) {
   const std::size_t channels = PNG_IMAGE_SAMPLE_CHANNELS(format);
   std::vector<png_byte> pixels;
   for (int i = 0; i < kWidth * kHeight; ++i)
-    for (std::size_t channel = 0; channel < channels; ++channel) pixels.push_back(i % 7 == 0 ? png_byte{0} : kBone[channel]);
+    for (std::size_t channel = 0; channel < channels; ++channel)
+      pixels.push_back(i % 7 == 0 ? png_byte{0} : kBone[channel]);
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
   image.width = kWidth;
@@ -40,7 +41,8 @@ void read_slice(std::span<const std::uint8_t> data) {
   auto stack = import::read_label_stack(file.folder(), legend, Vec3(0.5, 0.75, 1.0), going);
   if (!stack) return expect_bounded(stack.error());
   if (stack->volume.labels.values.size() > kSmall) return;
-  const auto made = import::import_labels(std::move(*stack), legend, {.pitch_mm = {}, .title = "Labels", .smoothing = {}}, going);
+  const auto made =
+      import::import_labels(std::move(*stack), legend, {.pitch_mm = {}, .title = "Labels", .smoothing = {}}, going);
   if (!made) return expect_bounded(made.error());
   OSTEON_CHECK(made->labelled_mm3 > 0.0 && made->bone.volume_mm3() > 0.0);
 }
@@ -48,7 +50,8 @@ void read_slice(std::span<const std::uint8_t> data) {
 }  // namespace
 
 Target label_slice_target() {
-  Target target{"label_slice", read_slice, {a_slice(PNG_FORMAT_RGBA), a_slice(PNG_FORMAT_RGB), a_slice(PNG_FORMAT_GRAY)}};
+  Target target{
+      "label_slice", read_slice, {a_slice(PNG_FORMAT_RGBA), a_slice(PNG_FORMAT_RGB), a_slice(PNG_FORMAT_GRAY)}};
   target.mutations = 50;
   return target;
 }

@@ -51,8 +51,8 @@ void choose(std::span<char*> arguments) {
 }  // namespace
 }  // namespace osteon::fuzz
 
-// GDCM and OpenVDB ask for what a damaged file claims. The child that the import reads it in has a limit of memory and takes std::bad_alloc
-// for a damaged file; under the address sanitizer the limit is here.
+// GDCM and OpenVDB ask for what a damaged file claims. The child that the import reads it in has a limit of memory and
+// takes std::bad_alloc for a damaged file; under the address sanitizer the limit is here.
 void* operator new(std::size_t bytes) {
   constexpr std::size_t kMost = std::size_t{256} << 20;
   void* memory = bytes > kMost ? nullptr : std::malloc(std::max<std::size_t>(bytes, 1));
@@ -60,8 +60,12 @@ void* operator new(std::size_t bytes) {
   return memory;
 }
 void* operator new[](std::size_t bytes) { return operator new(bytes); }
-void* operator new(std::size_t bytes, const std::nothrow_t&) noexcept { return std::malloc(std::max<std::size_t>(bytes, 1)); }
-void* operator new[](std::size_t bytes, const std::nothrow_t&) noexcept { return std::malloc(std::max<std::size_t>(bytes, 1)); }
+void* operator new(std::size_t bytes, const std::nothrow_t&) noexcept {
+  return std::malloc(std::max<std::size_t>(bytes, 1));
+}
+void* operator new[](std::size_t bytes, const std::nothrow_t&) noexcept {
+  return std::malloc(std::max<std::size_t>(bytes, 1));
+}
 void operator delete(void* memory) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 void operator delete[](void* memory) noexcept { std::free(memory); }

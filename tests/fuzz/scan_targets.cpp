@@ -64,7 +64,10 @@ std::string a_slice(const std::string& syntax) {
   DataSet meta(true);
   meta.add(2, 2, "UI", ct).add(2, 3, "UI", "1.2.3.4.5").add(2, 0x10, "UI", syntax);
   DataSet data(syntax == kExplicit);
-  data.add(8, 8, "CS", "ORIGINAL\\PRIMARY\\AXIAL").add(8, 0x16, "UI", ct).add(8, 0x18, "UI", "1.2.3.4.5").add(8, 0x60, "CS", "CT");
+  data.add(8, 8, "CS", "ORIGINAL\\PRIMARY\\AXIAL")
+      .add(8, 0x16, "UI", ct)
+      .add(8, 0x18, "UI", "1.2.3.4.5")
+      .add(8, 0x60, "CS", "CT");
   data.add(8, 0x103e, "LO", "HEAD 1.0").add(0x18, 0x1210, "SH", "H60s");
   data.add(0x20, 0x0e, "UI", "1.2.3.4").add(0x20, 0x11, "IS", "1").add(0x20, 0x32, "DS", "-10\\-20\\30");
   data.add(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0").add_number(0x28, 2, 1).add(0x28, 4, "CS", "MONOCHROME2");
@@ -94,18 +97,20 @@ void read_slice(const fs::path& file) {
   if (!chosen) return expect_bounded(chosen.error());
   const import::CtSeries& taken = series[*chosen];
   if (taken.fault) return expect_bounded(taken.fault->error);
-  const std::size_t pixels = static_cast<std::size_t>(taken.grid.dims[0]) * static_cast<std::size_t>(taken.grid.dims[1]);
+  const std::size_t pixels =
+      static_cast<std::size_t>(taken.grid.dims[0]) * static_cast<std::size_t>(taken.grid.dims[1]);
   std::vector<std::int16_t> out(pixels);
   const auto read = import::read_pixels(taken.slices.front(), file, "a", out);
   if (!read) expect_bounded(read.error());
 }
 
-// GDCM aborts by assert() on some damaged files, so the import reads them in processes that may die. Here such an input is
-// left instead, and what the library held is lost.
+// GDCM aborts by assert() on some damaged files, so the import reads them in processes that may die. Here such an input
+// is left instead, and what the library held is lost.
 std::jmp_buf on_assertion;
 bool in_library = false;
 
-// What the library may allocate while it reads one input, as in the child that the import starts. Returns what was allowed before.
+// What the library may allocate while it reads one input, as in the child that the import starts. Returns what was
+// allowed before.
 rlimit allow_memory(rlim_t more_bytes) {
   rlimit before{}, limit{};
   ::getrlimit(RLIMIT_AS, &before);
@@ -159,17 +164,22 @@ void read_archive(std::span<const std::uint8_t> data) {
 
 Bytes a_project(bool gzip) {
   const std::string list =
-      "<?xml version=\"1.0\"?><plist version=\"1.0\"><dict><key>modality</key><string>CT</string><key>orientation</key><integer>1</integer>"
-      "<key>matrix</key><dict><key>dtype</key><string>int16</string><key>filename</key><string>matrix.dat</string><key>shape</key><array>"
-      "<integer>2</integer><integer>3</integer><integer>4</integer></array></dict><key>spacing</key><array><real>0.5</real><real>0.75</real>"
+      "<?xml version=\"1.0\"?><plist "
+      "version=\"1.0\"><dict><key>modality</key><string>CT</string><key>orientation</key><integer>1</integer>"
+      "<key>matrix</key><dict><key>dtype</key><string>int16</string><key>filename</key><string>matrix.dat</"
+      "string><key>shape</key><array>"
+      "<integer>2</integer><integer>3</integer><integer>4</integer></array></dict><key>spacing</key><array><real>0.5</"
+      "real><real>0.75</real>"
       "<real>2.0</real></array></dict></plist>";
-  return an_archive({{"tmp/matrix.dat", std::string(48, 'm')}, {"tmp/main.plist", list}}, {.format = "pax", .gzip = gzip});
+  return an_archive({{"tmp/matrix.dat", std::string(48, 'm')}, {"tmp/main.plist", list}},
+                    {.format = "pax", .gzip = gzip});
 }
 
 }  // namespace
 
 // [any thread] Takes the C library's place for the library's assertions alone.
-extern "C" [[noreturn]] void __assert_fail(const char* expression, const char* file, unsigned line, const char*) noexcept {
+extern "C" [[noreturn]] void __assert_fail(const char* expression, const char* file, unsigned line,
+                                           const char*) noexcept {
   if (std::exchange(in_library, false)) std::longjmp(on_assertion, 1);
   std::fprintf(stderr, "%s:%u: assertion failed: %s\n", file, line, expression);
   std::abort();
@@ -192,11 +202,13 @@ Target inv3_target() {
 }
 
 Target scan_archive_target() {
-  const std::vector<std::pair<std::string, std::string>> files{{"CD/IM1", a_slice(kExplicit)}, {"CD/README.TXT", "nothing"}};
-  Target target{"scan_archive",
-                read_archive,
-                {an_archive(files, {}), an_archive(files, {.zip_compression = "store"}), an_archive(files, {.format = "pax"}),
-                 an_archive(files, {.format = "pax", .gzip = true}), an_archive(files, {.format = "iso9660"})}};
+  const std::vector<std::pair<std::string, std::string>> files{{"CD/IM1", a_slice(kExplicit)},
+                                                               {"CD/README.TXT", "nothing"}};
+  Target target{
+      "scan_archive",
+      read_archive,
+      {an_archive(files, {}), an_archive(files, {.zip_compression = "store"}), an_archive(files, {.format = "pax"}),
+       an_archive(files, {.format = "pax", .gzip = true}), an_archive(files, {.format = "iso9660"})}};
   target.mutations = 50;
   return target;
 }

@@ -80,7 +80,8 @@ TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
   EXPECT_THAT(turned_away({}, {.environment = {}, .without = {}, .folder = {}, .as_given = true}), HasSubstr("--certificates DIR with --ticket FILE"));
   EXPECT_THAT(turned_away({"--plain"}), HasSubstr("asks for a certificate"));
   People strangers;
-  EXPECT_THAT(turned_away({"--certificates", strangers.person("sue"), "--ticket", ticket("sue", "trainee")}), HasSubstr("is not of the authority in"));
+  EXPECT_THAT(turned_away({"--certificates", strangers.person("sue"), "--ticket", ticket("sue", "trainee")}),
+              HasSubstr("is not of the authority in"));
   say_nonsense();
 
   // With a certificate, and a ticket that does not fit.

@@ -102,7 +102,8 @@ TEST_F(Uploads, ErrorsNameNoPathsAndNoProcesses) {
 
   std::vector<fs::path> journals;
   for (const auto& entry : fs::directory_iterator(rooms_.path()))
-    if (entry.path().filename().string().starts_with("damaged") && entry.path().extension() != ".backup") journals.push_back(entry.path());
+    if (entry.path().filename().string().starts_with("damaged") && entry.path().extension() != ".backup")
+      journals.push_back(entry.path());
   ASSERT_FALSE(journals.empty());
   for (const fs::path& journal : journals) std::ofstream(journal, std::ios::trunc) << "no journal";
   expect_told(ask("rooms", {"resume", "damaged"}), "no journal");

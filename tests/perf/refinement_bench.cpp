@@ -1,5 +1,6 @@
-// The two methods of raising the resolution (Niu 2008, §5.5, Table 5.4), at twice and four times: time of a cut that touches
-// new bone and of the later ones, memory, unconnected areas, and the finest pitch that a given memory allows. Prints JSON.
+// The two methods of raising the resolution (Niu 2008, §5.5, Table 5.4), at twice and four times: time of a cut that
+// touches new bone and of the later ones, memory, unconnected areas, and the finest pitch that a given memory allows.
+// Prints JSON.
 #include <tbb/global_control.h>
 
 #include <algorithm>

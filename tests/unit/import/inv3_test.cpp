@@ -92,7 +92,8 @@ std::string tar_entry(const std::string& name, std::uint64_t size) {
 TEST(Inv3, AMatrixThatClaimsTwoTerabytesTakesNoMemory) {
   const test::TempDir folder;
   std::string list =
-      "<plist><dict><key>matrix</key><dict><key>dtype</key><string>int16</string><key>filename</key><string>matrix.dat</string>"
+      "<plist><dict><key>matrix</key><dict><key>dtype</key><string>int16</string><key>filename</"
+      "key><string>matrix.dat</string>"
       "<key>shape</key><array><integer>4000</integer><integer>16384</integer><integer>16384</integer></array></dict>"
       "<key>spacing</key><array><real>1</real><real>1</real><real>1</real></array></dict></plist>";
   const std::string head = tar_entry("main.plist", list.size());
