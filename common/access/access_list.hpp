@@ -26,6 +26,10 @@ class AccessList {
 
   // The reason, one sentence; nothing where all three may come in. Serial numbers and ids in any writing of hexadecimal.
   [[nodiscard]] std::optional<std::string> refuses(std::string_view serial, std::string_view user, std::string_view ticket_id) const;
+  // Whether the other list revokes the same certificates, users and tickets.
+  [[nodiscard]] bool revokes_as(const AccessList& other) const {
+    return serials_ == other.serials_ && users_ == other.users_ && tickets_ == other.tickets_;
+  }
   // What holds instead of the ticket's role.
   [[nodiscard]] Role role(std::string_view user, std::string_view room, Role of_ticket) const;
   [[nodiscard]] std::size_t size() const { return serials_.size() + users_.size() + tickets_.size() + roles_.size(); }

@@ -3,6 +3,12 @@
 #include <algorithm>
 
 namespace osteon {
+namespace {
+
+// "Input/output error" says the system, "disk I/O error" SQLite: no paths.
+bool is_of_an_error_text(std::string_view word) { return word == "Input/output" || word == "I/O"; }
+
+}  // namespace
 
 std::string bounded_text(std::string_view text, std::size_t most) {
   const auto is_inside_letter = [&](std::size_t at) { return (static_cast<unsigned char>(text[at]) & 0xc0u) == 0x80u; };
@@ -28,7 +34,7 @@ std::string without_paths(std::string_view text) {
     std::string_view word = text.substr(0, size);
     // What ends in a slash is a folder.
     while (word.size() > 1 && word.ends_with('/')) word.remove_suffix(1);
-    word.remove_prefix(std::min(word.rfind('/') + 1, word.size()));
+    if (!is_of_an_error_text(word)) word.remove_prefix(std::min(word.rfind('/') + 1, word.size()));
     kept += word.substr(0, word.find(kPartial));
     if (const std::size_t partial = word.find(kPartial); partial != word.npos) {
       word.remove_prefix(partial + kPartial.size());

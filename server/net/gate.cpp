@@ -50,12 +50,6 @@ std::string article(Role role) {
   return (std::string_view("aeiou").find(name.front()) == std::string_view::npos ? "a " : "an ") + name;
 }
 
-// "RoomService/Undo" of "/osteon.v1.RoomService/Undo".
-std::string_view short_name(std::string_view method) {
-  const std::size_t dot = method.rfind('.');
-  return dot == std::string_view::npos ? method : method.substr(dot + 1);
-}
-
 std::string changed_role(Role role) { return "your role has changed to " + std::string(to_string(role)) + "; join anew"; }
 
 template <class Map>
@@ -274,7 +268,7 @@ std::optional<Refusal> Gate::judge_again(Caller& caller, const std::string& room
   caller.role = access_list_.role(caller.user, room, caller.ticket_role);
   if (method.empty() || may_call(caller.role, method)) return {};
   if (!find_call(method)) return Refusal{"call", true, "this server has no such call"};
-  return Refusal{"role", true, article(caller.role) + " may not call " + std::string(short_name(method)) +
+  return Refusal{"role", true, article(caller.role) + " may not call " + std::string(call_name(method)) +
                                    "; ask whoever runs the server for a ticket of another role"};
 }
 
@@ -504,9 +498,11 @@ void Gate::refresh() {
     told = fault;
   };
   const Result<bool> list = access_.refresh();
+  bool is_revocation = false;
   if (list && *list) {
     log::info("access list", {{"entries", access_.list().size()}});
     const std::lock_guard lock(mutex_);
+    is_revocation = !access_.list().revokes_as(access_list_);
     access_list_ = access_.list();
   }
   tell("access list", list, access_fault_);
@@ -516,7 +512,8 @@ void Gate::refresh() {
   const Result<bool> keys = read_ticket_keys();
   if (keys && *keys) log::info("ticket keys", {{"keys", ticket_keys_.size()}});
   tell("ticket keys were not read, and those before count on", keys, keys_fault_);
-  revoked_anew_ = (list && *list) || (authorities && *authorities);
+  // A changed role alone closes no connection: those before a first call would be closed with it.
+  revoked_anew_ = is_revocation || (authorities && *authorities);
 }
 
 void Gate::close_revoked() {

@@ -210,7 +210,8 @@ std::string BreakerJudge::unsaid_failure(Server& server, LightHand& hand, const 
   const std::string why = *hand.ended();
   Oracle later;
   const auto stranger = LightHand::come(server.address, "", later, 1);
-  if (!has(why, "the room takes no more cuts") || !has(why, file) || !has(why, "recover"))
+  // The client learns the file's name. Where it lies is in the server's log alone.
+  if (!has(why, "the room takes no more cuts") || !has(why, fs::path(file).filename().string()) || !has(why, "recover"))
     return "a client is told no reason, file or remedy: " + why;
   if (!stranger)
     return has(stranger.error().message, "takes no more") ? "" : "who comes is told: " + stranger.error().message;

@@ -92,7 +92,7 @@ TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
   EXPECT_THAT(turned_away(door("eve", strangers.ticket("eve", "room", Role::instructor))), HasSubstr("signature"));
   const RunResult closing = run(program("osteon-server"), plus({"rooms", "close", "room", "--server", stage_.address()}, door("eve", ticket("eve", "instructor"))));
   EXPECT_NE(closing.exit_code, 0);
-  EXPECT_THAT(closing.err, HasSubstr("an instructor may not call RoomsService/CloseRoom"));
+  EXPECT_THAT(closing.err, HasSubstr("an instructor may not call CloseRoom"));
 
   // In the middle of it: one is revoked, another's role is taken away.
   EXPECT_TRUE(ben.running()) << ben.err();
@@ -106,7 +106,7 @@ TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
   const auto dora_ended = dora.wait(20s);
   ASSERT_TRUE(dora_ended.has_value());
   EXPECT_NE(*dora_ended, 0);
-  EXPECT_THAT(dora.err(), HasSubstr("an observer may not call CuttingService/Session"));
+  EXPECT_THAT(dora.err(), HasSubstr("an observer may not call Session"));
 
   // She has noticed nothing.
   ASSERT_EQ(sue.wait(120s), 0) << sue.err();

@@ -59,6 +59,8 @@ TEST(WithoutPaths, LeavesTheLastNames) {
   EXPECT_EQ(without_paths("cannot rename /x/sound.partial-4711 to /x/sound"), "cannot rename sound to sound");
   EXPECT_EQ(without_paths("/"), "");
   EXPECT_EQ(without_paths("a room"), "a room");
+  EXPECT_EQ(without_paths("cannot sync /x/a: Input/output error"), "cannot sync a: Input/output error");
+  EXPECT_EQ(without_paths("/x/a: disk I/O error"), "a: disk I/O error");
 }
 
 TEST(BoundedText, IsOneLineOfSoManyBytes) {

@@ -112,7 +112,7 @@ TEST_F(GoingOn, ADemonstrationEndsWithTheRightOfWhoStartedIt) {
   EXPECT_TRUE(test::wait_until([&] { return sessions() == 3; }, test::kPatience));
   people_.certs({"revoke", "ira"});
   EXPECT_TRUE(test::wait_until([&] { return sessions() == 2; }, test::kPatience));
-  EXPECT_THAT(end(ida, of_ina).error_message(), HasSubstr("may not call PeopleService/Demonstrate"));
+  EXPECT_THAT(end(ida, of_ina).error_message(), HasSubstr("may not call Demonstrate"));
   const grpc::Status revoked = end(ida, of_ira);
   EXPECT_EQ(revoked.error_code(), StatusCode::NOT_FOUND);
   EXPECT_THAT(revoked.error_message(), HasSubstr("revoked"));
@@ -211,7 +211,7 @@ TEST_F(Uploads, EndAlsoWhileTheyAreLookedThrough) {
   people_.append_access("role otto instructor");
   const grpc::Status end = sending.writer->Finish();
   EXPECT_EQ(end.error_code(), StatusCode::PERMISSION_DENIED) << end.error_message();
-  EXPECT_THAT(end.error_message(), HasSubstr("an instructor may not call CaseService/UploadCase"));
+  EXPECT_THAT(end.error_message(), HasSubstr("an instructor may not call UploadCase"));
   EXPECT_TRUE(nothing_is_left());
 }
 

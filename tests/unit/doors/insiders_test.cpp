@@ -152,6 +152,16 @@ TEST_F(Insiders, WhoAreRevokedLoseTheConnectionsThatTheyHave) {
   EXPECT_TRUE(test::wait_until([&] { return server_->door_health().connections.open == 1; }, kPatience));
 }
 
+// Whoever is about to make a first call notices nothing of the role of somebody else.
+TEST_F(Insiders, LoseNoConnectionByAChangedRole) {
+  RawHttp2 line(address(), people_.person("anna"));
+  ASSERT_TRUE(line.read(5s).has_value());
+  people_.append_access("role mallory observer ward");
+  for (int i = 0; i < 3; ++i) server_->rooms().gate->look();
+  ASSERT_TRUE(line.call(1, kGetStatus));
+  EXPECT_TRUE(is_answered(line));
+}
+
 // A revocation list as other authorities write it holds as the server's own list does.
 TEST_F(Insiders, AreRevokedByAListOfTheAuthorityAlone) {
   const std::filesystem::path list = people_.server() / "access.txt";

@@ -399,7 +399,7 @@ TEST_F(Matrices, DatagramsBringEveryHandAllThatIsForIt) {
     people_.append_access("role " + name + " observer ward");
     ASSERT_TRUE(line.drive([&] { return hand.session_end().has_value(); }));
     EXPECT_EQ(hand.session_end()->error_code(), StatusCode::PERMISSION_DENIED);
-    EXPECT_THAT(hand.session_end()->error_message(), HasSubstr("an observer may not call CuttingService/Session"));
+    EXPECT_THAT(hand.session_end()->error_message(), HasSubstr("an observer may not call Session"));
     const auto nothing = [&] { return false; };
     (void)line.drive(nothing, 100ms);  // what was on its way
     const std::size_t before = line.datagrams;
@@ -422,7 +422,7 @@ TEST_F(Matrices, DatagramsBringNothingToWhoHoldsNoTool) {
     ASSERT_FALSE(as_hand);
     EXPECT_EQ(as_hand.error().code, ErrorCode::denied);
     EXPECT_THAT(as_hand.error().message,
-                HasSubstr(role == Role::observer ? "holds no tool" : "may not call RoomService/Join"));
+                HasSubstr(role == Role::observer ? "holds no tool" : "may not call Join"));
     // Nor does a session of a watcher, or of another's hand, get as far as the keys.
     std::uint64_t author = sue_->author().value;
     if (role == Role::observer) author = join(door, wire::ClientKind::viewer).author.value;
@@ -438,7 +438,7 @@ TEST_F(Matrices, DatagramsBringNothingToWhoHoldsNoTool) {
     EXPECT_FALSE(session->Read(&said)) << said.ShortDebugString();
     const grpc::Status end = session->Finish();
     EXPECT_EQ(end.error_code(), StatusCode::PERMISSION_DENIED);
-    EXPECT_THAT(end.error_message(), HasSubstr("may not call CuttingService/Session"));
+    EXPECT_THAT(end.error_message(), HasSubstr("may not call Session"));
     // With keys of one's own making: counted, and not answered.
     const std::uint64_t strangers = server_->link_health().strangers;
     Line line(make_session_keys(0x01020304, system_random()), server_->link_port(), address());
