@@ -103,7 +103,8 @@ TEST_F(GateTest, SaysWhyNot) {
   EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::trainee, -1s), "ward", kUndo, false), HasSubstr("expired"));
   EXPECT_THAT(refused("anna", ticket("ben", "ward", Role::trainee), "ward", kUndo, true), HasSubstr("person: the ticket is for ben"));
   EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::trainee), "other", kUndo, true), HasSubstr("room: "));
-  EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::observer), "ward", kUndo, true), HasSubstr("role: an observer may not call Undo"));
+  EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::observer), "ward", kUndo, true),
+              HasSubstr("role: an observer may not call Undo"));
   EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::instructor), "ward", "/osteon.v1.RoomService/Nothing", true), HasSubstr("call: "));
   EXPECT_FALSE(let_in_with(content(people_->server() / "server.pem")));
   EXPECT_FALSE(let_in_with(""));

@@ -158,7 +158,7 @@ TEST_F(Insiders, LoseNoConnectionByAChangedRole) {
   ASSERT_TRUE(line.read(5s).has_value());
   people_.append_access("role mallory observer ward");
   for (int i = 0; i < 3; ++i) server_->rooms().gate->look();
-  ASSERT_TRUE(line.call(1, kGetStatus));
+  ASSERT_TRUE(line.call(1, kSession));
   EXPECT_TRUE(is_answered(line));
 }
 
