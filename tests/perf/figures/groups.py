@@ -245,5 +245,6 @@ def scan(run):
     return imports.slab_volume(run) | {f"scan_{name}": physics[f"rig_{name}"] for name in forces}
 
 
-GROUPS = {**kernels.GROUPS, **devices.GROUPS, **doors.GROUPS, **insiders.GROUPS, **feel.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, "expert": expert,
+GROUPS = {**kernels.GROUPS, **devices.GROUPS, **doors.GROUPS, **insiders.GROUPS,
+          **feel.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, "expert": expert,
           "novice": novice, "rig": rig, "scan": scan, "real_imports": imports.real_imports}

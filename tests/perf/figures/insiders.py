@@ -1,4 +1,4 @@
-"""Figures of people who have, or once had, a certificate and attack with it, straight at the server and through the proxy."""
+"""Figures of people who have, or once had, a certificate and attack with it, at the server and through the proxy."""
 import os
 import re
 import shutil
@@ -112,7 +112,7 @@ def p99(times):
 
 
 def is_named(said, holder, who, source):
-    """Whether a line of the logs says whose attack it was and from where; of nobody with a certificate, from where alone."""
+    """Whether a line of the logs says whose attack it was and from where; without a certificate, from where alone."""
     place = re.escape(source)
     if holder == "none":
         return re.search(rf"\b{place}\b", said) is not None

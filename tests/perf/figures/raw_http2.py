@@ -1,4 +1,4 @@
-"""A client that speaks HTTP/2 frame by frame over TLS (RFC 9113, RFC 7541), so that it can say what no gRPC client would."""
+"""A client that speaks HTTP/2 frame by frame over TLS (RFC 9113, RFC 7541), to say what no gRPC client would."""
 import base64
 import socket
 import ssl
@@ -81,7 +81,7 @@ class Connection:
         self.line.sendall(out)
 
     def read(self):
-        """The next frame as (kind, flags, stream, payload), answered where it asks; None at the end of the connection."""
+        """The next frame as (kind, flags, stream, payload), answered where it asks; None at the end."""
         while True:
             while len(self.arrived) < 9 or len(self.arrived) < 9 + int.from_bytes(self.arrived[:3], "big"):
                 more = self.line.recv(65536)

@@ -60,7 +60,8 @@ FUZZED = (
     ("journal_file", "files of journals", "verify, recover and open", 1_000_000),
 )
 INSIDER_WAYS = (("", ""), ("_proxied", ", through the proxy"))
-INSIDER_ATTACKS = (("killing", "send a header that once ended the server"), ("resets", "begin and reset 20000 calls over a connection"))
+INSIDER_ATTACKS = (("killing", "send a header that once ended the server"),
+                   ("resets", "begin and reset 20000 calls over a connection"))
 MACHINE = "a thread that wakes 20 times a second and syncs 4 KB to the disk, in the same runs"
 
 FIGURES = [
@@ -464,17 +465,21 @@ FIGURES = [
            ("<=", 1024), full=True),
     Figure("damaged_cases_sentence", "bytes", "longest sentence of why one was refused", "damaged_cases", ("<=", 4100),
            full=True),
-    # Those who have a certificate, or had one that was revoked, and those without: four connections at a time for six seconds, at a
-    # lower priority of the same machine, while somebody else calls.
-    *[Figure(f"insider{way}_{attack}_p99", "ratio", f"a person's calls, 99th percentile, while others {what}{through}, over the same "
-             f"before and after; the worst of a valid, a revoked and no certificate", "insiders", ("<=", 2.0), full=True)
+    # Those who have a certificate, or had one that was revoked, and those without: four connections at a time for six
+    # seconds, at a lower priority of the same machine, while somebody else calls.
+    *[Figure(f"insider{way}_{attack}_p99", "ratio",
+             f"a person's calls, 99th percentile, while others {what}{through}, over the same "
+             f"before and after; the worst of a valid, a revoked and no certificate",
+             "insiders", ("<=", 2.0), full=True)
       for way, through in INSIDER_WAYS for attack, what in INSIDER_ATTACKS],
     *[figure for way, through in INSIDER_WAYS for figure in (
-        Figure(f"insider{way}_memory", "mib", f"most that memory grew by in one of these attacks{through}", "insiders", ("<=", 128.0),
-               full=True),
-        Figure(f"insider{way}_unnamed", "count", f"of these attacks{through}, those of which no log says who it was and from where",
+        Figure(f"insider{way}_memory", "mib", f"most that memory grew by in one of these attacks{through}",
+               "insiders", ("<=", 128.0), full=True),
+        Figure(f"insider{way}_unnamed", "count",
+               f"of these attacks{through}, those of which no log says who it was and from where",
                "insiders", ("==", 0), full=True))],
-    Figure("proxy_upload_ratio", "ratio", "time to send 32 MiB to the server over that through the proxy, at a round trip of 150 ms "
+    Figure("proxy_upload_ratio", "ratio",
+           "time to send 32 MiB to the server over that through the proxy, at a round trip of 150 ms "
            "(a relay that delays both directions and bounds nothing)", "insider_uploads", (">=", 0.8), full=True),
     *[Figure(f"fuzzed_{target}", "count", f"changed {what} that {take} took or refused, and nothing else", f"fuzz_{target}",
              (">=", inputs), full=True) for target, what, take, inputs in FUZZED],
