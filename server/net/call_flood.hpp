@@ -1,4 +1,4 @@
-// Bounds how many calls a connection, or behind a proxy a certificate, may begin, whatever becomes of them. HTTP/2
+// Bounds how many calls a person may begin, whatever becomes of them. HTTP/2
 // lets a client begin and reset calls without waiting (CVE-2023-44487, "rapid reset"); gRPC 1.51 counts none of them.
 #pragma once
 #include <chrono>
@@ -18,7 +18,7 @@ class ServerInterceptorFactoryInterface;
 namespace osteon {
 
 struct FloodLimit {
-  double at_once = 1200.0;    // calls; who asks GetStatus too often hears so after 1000
+  double at_once = 150.0;     // calls; who asks GetStatus too often hears so after 100
   double per_second = 200.0;  // calls, in the long run; the busiest client of ours makes 50
 };
 
@@ -27,11 +27,11 @@ class CallFlood {
  public:
   using Time = std::chrono::steady_clock::time_point;
   explicit CallFlood(FloodLimit limit) : limit_(limit) {}
-  // A call begins. `whose`: the connection, or behind a proxy the certificate. False: that has begun too many.
+  // A call begins. `whose`: the certificate, or where none was shown the connection. False: that has begun too many.
   [[nodiscard]] bool take(const std::string& whose, Time now);
 
  private:
-  static constexpr std::size_t kMost = 4096;  // connections remembered
+  static constexpr std::size_t kMost = 4096;  // of them remembered
   struct Bucket {
     double left = 0.0;
     Time when{};

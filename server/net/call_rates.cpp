@@ -13,7 +13,7 @@ constexpr CallRate kSaying{5.0, 40.0};
 // The same, as of a tool that is dragged, or a script.
 constexpr CallRate kChanging{20.0, 100.0};
 // Takes the bone in hand, and is what programs ask over and over while they wait.
-constexpr CallRate kLookingUp{100.0, 1000.0};
+constexpr CallRate kLookingUp{100.0, 100.0};
 
 struct Row {
   std::string_view method;

@@ -94,14 +94,23 @@ std::size_t Connections::close_if(const std::function<bool(const Connection&)>& 
   const std::lock_guard lock(mutex_);
   drop_closed();
   std::size_t closed = 0;
-  for (const auto& [peer, entry] : open_) {
-    if (entry.connection.is_proxys || !which(entry.connection)) continue;
+  for (auto& [peer, entry] : open_) {
+    if (entry.connection.is_proxys || entry.is_cut_off || !which(entry.connection)) continue;
     // gRPC may close it at this moment and another connection may take its descriptor. That one is cut off then, and
     // comes again.
-    ::shutdown(entry.descriptor, SHUT_RDWR);
+    // What shutdown() leaves in the receive queue would still be read: thousands of calls (CVE-2023-44487).
+    const sockaddr nowhere{.sa_family = AF_UNSPEC, .sa_data = {}};
+    ::connect(entry.descriptor, &nowhere, sizeof nowhere);
+    entry.is_cut_off = true;
     ++closed;
   }
   return closed;
+}
+
+bool Connections::is_cut_off(const std::string& peer) {
+  const std::lock_guard lock(mutex_);
+  const auto known = open_.find(peer);
+  return known != open_.end() && known->second.is_cut_off;
 }
 
 std::string some_addresses(Connections& connections) {

@@ -31,15 +31,17 @@ class Connections {
   // Addresses, without ports and each once, of open connections over which no call has come: a handshake that fails
   // is of one of them. At most `most`.
   [[nodiscard]] std::vector<std::string> unidentified(std::size_t most);
-  // Shuts down each connection for which `which` is true. gRPC then sees its end and drops it with all its calls.
-  // Returns how many.
+  // Cuts off each connection for which `which` is true, and drops what has arrived over it unread. gRPC then sees its
+  // end and drops it with all its calls. Returns how many.
   std::size_t close_if(const std::function<bool(const Connection&)>& which);
+  [[nodiscard]] bool is_cut_off(const std::string& peer);  // by close_if()
 
  private:
   struct Entry {
     int descriptor = -1;
     std::uint64_t inode = 0;  // tells a connection that was closed from another with its descriptor
     Connection connection;
+    bool is_cut_off = false;
   };
   void drop_closed();  // under mutex_
 

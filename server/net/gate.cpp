@@ -176,7 +176,7 @@ std::optional<Refusal> Gate::judge_handshake(std::string_view chain_pem) {
     if (const auto why = revoked(certificate->serial, certificate->user, {}))
       refusal = Refusal{"revoked", false, *why};
     else if (is_paused(certificate->user))
-      refusal = Refusal{"flood", true, "too many calls came from you; wait ten seconds"};
+      refusal = Refusal{"flood", true, "too many calls came from you; wait a minute"};
   }
   if (!refusal) return {};
   // The name in a chain that does not hold is only what somebody says. A revoked one holds otherwise.
@@ -351,6 +351,8 @@ void Gate::note_refused(std::string_view reason, std::string_view sentence, cons
 }
 
 void Gate::note_flood(const PeerClaims& peer) {
+  // gRPC had read these calls before the connection was closed.
+  if (connections_ && connections_->is_cut_off(peer.peer)) return;
   std::string who = "a stranger";
   {
     const std::lock_guard lock(mutex_);
@@ -361,7 +363,7 @@ void Gate::note_flood(const PeerClaims& peer) {
       paused_[who] = now + kPause;
     }
   }
-  refusals_.note("flood", who, "more calls than a connection may begin; it was closed", peer.address);
+  refusals_.note("flood", who, "more calls than a person may begin; their connections were closed", peer.address);
   audit_refusal("flood", {.peer = peer});
   if (connections_)
     connections_->close_if([&](const Connection& one) { return one.peer == peer.peer || one.user == who; });

@@ -125,8 +125,8 @@ class Gate {
   [[nodiscard]] tl::expected<Caller, Refusal> admit(const CallClaims& call);
   // A call with which something is wrong before it can be judged: counted and logged likewise.
   void note_refused(std::string_view reason, std::string_view sentence, const CallClaims& call);
-  // A connection began more calls than it may: it is closed, and who holds its certificate comes again kPause later.
-  static constexpr std::chrono::seconds kPause{10};
+  // A person began more calls than they may: their connections are closed, and they come again kPause later.
+  static constexpr std::chrono::seconds kPause{60};
   void note_flood(const PeerClaims& peer);
 
   // Who may be who in a room. `kind`: of client. Errors denied: the identity is another person's or of another role, or a newer

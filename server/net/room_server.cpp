@@ -68,9 +68,9 @@ constexpr int kMaxSendBytes = 4 * 1024 * 1024;     // a piece of a case is 1 MiB
 constexpr int kShortestPingMs = 500;               // clients may ask that often whether the server lives
 constexpr int kMostStreams = 64;                   // of one connection
 constexpr int kMostMetadataBytes = 8 * 1024;       // of one call; a ticket is below 1 kB
-// Calls that are begun and reset are bounded after each read (call_flood.hpp); a read of gRPC's 4 MiB has 20 000 of
-// them.
-constexpr int kMostReadBytes = 64 * 1024;
+// Calls that are begun and reset are bounded after each read (call_flood.hpp); a read of gRPC's 4 MiB has 20 000
+// of them.
+constexpr int kMostReadBytes = 16 * 1024;
 constexpr int kHandshakeMs = 5'000;                // for those who have not shown who they are
 constexpr std::size_t kMostTransportBytes = std::size_t{512} << 20;  // of all connections, in gRPC
 constexpr const char* kStopping = "the server is stopping; come again in a few seconds";

@@ -1,6 +1,7 @@
 """One attacker: insider_attack.py killing|resets HOST PORT SOURCE PERSON SECONDS; prints how often it tried.
 
 PERSON is the folder of a certificate; empty: none is shown."""
+import random
 import ssl
 import sys
 import time
@@ -10,7 +11,8 @@ import raw_http2
 
 GET_STATUS = "/osteon.v1.RoomService/GetStatus"
 RESETS = 20_000  # over a connection
-PAUSE_S = 1.0    # before it comes again: more often the proxy lets no address connect
+START_S = 1.0  # in which the program itself starts: somebody else's machine does that
+PAUSE_S = (0.5, 1.5)  # before it comes again, by chance: more often the proxy lets no address connect
 
 
 def attack_once(kind, address, source, person):
@@ -24,6 +26,7 @@ def attack_once(kind, address, source, person):
 
 
 def attack(kind, host, port, source, person, seconds):
+    time.sleep(START_S)
     until, times = time.monotonic() + seconds, 0
     while time.monotonic() < until:
         try:
@@ -31,7 +34,7 @@ def attack(kind, host, port, source, person, seconds):
         except (OSError, ssl.SSLError):
             pass  # it was closed, as it should be
         times += 1
-        time.sleep(PAUSE_S)
+        time.sleep(random.uniform(*PAUSE_S))
     print(times)
 
 

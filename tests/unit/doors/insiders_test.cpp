@@ -187,7 +187,21 @@ TEST_F(Insiders, WhoResetCallsRapidlyAreCutOffAndWait) {
   EXPECT_TRUE(RawHttp2(address(), people_.person("anna")).read(5s).has_value());
   const std::string said = log();
   EXPECT_THAT(said, HasSubstr("mallory"));
-  EXPECT_THAT(said, HasSubstr("more calls than a connection may begin"));
+  EXPECT_THAT(said, HasSubstr("more calls than a person may begin"));
+}
+
+// More connections are no more calls: all of a person share one limit, and all are closed.
+TEST_F(Insiders, ShareOneLimitOverAllTheirConnections) {
+  RawHttp2 first(address(), people_.person("mallory")), second(address(), people_.person("mallory"));
+  ASSERT_TRUE(first.read(5s).has_value());
+  ASSERT_TRUE(second.read(5s).has_value());
+  for (std::uint32_t stream = 1; stream < 2 * kCalls; stream += 2) ASSERT_TRUE(first.call(stream, kSession));
+  ASSERT_TRUE(is_answered(first));
+  for (std::uint32_t stream = 1; stream < 2 * kCalls; stream += 2)
+    if (!second.call(stream, kSession)) break;
+  EXPECT_TRUE(second.closed_within(kPatience));
+  EXPECT_TRUE(first.closed_within(kPatience));
+  EXPECT_GE(counted("flood"), 1u);
 }
 
 // Handshakes that fail are noted with the address, whatever is wrong.
