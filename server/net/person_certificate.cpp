@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "common/access/ticket.hpp"
+#include "common/wire/x509.hpp"
 
 namespace osteon {
 namespace {
@@ -100,6 +101,9 @@ Store store_of(const Authorities& authorities) {
 }
 
 ChainRefusal refusal_of(int error) {
+  if (wire::is_unknown_authority(error))
+    return {ChainFault::unknown_authority,
+            "the certificate is of an authority that this server does not know; ask whoever runs it for one"};
   switch (error) {
     case X509_V_ERR_CERT_HAS_EXPIRED:
       return {ChainFault::expired, "the certificate has expired; ask for a new one"};
@@ -107,14 +111,6 @@ ChainRefusal refusal_of(int error) {
       return {ChainFault::not_yet_valid, "the certificate does not hold yet; set the clocks of both machines"};
     case X509_V_ERR_CERT_REVOKED:
       return {ChainFault::revoked, "the certificate was revoked; ask for a new one"};
-    case X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT:
-    case X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT_LOCALLY:
-    case X509_V_ERR_UNABLE_TO_VERIFY_LEAF_SIGNATURE:
-    case X509_V_ERR_DEPTH_ZERO_SELF_SIGNED_CERT:
-    case X509_V_ERR_SELF_SIGNED_CERT_IN_CHAIN:
-    case X509_V_ERR_CERT_SIGNATURE_FAILURE:
-      return {ChainFault::unknown_authority,
-              "the certificate is of an authority that this server does not know; ask whoever runs it for one"};
     case X509_V_ERR_INVALID_PURPOSE:
       return {ChainFault::purpose, "the certificate is not for a person; make one with deploy/certs person NAME"};
     default:
