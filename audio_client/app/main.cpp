@@ -37,7 +37,7 @@ constexpr auto kRunDown = 2s;
 
 struct Options {
   std::string server, room, name = "audio";
-  wire::DoorArguments door;
+  wire::CredentialArguments credentials;
   std::string output = "pulse";
   std::filesystem::path wav_file, state_log_file, summary_file;
   double patience_s = 5;
@@ -117,8 +117,8 @@ nlohmann::json summary_of(const Options& options, const audio::SoundEngine& engi
 }
 
 Result<void> run(const Options& options, const StopSignal& stop) {
-  const Result<wire::Door> door = wire::door_of(options.door);
-  if (!door) return tl::unexpected(door.error());
+  const Result<wire::ClientCredentials> credentials = wire::client_credentials(options.credentials);
+  if (!credentials) return tl::unexpected(credentials.error());
   const Result<audio::OutputKind> kind = audio::output_kind(options.output);
   if (!kind) return tl::unexpected(kind.error());
   audio::OutputParams output_params;
@@ -137,7 +137,7 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   Result<wire::JoinedRoom> room =
       wire::join_room(options.server, wire::ClientKind::audio, options.name,
                       std::chrono::milliseconds(static_cast<std::int64_t>(1000 * options.patience_s)),
-                      [&] { return stop.requested(); }, options.room, *door);
+                      [&] { return stop.requested(); }, options.room, *credentials);
   // A stop is what was asked for, also before the server answered.
   if (!room && room.error().code == ErrorCode::cancelled) return {};
   if (!room) return tl::unexpected(room.error());
@@ -211,7 +211,7 @@ int main(int argc, char** argv) {
   app.add_option("--server", options.server, "HOST:PORT of osteon-server")->required();
   app.add_option("--room", options.room, "Name of the room; not needed where the server has one");
   app.add_option("--name", options.name, "Who you are, shown to others")->capture_default_str();
-  wire::add_door_options(app, options.door);
+  wire::add_credential_options(app, options.credentials);
   app.add_option("--output", options.output, "pulse: PulseAudio's default sink; none: at the same pace to nowhere")
       ->capture_default_str();
   app.add_option("--wav", options.wav_file, "Record what is heard: 48 kHz, 16 bit, mono");

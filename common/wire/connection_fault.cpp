@@ -46,8 +46,8 @@ int fault_of_alert(int alert) {
 // What is looked at of a connection that failed.
 class Diagnosis {
  public:
-  Diagnosis(const std::string& address, const Door& door)
-      : address_(address), host_(address.substr(0, address.rfind(':'))), folder_(door.certificates) {
+  Diagnosis(const std::string& address, const ClientCredentials& credentials)
+      : address_(address), host_(address.substr(0, address.rfind(':'))), folder_(credentials.certificates) {
     if (host_.starts_with('[') && host_.ends_with(']')) host_ = host_.substr(1, host_.size() - 2);
   }
 
@@ -218,8 +218,8 @@ class Diagnosis {
 
 }  // namespace
 
-ConnectionFault connection_fault(const std::string& address, const Door& door) {
-  return Diagnosis(address, door).find();
+ConnectionFault connection_fault(const std::string& address, const ClientCredentials& credentials) {
+  return Diagnosis(address, credentials).find();
 }
 
 }  // namespace osteon::wire

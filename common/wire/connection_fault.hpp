@@ -4,7 +4,7 @@
 #include <string>
 
 #include "common/core/result.hpp"
-#include "common/wire/door.hpp"
+#include "common/wire/credentials.hpp"
 
 namespace osteon::wire {
 
@@ -12,8 +12,8 @@ struct ConnectionFault {
   Error error;         // one sentence: what is wrong, and the remedy
   bool lasts = false;  // it does not go away by waiting
 };
-// `address`: HOST:PORT, where a connection with `door` has just failed. Takes at most three seconds; carries no call
+// `address`: HOST:PORT, where a connection with `credentials` has just failed. Takes at most three seconds; carries no call
 // and no ticket. deploy/docs/troubleshooting.md lists the sentences.
-[[nodiscard]] ConnectionFault connection_fault(const std::string& address, const Door& door);
+[[nodiscard]] ConnectionFault connection_fault(const std::string& address, const ClientCredentials& credentials);
 
 }  // namespace osteon::wire

@@ -67,18 +67,18 @@ class RoomNamer final : public grpc::experimental::Interceptor {
 
 class RoomNamers final : public grpc::experimental::ClientInterceptorFactoryInterface {
  public:
-  RoomNamers(std::shared_ptr<const RoomName> room, Door door) : room_(std::move(room)), door_(std::move(door)) {}
+  RoomNamers(std::shared_ptr<const RoomName> room, ClientCredentials credentials) : room_(std::move(room)), credentials_(std::move(credentials)) {}
   grpc::experimental::Interceptor* CreateClientInterceptor(grpc::experimental::ClientRpcInfo*) override {
-    return new RoomNamer(room_ ? room_->get() : std::string(), ticket_text(door_));  // which the call deletes
+    return new RoomNamer(room_ ? room_->get() : std::string(), ticket_text(credentials_));  // which the call deletes
   }
 
  private:
   const std::shared_ptr<const RoomName> room_;  // shared with whoever joined over this channel
-  const Door door_;
+  const ClientCredentials credentials_;
 };
 
-std::shared_ptr<grpc::Channel> make_channel(const std::string& address, const std::shared_ptr<grpc::ChannelCredentials>& credentials,
-                                            ClientKind kind, const std::shared_ptr<const RoomName>& room, const Door& door) {
+std::shared_ptr<grpc::Channel> make_channel(const std::string& address, const std::shared_ptr<grpc::ChannelCredentials>& tls,
+                                            ClientKind kind, const std::shared_ptr<const RoomName>& room, const ClientCredentials& credentials) {
   // What fails is told in one sentence by the program, not in gRPC's own lines.
   gpr_set_log_function([](gpr_log_func_args*) {});
   grpc::ChannelArguments arguments;
@@ -92,8 +92,8 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address, const st
   arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> namers;
-  if (room || !door.ticket.empty()) namers.push_back(std::make_unique<RoomNamers>(room, door));
-  return grpc::experimental::CreateCustomChannelWithInterceptors(address, credentials, arguments, std::move(namers));
+  if (room || !credentials.ticket.empty()) namers.push_back(std::make_unique<RoomNamers>(room, credentials));
+  return grpc::experimental::CreateCustomChannelWithInterceptors(address, tls, arguments, std::move(namers));
 }
 
 bool is_host_port(const std::string& address) {
@@ -134,14 +134,14 @@ Error error_of(const grpc::Status& status, const std::string& server) {
 }
 
 Result<std::shared_ptr<grpc::Channel>> reach(const std::string& address, const std::shared_ptr<const RoomName>& room, ClientKind kind,
-                                             std::chrono::milliseconds patience, const std::function<bool()>& stop, const Door& door) {
+                                             std::chrono::milliseconds patience, const std::function<bool()>& stop, const ClientCredentials& credentials) {
   if (!is_host_port(address))
     return failure(ErrorCode::invalid_input, "the server's address " + address +
                                                  " is not HOST:PORT; give the one that osteon-server prints, such as " +
                                                  "127.0.0.1:50151, without http:// and without a path");
-  const Result<std::shared_ptr<grpc::ChannelCredentials>> credentials = credentials_of(door, address);
-  if (!credentials) return tl::unexpected(credentials.error());
-  std::shared_ptr<grpc::Channel> channel = make_channel(address, *credentials, kind, room, door);
+  const Result<std::shared_ptr<grpc::ChannelCredentials>> tls = channel_credentials(credentials, address);
+  if (!tls) return tl::unexpected(tls.error());
+  std::shared_ptr<grpc::Channel> channel = make_channel(address, *tls, kind, room, credentials);
   // In short waits, so that a person who gives up is heard.
   const auto until = Clock::now() + patience;
   bool has_looked = false;
@@ -152,7 +152,7 @@ Result<std::shared_ptr<grpc::Channel>> reach(const std::string& address, const s
     if (!is_over && !has_failed) continue;
     // At the first failure and at the end: nobody waits for what does not get better by waiting.
     has_looked = true;
-    ConnectionFault fault = connection_fault(address, door);
+    ConnectionFault fault = connection_fault(address, credentials);
     if (is_over || fault.lasts) return tl::unexpected(std::move(fault.error));
   }
   return channel;
@@ -191,15 +191,15 @@ Result<JoinedRoom> ask_to_join(JoinedRoom room, const v1::JoinRequest& request, 
 }  // namespace
 
 Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, ClientKind kind, std::chrono::milliseconds patience,
-                                                    const std::function<bool()>& stop, const Door& door) {
-  return reach(address, nullptr, kind, patience, stop, door);
+                                                    const std::function<bool()>& stop, const ClientCredentials& credentials) {
+  return reach(address, nullptr, kind, patience, stop, credentials);
 }
 
 Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
                              std::chrono::milliseconds patience, const std::function<bool()>& stop, const std::string& named,
-                             const Door& door) {
+                             const ClientCredentials& credentials) {
   const auto calls_to = std::make_shared<RoomName>(named);  // shared with the channel
-  Result<std::shared_ptr<grpc::Channel>> channel = reach(address, calls_to, kind, patience, stop, door);
+  Result<std::shared_ptr<grpc::Channel>> channel = reach(address, calls_to, kind, patience, stop, credentials);
   if (!channel) return tl::unexpected(channel.error());
   JoinedRoom room;
   room.channel = std::move(*channel);

@@ -66,7 +66,7 @@ class Console:
         return found
 
 
-class Doors:
+class Certificates:
     """A local authority, a server's certificate, and everybody's own with a ticket for the room."""
 
     def __init__(self, programs, folder):
@@ -112,15 +112,15 @@ class Together:
 
     def run(self):
         (self.out / "logs").mkdir(parents=True, exist_ok=True)
-        self.doors = Doors(self.programs, self.out)
+        self.certificates = Certificates(self.programs, self.out)
         with Household(self.out / "logs") as household:
             self.household = household
             screen, self.picture = start_screen(household, self.size)
             self.say(f"Picture: {self.picture}.")
             address = self._start_server()
-            berg = self.doors.person(INSTRUCTOR, "instructor")
+            berg = self.certificates.person(INSTRUCTOR, "instructor")
             viewer = Viewer(household, household.start("osteon-viewer", [
-                self.programs / "osteon-viewer", "--server", address, *self.doors.person(OBSERVER, "observer"), "--name", "The class",
+                self.programs / "osteon-viewer", "--server", address, *self.certificates.person(OBSERVER, "observer"), "--name", "The class",
                 "--room", ROOM,
                 "--size", self.size, "--script", "-", "--summary", self.out / "viewer.json"], screen, takes_input=True))
             console = Console(household, household.start("console", [
@@ -147,18 +147,18 @@ class Together:
         address_file.unlink(missing_ok=True)
         self.journal = self.out / f"{ROOM}.journal"
         self.household.start("osteon-server", [
-            self.programs / "osteon-server", "--case", self.case, "--listen", "127.0.0.1:0", *self.doors.server,
+            self.programs / "osteon-server", "--case", self.case, "--listen", "127.0.0.1:0", *self.certificates.server,
             "--address-file", address_file, "--summary", self.out / "server.json", "--journal", self.journal])
         address = self.household.wait_for_file(address_file, "osteon-server", patience_s=60.0)
         self.say(f"Server: {self.case.name} at {address}, by mutual TLS.")
         return address
 
-    def _start_hand(self, address, name, door, plan):
+    def _start_hand(self, address, name, credentials, plan):
         (self.out / f"{name}-plan.json").write_text(json.dumps(plan, indent=2) + "\n", encoding="utf-8")
         cache = ROOT / "build" / "case-cache"
         cache.mkdir(parents=True, exist_ok=True)
         return self.household.start(name, [
-            self.programs / "osteon-haptic", "--server", address, *door, "--room", ROOM, "--name", name,
+            self.programs / "osteon-haptic", "--server", address, *credentials, "--room", ROOM, "--name", name,
             "--plan", self.out / f"{name}-plan.json", "--device", self.device, "--session-log", self.out / f"{name}.csv",
             "--record", self.out / f"{name}.h5", "--cut-log", self.out / f"{name}-cuts.csv", "--summary", self.out / f"{name}.json",
             "--cache", cache])
@@ -187,7 +187,7 @@ class Together:
     def _work(self, address, viewer, console, berg):
         hands = {}
         for (name, role), side in zip(TRAINEES.items(), self.sides):
-            hands[name] = self._start_hand(address, name, self.doors.person(name, role), burr_window(side, [18, 12], then_s=STAYS_S))
+            hands[name] = self._start_hand(address, name, self.certificates.person(name, role), burr_window(side, [18, 12], then_s=STAYS_S))
             hands[name].may_end = True
         self._wait("that both surgeons cut", lambda: all(self._cuts(console, name) > 100 for name in TRAINEES), 120.0)
         console.do("say all I am watching you both")

@@ -28,7 +28,7 @@ constexpr const char* kProgram = "osteon-haptic";
 
 struct Options {
   RoomSessionOptions room;
-  wire::DoorArguments door;
+  wire::CredentialArguments credentials;
   double patience_s = 5.0;
   std::optional<double> force_scale;
   std::filesystem::path cut_log, summary;
@@ -235,9 +235,9 @@ Result<void> run(Options& options, const StopSignal& stop) {
     return failure(ErrorCode::invalid_input, "--scale must be a number above 0 and at most 1");
   if (!(options.patience_s >= 0.0 && options.patience_s <= 3600.0))
     return failure(ErrorCode::invalid_input, "--patience must be from 0 to 3600 seconds");
-  const Result<wire::Door> door = wire::door_of(options.door);
-  if (!door) return tl::unexpected(door.error());
-  options.room.door = *door;
+  const Result<wire::ClientCredentials> credentials = wire::client_credentials(options.credentials);
+  if (!credentials) return tl::unexpected(credentials.error());
+  options.room.credentials = *credentials;
   if (Result<void> usable = check_outputs(options); !usable) return usable;
   Result<HandChoice> hand = HandChoice::make(options.hand, tell);
   if (!hand) return tl::unexpected(hand.error());
@@ -297,7 +297,7 @@ int main(int argc, char** argv) {
       kProgram);
   app.add_option("--server", options.room.address, "HOST:PORT of osteon-server")->required();
   app.add_option("--room", options.room.room, "Name of the room; not needed where the server has one");
-  wire::add_door_options(app, options.door);
+  wire::add_credential_options(app, options.credentials);
   app.add_option("--name", options.room.name,
                  "How others in the room see you called; over plain text also who you are, so that without it nobody is you again");
   app.add_option("--plan", options.hand.plan, "JSON file with the steps of a simulated surgeon");

@@ -471,7 +471,7 @@ RoomSession::~RoomSession() { close(); }
 
 Result<RoomSession> RoomSession::join(const RoomSessionOptions& options, const std::function<bool()>& stop) {
   Result<wire::JoinedRoom> room =
-      wire::join_room(options.address, wire::ClientKind::haptic, options.name, options.patience, stop, options.room, options.door);
+      wire::join_room(options.address, wire::ClientKind::haptic, options.name, options.patience, stop, options.room, options.credentials);
   if (!room) return tl::unexpected(room.error());
   Result<Case> bone = fetch_case(*room, options.cache, stop);
   if (!bone) return tl::unexpected(bone.error());

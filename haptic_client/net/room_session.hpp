@@ -27,7 +27,7 @@ namespace osteon {
 struct RoomSessionOptions {
   std::string address;                  // HOST:PORT
   std::string room{};                   // which of the server's; empty: the only one that is open
-  wire::Door door{};
+  wire::ClientCredentials credentials{};
   std::string name{};                   // shown to others, and over plain text who one is; empty: somebody else each time
   std::chrono::milliseconds patience{5000};
   std::filesystem::path cache = default_case_cache();  // one folder per case, named by its hash

@@ -308,16 +308,16 @@ Result<void> run(const ServerConfig& options, const StopSignal& stop) {
     std::error_code ignored;
     std::filesystem::remove(options.address_file, ignored);
   }
-  const DoorOptions doors{.certificates = options.certificates,
+  const ConnectionOptions connections{.certificates = options.certificates,
                           .most_connections = static_cast<std::size_t>(options.most_connections),
                           .proxy_socket = options.proxy_socket,
                           .udp_listen = options.udp_listen,
                           .most_ticket_life = std::chrono::hours(options.most_ticket_hours)};
-  if (Result<void> usable = RoomServer::check_listen(options.listen, doors); !usable) return usable;
+  if (Result<void> usable = RoomServer::check_listen(options.listen, connections); !usable) return usable;
   if (Result<void> usable = check_writable(options.save_file, "the fields", "--save"); !usable) return usable;
   Result<std::unique_ptr<Rooms>> rooms = open_rooms(options);
   if (!rooms) return tl::unexpected(rooms.error());
-  Result<std::unique_ptr<RoomServer>> server = RoomServer::start(std::move(*rooms), options.listen, doors);
+  Result<std::unique_ptr<RoomServer>> server = RoomServer::start(std::move(*rooms), options.listen, connections);
   if (!server) return tl::unexpected(server.error());
   const HostHealth first = (*server)->health();
   log::info("listening", {{"address", (*server)->address()},

@@ -3,7 +3,7 @@
 #include <charconv>
 #include <system_error>
 
-#include "common/wire/door.hpp"
+#include "common/wire/credentials.hpp"
 
 namespace osteon {
 

@@ -141,16 +141,16 @@ std::vector<MetricFamily> figures_of(RoomServer& server, const fs::path& certifi
   auto refusals = server.rooms().refusals.counts();
   for (const char* known : {"version", "request", "room", "draining", "tls"}) refusals.try_emplace(known, 0u);
   for (const auto& [reason, count] : refusals)
-    page.counter("osteon_refusals_total", "Callers turned away at the door, and calls refused behind it.", {{"reason", reason}}, static_cast<double>(count));
+    page.counter("osteon_refusals_total", "Callers turned away at the credentials, and calls refused behind it.", {{"reason", reason}}, static_cast<double>(count));
   if (!certificate.empty())
     if (const Result<double> days = certificate_days_left(certificate))
       page.gauge("osteon_certificate_days_left", "Until the server's certificate is over.", {}, *days);
-  const DoorHealth doors = server.door_health();
-  page.gauge("osteon_connections", "Open connections.", {}, static_cast<double>(doors.connections.open));
+  const ConnectionHealth connections = server.connection_health();
+  page.gauge("osteon_connections", "Open connections.", {}, static_cast<double>(connections.connections.open));
   page.counter("osteon_connections_refused_total", "Connections closed at once, beyond the limit.", {},
-               static_cast<double>(doors.connections.refused));
+               static_cast<double>(connections.connections.refused));
   page.counter("osteon_streams_ended_total", "Streams ended since a right to them was over.", {},
-               static_cast<double>(doors.gate.ended));
+               static_cast<double>(connections.gate.ended));
   const LinkServerHealth links = server.link_health();
   const char* paths = "Fast paths, and those over which datagrams have come lately.";
   page.gauge("osteon_links", paths, {{"state", "open"}}, static_cast<double>(links.links));

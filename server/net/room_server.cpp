@@ -29,37 +29,37 @@ Error cannot_listen(const std::string& listen, const std::string& why, ErrorCode
   return {code, "cannot listen on " + listen + ": " + why + "; choose another with --listen, or 0 for a free one"};
 }
 
-Result<std::unique_ptr<Listener>> listen_on(const std::string& listen, const DoorOptions& doors) {
+Result<std::unique_ptr<Listener>> listen_on(const std::string& listen, const ConnectionOptions& connections) {
   const Result<HostPort> at = parse_host_port(listen, "--listen");
   if (!at) return tl::unexpected(at.error());
-  if (doors.certificates.empty() && !is_loopback(at->host))
+  if (connections.certificates.empty() && !is_loopback(at->host))
     return failure(ErrorCode::invalid_input, "--listen " + listen +
                                                  " is reachable from other machines, but this server speaks plain text; "
                                                  "use 127.0.0.1, [::1] or localhost, or give --certificates DIR");
-  Result<std::unique_ptr<Listener>> listener = Listener::open(at->host, at->port, doors.most_connections);
+  Result<std::unique_ptr<Listener>> listener = Listener::open(at->host, at->port, connections.most_connections);
   if (!listener) return tl::unexpected(cannot_listen(listen, listener.error().message, listener.error().code));
   return listener;
 }
 
-// Where `doors.udp_listen` says, or at a free port of where connections come in: then a failure is no error, since the
+// Where `connections.udp_listen` says, or at a free port of where connections come in: then a failure is no error, since the
 // streams carry everything.
-Result<std::unique_ptr<LinkServer>> hear_datagrams(const DoorOptions& doors, const std::string& address) {
-  if (doors.udp_listen.empty()) {
+Result<std::unique_ptr<LinkServer>> hear_datagrams(const ConnectionOptions& connections, const std::string& address) {
+  if (connections.udp_listen.empty()) {
     Result<std::unique_ptr<LinkServer>> links = LinkServer::open(address);
     if (links) return links;
     log::warn("no fast path", {{"reason", links.error().message}});
     return nullptr;
   }
-  const Result<HostPort> at = parse_host_port(doors.udp_listen, "--udp-listen");
+  const Result<HostPort> at = parse_host_port(connections.udp_listen, "--udp-listen");
   if (!at) return tl::unexpected(at.error());
-  if (doors.certificates.empty() && !is_loopback(at->host))
-    return failure(ErrorCode::invalid_input, "--udp-listen " + doors.udp_listen +
+  if (connections.certificates.empty() && !is_loopback(at->host))
+    return failure(ErrorCode::invalid_input, "--udp-listen " + connections.udp_listen +
                                                  " is reachable from other machines, but this server speaks plain "
                                                  "text; use 127.0.0.1 or [::1], or give --certificates DIR");
   std::string host = at->host;
   if (host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
   return LinkServer::open(host, static_cast<std::uint16_t>(at->port)).map_error([&](const Error& error) {
-    return Error{error.code, "--udp-listen " + doors.udp_listen + ": " + error.message};
+    return Error{error.code, "--udp-listen " + connections.udp_listen + ": " + error.message};
   });
 }
 
@@ -100,11 +100,11 @@ RoomServer::~RoomServer() {
   if (impl_->server) (void)stop_all();
 }
 
-Result<void> RoomServer::check_listen(const std::string& listen, const DoorOptions& doors) {
-  const Result<std::unique_ptr<Listener>> listener = listen_on(listen, doors);
+Result<void> RoomServer::check_listen(const std::string& listen, const ConnectionOptions& connections) {
+  const Result<std::unique_ptr<Listener>> listener = listen_on(listen, connections);
   if (!listener) return tl::unexpected(listener.error());
-  if (doors.udp_listen.empty()) return {};
-  const Result<std::unique_ptr<LinkServer>> links = hear_datagrams(doors, (*listener)->address());
+  if (connections.udp_listen.empty()) return {};
+  const Result<std::unique_ptr<LinkServer>> links = hear_datagrams(connections, (*listener)->address());
   if (!links) return tl::unexpected(links.error());
   return {};
 }
@@ -122,8 +122,8 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(Room room, const RoomServe
 }
 
 Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> rooms, const std::string& listen,
-                                                      const DoorOptions& doors) {
-  Result<std::unique_ptr<Listener>> listener = listen_on(listen, doors);
+                                                      const ConnectionOptions& connections) {
+  Result<std::unique_ptr<Listener>> listener = listen_on(listen, connections);
   if (!listener) return tl::unexpected(listener.error());
   auto impl = std::make_unique<Impl>();
   impl->rooms = std::move(rooms);
@@ -131,15 +131,15 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   impl->listener = std::move(*listener);
   impl->handshakes = std::make_unique<HandshakeWatch>(impl->rooms->refusals, impl->listener->connections());
   std::shared_ptr<grpc::ServerCredentials> credentials = grpc::InsecureServerCredentials();  // shared with gRPC
-  if (!doors.certificates.empty()) {
+  if (!connections.certificates.empty()) {
     if (Result<void> preferred = prefer_own_cipher_order(); !preferred) return tl::unexpected(preferred.error());
-    Result<std::unique_ptr<Gate>> gate = Gate::open(doors.certificates, impl->rooms->refusals);
+    Result<std::unique_ptr<Gate>> gate = Gate::open(connections.certificates, impl->rooms->refusals);
     if (!gate) return tl::unexpected(gate.error());
-    log_server_certificate(doors.certificates / "server.pem",
+    log_server_certificate(connections.certificates / "server.pem",
                            std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now()));
     impl->gate = std::move(*gate);
     impl->rooms->gate = impl->gate.get();
-    impl->gate->set_most_ticket_life(doors.most_ticket_life);
+    impl->gate->set_most_ticket_life(connections.most_ticket_life);
     impl->gate->set_connections(impl->listener->connections());
     if (impl->rooms->trail()) impl->gate->set_trail(*impl->rooms->trail());
     impl->gate->set_only_room([all = impl->rooms.get()] {
@@ -148,18 +148,18 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
     });
     credentials = impl->gate->credentials();
   }
-  if (!doors.proxy_socket.empty()) {
+  if (!connections.proxy_socket.empty()) {
     if (!impl->gate)
       return failure(ErrorCode::invalid_input,
                      "--proxy-socket needs --certificates DIR: a proxy brings calls of people");
-    Result<std::unique_ptr<Listener>> proxy = Listener::open_at(doors.proxy_socket, doors.most_connections);
+    Result<std::unique_ptr<Listener>> proxy = Listener::open_at(connections.proxy_socket, connections.most_connections);
     if (!proxy)
-      return failure(proxy.error().code, "cannot listen at --proxy-socket " + doors.proxy_socket.string() + ": " +
+      return failure(proxy.error().code, "cannot listen at --proxy-socket " + connections.proxy_socket.string() + ": " +
                                              proxy.error().message + "; choose another path");
     impl->proxy_listener = std::move(*proxy);
   }
   // Beside the streams; without it all goes over them.
-  Result<std::unique_ptr<LinkServer>> links = hear_datagrams(doors, impl->listener->address());
+  Result<std::unique_ptr<LinkServer>> links = hear_datagrams(connections, impl->listener->address());
   if (!links) return tl::unexpected(links.error());
   impl->links = std::move(*links);
   impl->services.push_back(make_room_service(*impl->rooms));
@@ -177,8 +177,8 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   if (impl->proxy_listener)
     impl->proxy_acceptor = builder.experimental().AddExternalConnectionAcceptor(
         grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, grpc::InsecureServerCredentials());
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, static_cast<int>(doors.keepalive.count()));
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, static_cast<int>(doors.keepalive.count()));
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, static_cast<int>(connections.keepalive.count()));
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, static_cast<int>(connections.keepalive.count()));
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kShortestPingMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
@@ -186,8 +186,8 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMostStreams);
   builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, kMostMetadataBytes);
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMs);
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_MS, static_cast<int>(doors.connection_age.count()));
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_GRACE_MS, static_cast<int>(doors.longest_session.count()));
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_MS, static_cast<int>(connections.connection_age.count()));
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_GRACE_MS, static_cast<int>(connections.longest_session.count()));
   grpc::ResourceQuota quota("osteon");
   quota.Resize(kMostTransportBytes);
   builder.SetResourceQuota(quota);
@@ -195,7 +195,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   builder.SetMaxSendMessageSize(kMaxSendBytes);
   auto interceptors = refused_call_notes(impl->rooms->refusals);
   if (impl->gate) {
-    impl->flood = std::make_unique<CallFlood>(doors.flood);
+    impl->flood = std::make_unique<CallFlood>(connections.flood);
     interceptors.push_back(
         flood_watch(*impl->flood, [gate = impl->gate.get()](const PeerClaims& peer) { gate->note_flood(peer); }));
   }
@@ -240,7 +240,7 @@ HostHealth RoomServer::health() const {
   return room ? (*room)->host().health() : HostHealth{};
 }
 std::uint16_t RoomServer::link_port() const { return impl_->links ? impl_->links->port() : 0; }
-DoorHealth RoomServer::door_health() const {
+ConnectionHealth RoomServer::connection_health() const {
   return {impl_->listener->counts(), impl_->gate ? impl_->gate->counts() : GateCounts{}};
 }
 LinkServerHealth RoomServer::link_health() const { return impl_->links ? impl_->links->health() : LinkServerHealth{}; }

@@ -18,7 +18,7 @@
 
 namespace osteon {
 
-struct DoorOptions {
+struct ConnectionOptions {
   std::filesystem::path certificates{};  // as Gate::open has them; empty: plain text, on this machine alone
   std::size_t most_connections = 512;    // further ones are closed at once
   // A Unix socket at which a proxy of this machine brings calls in plain text, and says of each whose it is
@@ -37,7 +37,7 @@ struct DoorOptions {
   std::chrono::milliseconds connection_age = std::chrono::hours(1), longest_session = std::chrono::hours(12);
 };
 
-struct DoorHealth {
+struct ConnectionHealth {
   ListenerCounts connections;
   GateCounts gate;  // of none over plain text
 };
@@ -53,11 +53,11 @@ struct RoomServerOptions {
 class RoomServer {
  public:
   // Whether start() could listen there now: told before a long preparation instead of after it. Errors as start().
-  [[nodiscard]] static Result<void> check_listen(const std::string& listen, const DoorOptions& doors = {});
+  [[nodiscard]] static Result<void> check_listen(const std::string& listen, const ConnectionOptions& connections = {});
   // Errors: invalid_input (`listen` is not HOST:PORT, or not of this machine alone), exists (the port is in use),
   // unavailable (the system refuses for another reason, which the message gives).
   [[nodiscard]] static Result<std::unique_ptr<RoomServer>> start(std::unique_ptr<Rooms> rooms, const std::string& listen,
-                                                                 const DoorOptions& doors = {});
+                                                                 const ConnectionOptions& connections = {});
   // Of one room, "room" or what `keeper` calls it. `progress` hears how far the first surface is. `keeper`: of this room;
   // without one it is lost when the process ends.
   [[nodiscard]] static Result<std::unique_ptr<RoomServer>> start(Room room, const RoomServerOptions& options,
@@ -72,7 +72,7 @@ class RoomServer {
   [[nodiscard]] HostHealth health() const;           // of the only room
   [[nodiscard]] std::uint16_t link_port() const;     // UDP; 0: there is no fast path
   [[nodiscard]] LinkServerHealth link_health() const;
-  [[nodiscard]] DoorHealth door_health() const;
+  [[nodiscard]] ConnectionHealth connection_health() const;
   // Lets nobody in any more, tells grpc.health.v1 so, asks every session to come again later, and returns when all have gone
   // with what they were told being kept, when `most` is over, or when `give_up`, which waits that long, returns true.
   void drain(std::chrono::milliseconds most, const std::function<bool(std::chrono::milliseconds)>& give_up);

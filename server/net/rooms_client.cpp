@@ -78,9 +78,9 @@ Result<RoomLine> line_of(const Result<Response>& response) {
 }  // namespace
 
 Result<RoomsClient> RoomsClient::reach(const std::string& address, std::chrono::milliseconds patience,
-                                       const std::function<bool()>& stop, const wire::Door& door) {
+                                       const std::function<bool()>& stop, const wire::ClientCredentials& credentials) {
   // A long answer is waited for as long as by a hand.
-  Result<std::shared_ptr<grpc::Channel>> channel = wire::reach_server(address, wire::ClientKind::haptic, patience, stop, door);
+  Result<std::shared_ptr<grpc::Channel>> channel = wire::reach_server(address, wire::ClientKind::haptic, patience, stop, credentials);
   if (!channel) return tl::unexpected(channel.error());
   return RoomsClient(std::move(*channel));
 }

@@ -11,7 +11,7 @@
 #include "common/core/digest.hpp"
 #include "common/core/id.hpp"
 #include "common/core/result.hpp"
-#include "common/wire/door.hpp"
+#include "common/wire/credentials.hpp"
 
 namespace grpc {
 class Channel;
@@ -36,7 +36,7 @@ struct RoomLine {
 class RoomsClient {
  public:
   [[nodiscard]] static Result<RoomsClient> reach(const std::string& address, std::chrono::milliseconds patience,
-                                                 const std::function<bool()>& stop, const wire::Door& door = {});
+                                                 const std::function<bool()>& stop, const wire::ClientCredentials& credentials = {});
 
   [[nodiscard]] Result<std::vector<RoomLine>> list();
   [[nodiscard]] Result<RoomLine> create(const std::string& name, const std::string& case_hash_hex);

@@ -23,9 +23,9 @@
 #include "common/wire/connection_fault.hpp"
 #include "common/wire/room_client.hpp"
 #include "tests/integration/stage.hpp"
-#include "tests/support/doors/altered.hpp"
-#include "tests/support/doors/people.hpp"
-#include "tests/support/doors/proxy.hpp"
+#include "tests/support/authentication/altered.hpp"
+#include "tests/support/authentication/people.hpp"
+#include "tests/support/authentication/proxy.hpp"
 #include "tests/support/wait.hpp"
 
 namespace osteon::test {
@@ -143,7 +143,7 @@ class ConnectionFaults : public ::testing::Test {
   struct Mistake {
     std::string what;
     std::string address;
-    wire::Door door;
+    wire::ClientCredentials credentials;
     Process* server = nullptr;  // null: it hears nothing of it
     std::string room = "room";
   };
@@ -175,7 +175,7 @@ class ConnectionFaults : public ::testing::Test {
     fs::copy(people_.person(person), copy);
     return copy;
   }
-  wire::Door with(const fs::path& folder, const std::string& user) {
+  wire::ClientCredentials with(const fs::path& folder, const std::string& user) {
     return {.certificates = folder, .ticket = people_.ticket(user, "room", Role::observer)};
   }
   static fs::path authority_of(const People& people) { return people.folder() / "certs" / "authority"; }
@@ -197,7 +197,7 @@ class ConnectionFaults : public ::testing::Test {
     for (const Mistake& one : mistakes)
       saying[one.what] = std::async(std::launch::async, [&one] {
         const auto joined =
-            wire::join_room(one.address, wire::ClientKind::viewer, "who", 300ms, {}, one.room, one.door);
+            wire::join_room(one.address, wire::ClientKind::viewer, "who", 300ms, {}, one.room, one.credentials);
         return joined ? std::string("it joined") : joined.error().message;
       });
     std::map<std::string, std::string> said;
@@ -216,7 +216,7 @@ class ConnectionFaults : public ::testing::Test {
 };
 
 std::vector<ConnectionFaults::Mistake> ConnectionFaults::without_a_server() {
-  const wire::Door anna = people_.door("anna", Role::observer, "room");
+  const wire::ClientCredentials anna = people_.credentials("anna", Role::observer, "room");
   return {{"no such host", "nowhere.invalid:50000", anna},
           {"not started", nobody_.address(), anna},
           {"machine off", full_.address(), anna},
@@ -230,7 +230,7 @@ std::vector<ConnectionFaults::Mistake> ConnectionFaults::without_a_server() {
 }
 
 std::vector<ConnectionFaults::Mistake> ConnectionFaults::of_the_server() {
-  const wire::Door eve = others_.door("eve", Role::observer, "room");
+  const wire::ClientCredentials eve = others_.credentials("eve", Role::observer, "room");
   const fs::path dated = folder_of_server("dated", "127.0.0.1"), early = folder_of_server("early", "127.0.0.1"),
                  named = folder_of_server("named", "sim.example"), person = folder_of_server("person", "127.0.0.1");
   resign(dated / "server.pem", authority_of(others_), -2 * kDay, -kDay);
@@ -261,7 +261,7 @@ std::vector<ConnectionFaults::Mistake> ConnectionFaults::of_the_client() {
   put(foreign / "ca.pem", content(people_.server() / "ca.pem"));
   put(server / "person.pem", content(people_.server() / "server.pem"));
   put(server / "person.key", content(people_.server() / "server.key"));
-  const wire::Door gone = people_.door("gone", Role::observer, "room");
+  const wire::ClientCredentials gone = people_.credentials("gone", Role::observer, "room");
   people_.certs({"revoke", "gone"});
   return {{"own expired", stage_.address(), with(expired, "ben"), &stage_.server()},
           {"own not yet", stage_.address(), with(early, "cleo"), &stage_.server()},
@@ -274,7 +274,7 @@ std::vector<ConnectionFaults::Mistake> ConnectionFaults::of_files() {
   std::vector<Mistake> all;
   const auto altered = [&](const std::string& what) {
     all.push_back({what, stage_.address(), with(copy_of("dora", what), "dora")});
-    return all.back().door.certificates;
+    return all.back().credentials.certificates;
   };
   const auto elsewhere = [&](const std::string& what, const fs::path& folder) {
     all.push_back({what, stage_.address(), with(folder, "dora")});
@@ -334,7 +334,7 @@ TEST_F(ConnectionFaults, AreEachASentenceOfItsOwnAtBothEnds) {
   for (const auto& some : {without_a_server(), of_the_server(), of_the_client(), of_files(), of_tickets()})
     mistakes.insert(mistakes.end(), some.begin(), some.end());
   std::map<std::string, std::string> said = say_all(mistakes);
-  said["slow"] = wire::connection_fault(stage_.address(), people_.door("anna", Role::observer, "room")).error.message;
+  said["slow"] = wire::connection_fault(stage_.address(), people_.credentials("anna", Role::observer, "room")).error.message;
   mistakes.push_back({"slow", stage_.address(), {}});
   const fs::path marked = people_.ticket_file(
       "\xef\xbb\xbf"
@@ -343,7 +343,7 @@ TEST_F(ConnectionFaults, AreEachASentenceOfItsOwnAtBothEnds) {
   const std::map<std::string, fs::path> tickets{{"no ticket", stage_ / "none"}, {"ticket of another encoding", marked}};
   for (const auto& [what, file] : tickets) {
     said[what] =
-        wire::door_of({.plain = false, .certificates = people_.person("anna"), .ticket = file}).error().message;
+        wire::client_credentials({.plain = false, .certificates = people_.person("anna"), .ticket = file}).error().message;
     mistakes.push_back({what, stage_.address(), {}});
   }
 
@@ -383,7 +383,7 @@ TEST_F(ConnectionFaults, AreTheSameSentencesThroughAProxy) {
   const Proxy proxy(people_.server(), socket), alone(people_.server(), stage_ / "nobody.sock");
   for (Mistake& one : mistakes) one.address = proxy.address();
   mistakes.push_back({"plain text", proxy.address(), {}});
-  mistakes.push_back({"no server behind it", alone.address(), people_.door("anna", Role::observer, "room")});
+  mistakes.push_back({"no server behind it", alone.address(), people_.credentials("anna", Role::observer, "room")});
   mistakes.push_back(
       {"ticket expired",
        proxy.address(),

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "tests/integration/stage.hpp"
-#include "tests/support/doors/proxy.hpp"
+#include "tests/support/authentication/proxy.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temp_dir.hpp"
 

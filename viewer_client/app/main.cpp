@@ -62,7 +62,7 @@ constexpr const char* kScriptHelp =
     "SpaceMouse (--spacemouse): the bone follows the cap; first button overview, second tool.";
 
 struct Arguments {
-  wire::DoorArguments door;
+  wire::CredentialArguments credentials;
   std::string server, room, name, hand, size = "1280x720", script, screenshot, frame_log, summary;
   double patience_s = 5.0;
   bool space_mouse = false, console = false;
@@ -86,9 +86,9 @@ Result<WindowOptions> window_options(const std::string& size) {
 // Commands as they come, until the input ends.
 Result<void> run_console(const Arguments& arguments) {
   StopSignal stop;
-  const Result<wire::Door> door = wire::door_of(arguments.door);
-  if (!door) return tl::unexpected(door.error());
-  PeopleClientOptions options{.address = arguments.server, .room = arguments.room, .door = *door};
+  const Result<wire::ClientCredentials> credentials = wire::client_credentials(arguments.credentials);
+  if (!credentials) return tl::unexpected(credentials.error());
+  PeopleClientOptions options{.address = arguments.server, .room = arguments.room, .credentials = *credentials};
   if (!arguments.name.empty()) options.name = arguments.name;
   options.patience = std::chrono::milliseconds(static_cast<long>(1000.0 * arguments.patience_s));
   const auto room = PeopleClient::start(options, [&stop] { return stop.requested(); });
@@ -116,8 +116,8 @@ Result<void> run(const Arguments& arguments) {
   StopSignal stop;
 
   // What can be wrong with the arguments is told before anything is started.
-  const Result<wire::Door> door = wire::door_of(arguments.door);
-  if (!door) return tl::unexpected(door.error());
+  const Result<wire::ClientCredentials> credentials = wire::client_credentials(arguments.credentials);
+  if (!credentials) return tl::unexpected(credentials.error());
   auto window_size = window_options(arguments.size);
   if (!window_size) return tl::unexpected(window_size.error());
   std::optional<ScriptReader> script;
@@ -137,7 +137,7 @@ Result<void> run(const Arguments& arguments) {
   RoomWatchOptions watch_options;
   watch_options.address = arguments.server;
   watch_options.room = arguments.room;
-  watch_options.door = *door;
+  watch_options.credentials = *credentials;
   if (!arguments.name.empty()) watch_options.name = arguments.name;
   watch_options.patience = std::chrono::milliseconds(static_cast<long>(1000.0 * arguments.patience_s));
   watch_options.keep_trying = !scripted;
@@ -227,7 +227,7 @@ int main(int argc, char** argv) {
   app.add_option("--of", arguments.hand, "Whose hand works before this window, NAME or #NUMBER: shows what is decided about it");
   app.add_flag("--console", arguments.console, "No window: oversee the room by commands on standard input");
   app.add_option("--room", arguments.room, "Name of the room; not needed where the server has one");
-  wire::add_door_options(app, arguments.door);
+  wire::add_credential_options(app, arguments.credentials);
   app.add_option("--size", arguments.size, "Size of the window in pixels")->capture_default_str();
   app.add_option("--script", arguments.script, "File of commands, - for standard input; its end closes the viewer");
   app.add_option("--screenshot", arguments.screenshot,

@@ -222,7 +222,7 @@ Result<std::unique_ptr<PeopleClient>> PeopleClient::start(const PeopleClientOpti
   Result<wire::JoinedRoom> joined = options.window
                                         ? options.window()
                                         : wire::join_room(options.address, wire::ClientKind::console, options.name,
-                                                          options.patience, impl->stop, options.room, options.door);
+                                                          options.patience, impl->stop, options.room, options.credentials);
   if (!joined) return tl::unexpected(console_refused(joined.error(), options));
   impl->joined = std::move(*joined);
   std::unique_ptr<PeopleClient> client(new PeopleClient(std::move(impl)));

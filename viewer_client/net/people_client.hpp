@@ -7,7 +7,7 @@
 #include <string>
 
 #include "common/core/result.hpp"
-#include "common/wire/door.hpp"
+#include "common/wire/credentials.hpp"
 #include "common/wire/room_client.hpp"
 #include "viewer_client/scene/room_desk.hpp"
 
@@ -16,7 +16,7 @@ namespace osteon {
 struct PeopleClientOptions {
   std::string address;  // host:port
   std::string room{};   // empty: the only one that is open
-  wire::Door door{};
+  wire::ClientCredentials credentials{};
   std::string name = "console";  // shown to others
   std::chrono::milliseconds patience{5000};
   // The newest join of a window that is in the room already: people are heard of under its identity. None: joins by itself,

@@ -194,7 +194,7 @@ struct RoomWatch::Impl {
 
 Result<void> RoomWatch::Impl::join(std::chrono::milliseconds patience) {
   auto answer =
-      wire::join_room(options.address, wire::ClientKind::viewer, options.name, patience, [this] { return stopping(); }, options.room, options.door);
+      wire::join_room(options.address, wire::ClientKind::viewer, options.name, patience, [this] { return stopping(); }, options.room, options.credentials);
   if (!answer) return tl::unexpected(answer.error());
   const std::lock_guard lock(mutex);
   joined = std::move(*answer);

@@ -10,7 +10,7 @@
 #include "common/core/result.hpp"
 #include "common/geometry/lattice.hpp"
 #include "common/surface/look.hpp"
-#include "common/wire/door.hpp"
+#include "common/wire/credentials.hpp"
 #include "common/wire/room_client.hpp"
 #include "viewer_client/scene/inbox.hpp"
 #include "viewer_client/scene/item_place.hpp"
@@ -21,7 +21,7 @@ namespace osteon {
 struct RoomWatchOptions {
   std::string address;          // host:port
   std::string room{};           // which of the server's; empty: the only one that is open
-  wire::Door door{};
+  wire::ClientCredentials credentials{};
   std::string name = "viewer";  // shown to others
   std::chrono::milliseconds patience{5000};
   // From where the window looks at a bone with these bounds at first; none: it wants all of the bone in full.

@@ -19,7 +19,7 @@ import rooms
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "deploy/session"))
 
-import doors  # noqa: E402  (they, too, use what is found through the path above)
+import authentication  # noqa: E402  (they, too, use what is found through the path above)
 import insiders  # noqa: E402
 import plans  # noqa: E402
 import record  # noqa: E402
@@ -245,6 +245,6 @@ def scan(run):
     return imports.slab_volume(run) | {f"scan_{name}": physics[f"rig_{name}"] for name in forces}
 
 
-GROUPS = {**kernels.GROUPS, **devices.GROUPS, **doors.GROUPS, **insiders.GROUPS,
+GROUPS = {**kernels.GROUPS, **devices.GROUPS, **authentication.GROUPS, **insiders.GROUPS,
           **feel.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, "expert": expert,
           "novice": novice, "rig": rig, "scan": scan, "real_imports": imports.real_imports}

@@ -14,7 +14,7 @@ import raw_http2
 from delay_line import DelayLine
 from insider_attack import GET_STATUS, START_S
 from processes import Failure, Household
-from together import ROOM, Doors
+from together import ROOM, Certificates
 
 ROOT = Path(__file__).resolve().parents[3]
 ATTACK = Path(__file__).resolve().parent / "insider_attack.py"
@@ -41,13 +41,13 @@ class Place:
 
     def __init__(self, run, household, folder, proxied, *more):
         folder.mkdir(parents=True, exist_ok=True)
-        self.doors = Doors(run.programs, folder)
+        self.certificates = Certificates(run.programs, folder)
         self.programs, self.folder, self.certificates = run.programs, folder, folder / "certs" / "server"
         address_file = folder / "address"
         address_file.unlink(missing_ok=True)
         socket_file = folder / "proxy.sock"
         self.server = household.start("osteon-server", [
-            run.programs / "osteon-server", "--case", run.phantom(), "--listen", "127.0.0.1:0", *self.doors.server,
+            run.programs / "osteon-server", "--case", run.phantom(), "--listen", "127.0.0.1:0", *self.certificates.server,
             "--address-file", address_file, *(["--proxy-socket", socket_file] if proxied else []), *more])
         address = household.wait_for_file(address_file, "osteon-server", 60.0)
         self.children = [self.server]
@@ -66,7 +66,7 @@ class Place:
 
     def person(self, name, role):
         """Options of a client of theirs; their folder; their ticket."""
-        options = self.doors.person(name, role)
+        options = self.certificates.person(name, role)
         return options, options[1], options[3].read_text(encoding="utf-8").split()[0]
 
     def memory_mib(self):
@@ -126,7 +126,7 @@ def attacked(run, household, place, way, kind, holder):
     source = f"127.0.1.{1 + 3 * ATTACKS.index(kind) + HOLDERS.index(holder)}"  # each has an address of its own
     _, person, _ = place.person(who, "observer")
     if holder == "revoked":
-        place.doors.revoke(who)
+        place.certificates.revoke(who)
         time.sleep(REVOKED_S)
     _, bystander, ticket = place.person("anna", "observer")
     headers = raw_http2.admission(ticket, ROOM)
@@ -208,7 +208,7 @@ def uploads(run):
 
 def upload(place, archive):
     """Seconds from the first byte until the server has said, after the last one, that these bytes are no archive."""
-    options = place.doors.person("olga", "operator", room="*")
+    options = place.certificates.person("olga", "operator", room="*")
     began, said = None, []
     with DelayLine((place.host, place.port), DELAY_S) as line:
         command = [place.programs / "osteon-server", "cases", "upload", archive, "--server", line.address, *options]

@@ -13,7 +13,7 @@
 #include <string>
 
 #include "common/access/access_list.hpp"
-#include "tests/support/doors/people.hpp"
+#include "tests/support/authentication/people.hpp"
 
 namespace osteon {
 namespace {

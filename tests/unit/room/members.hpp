@@ -44,8 +44,8 @@ inline v1::GetStatusResponse status_of(const wire::JoinedRoom& room) {
 class Surgeon {
  public:
   Surgeon(const std::string& address, const std::filesystem::path& cache, const std::string& fast_path = {},
-          const std::string& in_room = {}, const wire::Door& door = {}) {
-    auto joined = RoomSession::join({.address = address, .room = in_room, .door = door, .cache = cache, .fast_path = fast_path}, {});
+          const std::string& in_room = {}, const wire::ClientCredentials& credentials = {}) {
+    auto joined = RoomSession::join({.address = address, .room = in_room, .credentials = credentials, .cache = cache, .fast_path = fast_path}, {});
     EXPECT_TRUE(joined.has_value()) << joined.error().message;
     session_.emplace(std::move(*joined));
     replica_.emplace(session_->bone(), BodyId{0}, session_->tools());

@@ -15,10 +15,10 @@
 
 #include "common/wire/room_client.hpp"
 #include "server/net/room_server.hpp"
-#include "tests/support/doors/people.hpp"
-#include "tests/support/doors/proxy.hpp"
-#include "tests/support/doors/raw_http2.hpp"
-#include "tests/support/doors/wrong_certificates.hpp"
+#include "tests/support/authentication/people.hpp"
+#include "tests/support/authentication/proxy.hpp"
+#include "tests/support/authentication/raw_http2.hpp"
+#include "tests/support/authentication/wrong_certificates.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/relay/impair_process.hpp"
 #include "tests/support/temp_dir.hpp"
@@ -49,7 +49,7 @@ class BothWays : public ::testing::TestWithParam<Way> {
  protected:
   void SetUp() override {
     if (const std::string missing = test::Proxy::missing(); is_proxied() && !missing.empty()) GTEST_SKIP() << missing;
-    anna_ = people_.door("anna", Role::trainee, "ward");
+    anna_ = people_.credentials("anna", Role::trainee, "ward");
     (void)people_.person("mallory");
   }
   void TearDown() override {
@@ -61,7 +61,7 @@ class BothWays : public ::testing::TestWithParam<Way> {
     if (capturing_) (void)log();
   }
   [[nodiscard]] static bool is_proxied() { return GetParam() == Way::proxy; }
-  void serve(DoorOptions doors = {}, const test::Proxy::Changes& changes = {}) {
+  void serve(ConnectionOptions doors = {}, const test::Proxy::Changes& changes = {}) {
     const Case bone = test::test_block();
     ASSERT_TRUE(bone.save(dir_ / "case"));
     auto rooms = std::make_unique<Rooms>(RoomsOptions{.cases = {{bone, dir_ / "case"}}});
@@ -126,8 +126,8 @@ class BothWays : public ::testing::TestWithParam<Way> {
   }
   // A stream that is open, of somebody who has joined.
   std::unique_ptr<RawHttp2> stream_of(const std::string& user) {
-    const wire::Door door = people_.door(user, Role::trainee, "ward");
-    const auto joined = wire::join_room(address(), wire::ClientKind::viewer, user, 5s, {}, "ward", door);
+    const wire::ClientCredentials credentials = people_.credentials(user, Role::trainee, "ward");
+    const auto joined = wire::join_room(address(), wire::ClientKind::viewer, user, 5s, {}, "ward", credentials);
     EXPECT_TRUE(joined.has_value()) << joined.error().message;
     auto line = std::make_unique<RawHttp2>(address(), people_.person(user));
     const char author = static_cast<char>(joined.value().author.value);
@@ -138,7 +138,7 @@ class BothWays : public ::testing::TestWithParam<Way> {
 
   test::TempDir dir_;
   test::People people_;
-  wire::Door anna_;
+  wire::ClientCredentials anna_;
   std::unique_ptr<RoomServer> server_;
   std::optional<test::Proxy> proxy_;
   bool capturing_ = false;
@@ -151,7 +151,7 @@ TEST_P(BothWays, RefuseEveryWrongCertificateAndNoteItsAddress) {
   ASSERT_GE(wrong.size(), 13u);
   serve();
   EXPECT_TRUE(is_told(people_.person("anna"), "anna")) << "the right certificate";
-  const std::uint64_t admitted = server_->door_health().gate.admitted;
+  const std::uint64_t admitted = server_->connection_health().gate.admitted;
   for (const test::WrongCertificate& one : wrong) {
     SCOPED_TRACE(one.kind);
     const std::uint64_t noted = refusals() + noted_by_proxy();
@@ -159,7 +159,7 @@ TEST_P(BothWays, RefuseEveryWrongCertificateAndNoteItsAddress) {
     EXPECT_TRUE(test::wait_until([&] { return refusals() + noted_by_proxy() > noted; }, kPatience))
         << "nobody notes it";
   }
-  EXPECT_EQ(server_->door_health().gate.admitted, admitted);
+  EXPECT_EQ(server_->connection_health().gate.admitted, admitted);
   EXPECT_TRUE(is_told(people_.person("anna"), "anna"));
   EXPECT_THAT(log(), HasSubstr("127.0.0.1"));
 }
@@ -216,7 +216,7 @@ TEST_P(BothWays, LiveOnWhenAnybodySendsAHeaderThatOnceEndedTheServer) {
     EXPECT_FALSE(call(people_.person("mallory"), path)) << "revoked";
     EXPECT_FALSE(call({}, path)) << "without a certificate";
   }
-  EXPECT_EQ(server_->door_health().gate.admitted, 0u);
+  EXPECT_EQ(server_->connection_health().gate.admitted, 0u);
   const std::string said = log();
   EXPECT_TRUE(is_named(said, "ben"));
   EXPECT_TRUE(is_named(said, "mallory"));
@@ -234,7 +234,7 @@ TEST_P(BothWays, LiveOnWhenAnybodyResetsCallsRapidly) {
       if (!line.call(stream, kGetStatus) || !line.reset(stream)) break;
     EXPECT_TRUE(line.closed_within(kPatience)) << "may go on for ever";
   }
-  EXPECT_LT(server_->door_health().gate.admitted + server_->door_health().gate.refused, 8'000u);
+  EXPECT_LT(server_->connection_health().gate.admitted + server_->connection_health().gate.refused, 8'000u);
   const std::string said = log();
   EXPECT_TRUE(is_named(said, "ben"));
   EXPECT_TRUE(is_named(said, "mallory"));
@@ -248,9 +248,9 @@ TEST_P(BothWays, EndTheStreamsOfAMachineThatAnswersNothing) {
                                {"clitcpka-cnt 3", "clitcpka-cnt 2"},
                                {"tcp-ut 25s", "tcp-ut 2s"}});
   const auto mallorys = stream_of("mallory");
-  ASSERT_EQ(server_->door_health().gate.streams, 1u);
+  ASSERT_EQ(server_->connection_health().gate.streams, 1u);
   mallorys->go_deaf();
-  EXPECT_TRUE(test::wait_until([&] { return server_->door_health().gate.streams == 0; }, kPatience));
+  EXPECT_TRUE(test::wait_until([&] { return server_->connection_health().gate.streams == 0; }, kPatience));
 }
 
 // Seconds that the configuration gives to a word of it.
@@ -271,7 +271,7 @@ TEST(ShippedTimes, EndADeadClientWithin30Seconds) {
   EXPECT_NE(proxy.find("\n  option clitcpka\n"), std::string::npos);
   EXPECT_LE(seconds(proxy, "tcp-ut"), kMost) << "while something was sent to it";
   EXPECT_LE(seconds(proxy, "timeout client"), kMost) << "that takes nothing of what waits for it";
-  EXPECT_LE(2 * std::chrono::duration_cast<std::chrono::seconds>(DoorOptions{}.keepalive).count(), kMost)
+  EXPECT_LE(2 * std::chrono::duration_cast<std::chrono::seconds>(ConnectionOptions{}.keepalive).count(), kMost)
       << "asked after that time, and given as long to answer";
 }
 

@@ -30,9 +30,9 @@
 #include "server/net/room_server.hpp"
 #include "server/net/rooms_client.hpp"
 #include "tests/architecture/proto_rules.hpp"
-#include "tests/support/doors/people.hpp"
-#include "tests/support/doors/proxy.hpp"
-#include "tests/support/doors/raw_http2.hpp"
+#include "tests/support/authentication/people.hpp"
+#include "tests/support/authentication/proxy.hpp"
+#include "tests/support/authentication/raw_http2.hpp"
 #include "tests/support/wait.hpp"
 #include "tests/unit/room/cuts.hpp"
 #include "tests/unit/room/members.hpp"
@@ -50,7 +50,7 @@ std::string content(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-class Doors : public ::testing::Test {
+class Authentication : public ::testing::Test {
  protected:
   void SetUp() override { serve({}); }
   void serve(const std::filesystem::path& proxy_socket) {
@@ -69,16 +69,16 @@ class Doors : public ::testing::Test {
   // Where clients come.
   virtual const std::string& address() { return server_->address(); }
   void expect_every_role_to_make_the_calls_that_are_for_it();
-  Result<wire::JoinedRoom> join(const wire::Door& door, wire::ClientKind kind = wire::ClientKind::viewer, const std::string& room = "ward") {
-    return wire::join_room(address(), kind, "whatever", 5s, {}, room, door);
+  Result<wire::JoinedRoom> join(const wire::ClientCredentials& credentials, wire::ClientKind kind = wire::ClientKind::viewer, const std::string& room = "ward") {
+    return wire::join_room(address(), kind, "whatever", 5s, {}, room, credentials);
   }
-  std::string refusal(const wire::Door& door, const std::string& room = "ward") {
-    const auto joined = wire::join_room(address(), wire::ClientKind::viewer, "whatever", 500ms, {}, room, door);
+  std::string refusal(const wire::ClientCredentials& credentials, const std::string& room = "ward") {
+    const auto joined = wire::join_room(address(), wire::ClientKind::viewer, "whatever", 500ms, {}, room, credentials);
     return joined ? std::string() : joined.error().message;
   }
-  // A channel with this door, as no client of ours would use it.
-  std::shared_ptr<grpc::Channel> channel(const wire::Door& door) {
-    return grpc::CreateChannel(address(), wire::credentials_of(door, address()).value());
+  // A channel with this credentials, as no client of ours would use it.
+  std::shared_ptr<grpc::Channel> channel(const wire::ClientCredentials& credentials) {
+    return grpc::CreateChannel(address(), wire::channel_credentials(credentials, address()).value());
   }
 
   test::TempDir dir_;
@@ -168,7 +168,7 @@ ByteBuffer request_of(const Method& method, std::uint64_t author) {
 
 bool has_author(const Method& method) { return method.request->FindFieldByName("author") != nullptr; }
 
-void Doors::expect_every_role_to_make_the_calls_that_are_for_it() {
+void Authentication::expect_every_role_to_make_the_calls_that_are_for_it() {
   // By the rules as people are told them: what a role may do beyond looking.
   const std::set<std::string> hands{"Session", "AddTool", "Undo", "Redo", "Mark", "SetSceneItem", "RemoveSceneItem", "Say"},
       instructors{"RemoveBody", "SaveFields", "Supervise", "Annotate", "Demonstrate", "EndDemonstration"},
@@ -184,9 +184,9 @@ void Doors::expect_every_role_to_make_the_calls_that_are_for_it() {
   int calls = 0;
   for (const Role role : {Role::observer, Role::trainee, Role::collaborator, Role::instructor, Role::operator_}) {
     const std::string user = "user-" + std::string(to_string(role));
-    const wire::Door door = people_.door(user, role, "ward");
-    const auto line = channel(door);
-    const std::map<std::string, std::string> metadata{{"osteon-room-bin", "ward"}, {"osteon-ticket", wire::ticket_text(door)}};
+    const wire::ClientCredentials credentials = people_.credentials(user, role, "ward");
+    const auto line = channel(credentials);
+    const std::map<std::string, std::string> metadata{{"osteon-room-bin", "ward"}, {"osteon-ticket", wire::ticket_text(credentials)}};
     for (const Method& method : methods()) {
       const std::string name = method.name.substr(method.name.rfind('/') + 1);
       const Called called = call(line, method.name, request_of(method, 0), metadata);
@@ -203,10 +203,10 @@ void Doors::expect_every_role_to_make_the_calls_that_are_for_it() {
   EXPECT_GT(methods().size(), 30u);
 }
 
-TEST_F(Doors, LetEveryRoleMakeTheCallsThatAreForIt) { expect_every_role_to_make_the_calls_that_are_for_it(); }
+TEST_F(Authentication, LetEveryRoleMakeTheCallsThatAreForIt) { expect_every_role_to_make_the_calls_that_are_for_it(); }
 
 // With the proxy of deploy/haproxy.cfg, which ends TLS and says of each call whose it is.
-class DoorsBehindAProxy : public Doors {
+class AuthenticationBehindAProxy : public Authentication {
  protected:
   void SetUp() override {
     if (const std::string missing = test::Proxy::missing(); !missing.empty()) GTEST_SKIP() << missing;
@@ -217,44 +217,44 @@ class DoorsBehindAProxy : public Doors {
   std::optional<test::Proxy> proxy_;
 };
 
-TEST_F(DoorsBehindAProxy, LetEveryRoleMakeTheCallsThatAreForIt) {
+TEST_F(AuthenticationBehindAProxy, LetEveryRoleMakeTheCallsThatAreForIt) {
   expect_every_role_to_make_the_calls_that_are_for_it();
 }
 
-TEST_F(DoorsBehindAProxy, KnowPeopleByTheirCertificatesAndAddresses) {
-  EXPECT_EQ(refusal(people_.door("anna", Role::trainee, "ward")), "");
+TEST_F(AuthenticationBehindAProxy, KnowPeopleByTheirCertificatesAndAddresses) {
+  EXPECT_EQ(refusal(people_.credentials("anna", Role::trainee, "ward")), "");
   EXPECT_THAT(
-      refusal({.certificates = people_.person("ben"), .ticket = people_.door("anna", Role::trainee, "ward").ticket}),
+      refusal({.certificates = people_.person("ben"), .ticket = people_.credentials("anna", Role::trainee, "ward").ticket}),
       HasSubstr("the ticket is for anna and the certificate for ben"));
   // Two people over one connection of the proxy to the server stay two.
   EXPECT_THAT(
-      refusal({.certificates = people_.person("anna"), .ticket = people_.door("ben", Role::trainee, "ward").ticket}),
+      refusal({.certificates = people_.person("anna"), .ticket = people_.credentials("ben", Role::trainee, "ward").ticket}),
       HasSubstr("the ticket is for ben and the certificate for anna"));
 }
 
-TEST_F(DoorsBehindAProxy, BelieveNoHeaderThatAClientSends) {
+TEST_F(AuthenticationBehindAProxy, BelieveNoHeaderThatAClientSends) {
   const std::string annas = content(people_.person("anna") / "person.pem");
   std::string base64;
   std::istringstream lines(annas);
   for (std::string line; std::getline(lines, line);)
     if (!line.starts_with("-----")) base64 += line;
-  const std::string ticket = wire::ticket_text(people_.door("anna", Role::instructor, "ward"));
+  const std::string ticket = wire::ticket_text(people_.credentials("anna", Role::instructor, "ward"));
   const std::map<std::string, std::string> metadata{{"osteon-ticket", ticket},
                                                     {"osteon-client-certificate", base64},
                                                     {"osteon-client-address", "10.1.2.3"}};
-  const wire::Door ben = people_.door("ben", Role::trainee, "ward");
+  const wire::ClientCredentials ben = people_.credentials("ben", Role::trainee, "ward");
   const std::vector<std::string> places{server_->address(), proxy_->address()};
   for (const std::string& place : places) {
-    const auto line = grpc::CreateChannel(place, wire::credentials_of(ben, place).value());
+    const auto line = grpc::CreateChannel(place, wire::channel_credentials(ben, place).value());
     const Called called = call(line, "/osteon.v1.RoomService/GetStatus", {}, metadata);
     EXPECT_NE(called.status.error_code(), StatusCode::OK) << place;
     EXPECT_FALSE(called.answered) << place;
   }
-  EXPECT_EQ(server_->door_health().gate.admitted, 0u);
+  EXPECT_EQ(server_->connection_health().gate.admitted, 0u);
 }
 
-TEST_F(DoorsBehindAProxy, AreShutToWhoWasRevokedAndToOtherAuthorities) {
-  EXPECT_EQ(refusal(people_.door("anna", Role::trainee, "ward")), "");
+TEST_F(AuthenticationBehindAProxy, AreShutToWhoWasRevokedAndToOtherAuthorities) {
+  EXPECT_EQ(refusal(people_.credentials("anna", Role::trainee, "ward")), "");
   test::People elsewhere;
   EXPECT_FALSE(test::RawHttp2(address(), elsewhere.person("anna")).read(5s).has_value());
   EXPECT_FALSE(test::RawHttp2(address()).read(5s).has_value());
@@ -265,11 +265,11 @@ TEST_F(DoorsBehindAProxy, AreShutToWhoWasRevokedAndToOtherAuthorities) {
   EXPECT_FALSE(test::RawHttp2(address(), people_.person("anna")).read(5s).has_value()) << "a new connection";
   (void)before.call(1, "/osteon.v1.RoomService/GetStatus");
   EXPECT_TRUE(before.closed_within(test::kPatience)) << "the connection that was open";
-  EXPECT_EQ(refusal(people_.door("ben", Role::trainee, "ward")), "");
+  EXPECT_EQ(refusal(people_.credentials("ben", Role::trainee, "ward")), "");
   EXPECT_THAT(proxy_->log(), HasSubstr("certificate fault 23")) << "openssl verify's number of a revoked certificate";
 }
 
-TEST_F(DoorsBehindAProxy, KeepInsidersFromTheServer) {
+TEST_F(AuthenticationBehindAProxy, KeepInsidersFromTheServer) {
   // The headers end a gRPC 1.51 that is asked with an AuthMetadataProcessor, or by itself (CVE-2023-1428).
   const test::RawHttp2::Headers strange[] = {
       {{"grpclb_client_stats", "x"}}, {{"lb-token", "x"}}, {{"te", "x"}}, {{":scheme", "x"}}};
@@ -284,16 +284,16 @@ TEST_F(DoorsBehindAProxy, KeepInsidersFromTheServer) {
   for (std::uint32_t stream = 1; stream < 40'001; stream += 2)
     if (!line.call(stream, "/osteon.v1.CuttingService/Session") || !line.reset(stream)) break;
   EXPECT_TRUE(proxy_->running());
-  EXPECT_EQ(refusal(people_.door("anna", Role::trainee, "ward")), "");
-  EXPECT_LT(server_->door_health().gate.admitted + server_->door_health().gate.refused, 8'000u);
+  EXPECT_EQ(refusal(people_.credentials("anna", Role::trainee, "ward")), "");
+  EXPECT_LT(server_->connection_health().gate.admitted + server_->connection_health().gate.refused, 8'000u);
 }
 
-TEST_F(Doors, LetNobodyCallAsSomebodyElse) {
-  const auto ben = join(people_.door("ben", Role::instructor, "ward"));
+TEST_F(Authentication, LetNobodyCallAsSomebodyElse) {
+  const auto ben = join(people_.credentials("ben", Role::instructor, "ward"));
   ASSERT_TRUE(ben.has_value()) << ben.error().message;
-  const wire::Door door = people_.door("anna", Role::instructor, "ward");
-  const std::map<std::string, std::string> metadata{{"osteon-room-bin", "ward"}, {"osteon-ticket", wire::ticket_text(door)}};
-  const auto line = channel(door);
+  const wire::ClientCredentials credentials = people_.credentials("anna", Role::instructor, "ward");
+  const std::map<std::string, std::string> metadata{{"osteon-room-bin", "ward"}, {"osteon-ticket", wire::ticket_text(credentials)}};
+  const auto line = channel(credentials);
   int tried = 0;
   for (const Method& method : methods()) {
     if (!has_author(method)) continue;
@@ -310,8 +310,8 @@ TEST_F(Doors, LetNobodyCallAsSomebodyElse) {
   EXPECT_GT(tried, 15);
 }
 
-TEST_F(Doors, NeedACertificateOfTheirOwnAuthority) {
-  const wire::Door anna = people_.door("anna", Role::trainee, "ward");
+TEST_F(Authentication, NeedACertificateOfTheirOwnAuthority) {
+  const wire::ClientCredentials anna = people_.credentials("anna", Role::trainee, "ward");
   EXPECT_EQ(refusal(anna), "");
   EXPECT_THAT(refusal({}), HasSubstr("asks for a certificate")) << "plain text";
   test::People strangers;
@@ -328,7 +328,7 @@ TEST_F(Doors, NeedACertificateOfTheirOwnAuthority) {
   EXPECT_EQ(refusal(anna), "");
 }
 
-TEST_F(Doors, SayInOneSentenceWhatIsWrongWithATicket) {
+TEST_F(Authentication, SayInOneSentenceWhatIsWrongWithATicket) {
   const std::filesystem::path anna = people_.person("anna");
   const auto with = [&](const std::filesystem::path& ticket) { return refusal({.certificates = anna, .ticket = ticket}); };
   EXPECT_THAT(with(people_.ticket("anna", "ward", Role::trainee, -5s)), HasSubstr("the ticket expired"));
@@ -340,16 +340,16 @@ TEST_F(Doors, SayInOneSentenceWhatIsWrongWithATicket) {
               HasSubstr("signature"));
   EXPECT_THAT(with(people_.folder() / "none"), HasSubstr("no ticket came"));
   // An observer comes to look, not to cut.
-  const auto hand = join(people_.door("eve", Role::observer, "ward"), wire::ClientKind::haptic);
+  const auto hand = join(people_.credentials("eve", Role::observer, "ward"), wire::ClientKind::haptic);
   ASSERT_FALSE(hand);
   EXPECT_EQ(hand.error().code, ErrorCode::denied);
   EXPECT_THAT(hand.error().message, HasSubstr("holds no tool"));
-  EXPECT_TRUE(join(people_.door("eve", Role::observer, "ward")));
+  EXPECT_TRUE(join(people_.credentials("eve", Role::observer, "ward")));
 }
 
-TEST_F(Doors, TakeATicketOnceOnly) {
+TEST_F(Authentication, TakeATicketOnceOnly) {
   // Twice with one call: two readers might take different ones.
-  const wire::Door anna = people_.door("anna", Role::trainee, "ward");
+  const wire::ClientCredentials anna = people_.credentials("anna", Role::trainee, "ward");
   grpc::ClientContext context;
   context.AddMetadata("osteon-ticket", wire::ticket_text(anna));
   context.AddMetadata("osteon-room-bin", "ward");
@@ -359,17 +359,17 @@ TEST_F(Doors, TakeATicketOnceOnly) {
   EXPECT_EQ(status.error_code(), StatusCode::INVALID_ARGUMENT) << status.error_message();
 }
 
-TEST_F(Doors, TakeNewCertificatesWithoutAStartAnew) {
+TEST_F(Authentication, TakeNewCertificatesWithoutAStartAnew) {
   // A surgeon's certificate of an authority that comes to be trusted while the server runs.
   test::People others;
   const std::filesystem::path guest = others.person("guest");
   std::filesystem::copy_file(people_.server() / "ca.pem", guest / "ca.pem", std::filesystem::copy_options::overwrite_existing);
-  const wire::Door door{.certificates = guest, .ticket = people_.ticket("guest", "ward", Role::observer)};
-  EXPECT_NE(refusal(door), "");
+  const wire::ClientCredentials credentials{.certificates = guest, .ticket = people_.ticket("guest", "ward", Role::observer)};
+  EXPECT_NE(refusal(credentials), "");
   const std::string both = content(people_.server() / "ca.pem") + content(others.server() / "ca.pem");
   std::ofstream(dir_ / "both.pem") << both;
   std::filesystem::rename(dir_ / "both.pem", people_.server() / "ca.pem");
-  EXPECT_TRUE(test::wait_until([&] { return refusal(door).empty(); }, test::kPatience));
+  EXPECT_TRUE(test::wait_until([&] { return refusal(credentials).empty(); }, test::kPatience));
   // And a new key of the server's own.
   people_.certs({"server", "127.0.0.1"});
   const std::string fresh = content(people_.server() / "server.pem");
@@ -389,13 +389,13 @@ TEST_F(Doors, TakeNewCertificatesWithoutAStartAnew) {
       test::kPatience));
 }
 
-TEST_F(Doors, KeepRoomsApart) {
+TEST_F(Authentication, KeepRoomsApart) {
   // Without a room's name a call is to the ticket's.
-  const auto in_theatre = join(people_.door("anna", Role::trainee, "theatre"), wire::ClientKind::viewer, "");
+  const auto in_theatre = join(people_.credentials("anna", Role::trainee, "theatre"), wire::ClientKind::viewer, "");
   ASSERT_TRUE(in_theatre.has_value()) << in_theatre.error().message;
   EXPECT_EQ(in_theatre->name, "theatre");
   // An instructor of one room sees, checks and branches that one.
-  auto rooms = RoomsClient::reach(address(), 5s, {}, people_.door("ina", Role::instructor, "ward"));
+  auto rooms = RoomsClient::reach(address(), 5s, {}, people_.credentials("ina", Role::instructor, "ward"));
   ASSERT_TRUE(rooms.has_value());
   const auto list = rooms->list();
   ASSERT_TRUE(list.has_value()) << list.error().message;
@@ -408,7 +408,7 @@ TEST_F(Doors, KeepRoomsApart) {
   EXPECT_FALSE(rooms->branch("theatre", "copy", RoomSeq{0}));
   EXPECT_FALSE(rooms->create("third", ""));
   // Nor does she show in it what was cut in another.
-  const auto ina = join(people_.door("ina", Role::instructor, "ward"), wire::ClientKind::viewer, "");
+  const auto ina = join(people_.credentials("ina", Role::instructor, "ward"), wire::ClientKind::viewer, "");
   ASSERT_TRUE(ina.has_value()) << ina.error().message;
   v1::DemonstrateRequest shown;
   shown.set_author(ina->author.value);
@@ -419,22 +419,22 @@ TEST_F(Doors, KeepRoomsApart) {
   const grpc::Status status = v1::PeopleService::NewStub(ina->channel)->Demonstrate(&context, shown, &response);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::PERMISSION_DENIED) << status.error_message();
   EXPECT_THAT(status.error_message(), HasSubstr("theatre"));
-  auto all = RoomsClient::reach(address(), 5s, {}, people_.door("otto", Role::operator_, "*"));
+  auto all = RoomsClient::reach(address(), 5s, {}, people_.credentials("otto", Role::operator_, "*"));
   EXPECT_EQ(all->list()->size(), 2u);
   EXPECT_TRUE(all->create("third", ""));
   EXPECT_TRUE(all->remove("third", false));
 }
 
 // Which room a call is about says its message; the metadata, by which it was let in, may name another.
-TEST_F(Doors, JudgeCallsAboutRoomsByTheRoomsThatTheyName) {
-  const auto asked = [&](const wire::Door& door, const std::string& in, const std::string& about) {
+TEST_F(Authentication, JudgeCallsAboutRoomsByTheRoomsThatTheyName) {
+  const auto asked = [&](const wire::ClientCredentials& credentials, const std::string& in, const std::string& about) {
     grpc::ClientContext context;
-    context.AddMetadata("osteon-ticket", wire::ticket_text(door));
+    context.AddMetadata("osteon-ticket", wire::ticket_text(credentials));
     if (!in.empty()) context.AddMetadata("osteon-room-bin", in);
     v1::DeleteRoomRequest request;
     request.set_name(about);
     v1::DeleteRoomResponse response;
-    return v1::RoomsService::NewStub(channel(door))->DeleteRoom(&context, request, &response);
+    return v1::RoomsService::NewStub(channel(credentials))->DeleteRoom(&context, request, &response);
   };
   const auto is_there = [&](const std::string& name) { return server_->rooms().find(name).has_value(); };
   // More in one room than elsewhere.
@@ -442,13 +442,13 @@ TEST_F(Doors, JudgeCallsAboutRoomsByTheRoomsThatTheyName) {
   people_.append_access("role bob operator annex");
   people_.append_access("role otto observer ward");
   server_->rooms().gate->look();
-  const wire::Door bob = people_.door("bob", Role::observer, "*");
+  const wire::ClientCredentials bob = people_.credentials("bob", Role::observer, "*");
   EXPECT_EQ(asked(bob, "annex", "ward").error_code(), StatusCode::PERMISSION_DENIED);
   EXPECT_TRUE(is_there("ward"));
   EXPECT_TRUE(asked(bob, "annex", "annex").ok());
   EXPECT_FALSE(is_there("annex"));
   // Less in one room than elsewhere.
-  const wire::Door otto = people_.door("otto", Role::operator_, "*");
+  const wire::ClientCredentials otto = people_.credentials("otto", Role::operator_, "*");
   for (const char* in : {"", "ward", "theatre"}) EXPECT_EQ(asked(otto, in, "ward").error_code(), StatusCode::PERMISSION_DENIED) << in;
   EXPECT_TRUE(is_there("ward"));
   auto rooms = RoomsClient::reach(address(), 5s, {}, otto);
@@ -464,24 +464,24 @@ TEST_F(Doors, JudgeCallsAboutRoomsByTheRoomsThatTheyName) {
   EXPECT_EQ(asked(otto, "theatre", "").error_code(), StatusCode::INVALID_ARGUMENT);
 }
 
-TEST_F(Doors, DeleteNoBranchThatATicketIsNotFor) {
+TEST_F(Authentication, DeleteNoBranchThatATicketIsNotFor) {
   ASSERT_TRUE(server_->rooms().branch("ward", "annex", RoomSeq{0}));
-  auto own = RoomsClient::reach(address(), 5s, {}, people_.door("otto", Role::operator_, "ward"));
+  auto own = RoomsClient::reach(address(), 5s, {}, people_.credentials("otto", Role::operator_, "ward"));
   ASSERT_TRUE(own.has_value());
   const auto refused = own->remove("ward", true);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::denied) << refused.error().message;
   EXPECT_THAT(refused.error().message, HasSubstr("annex"));
   for (const char* name : {"ward", "annex"}) EXPECT_TRUE(server_->rooms().find(name)) << name;
-  auto any = RoomsClient::reach(address(), 5s, {}, people_.door("olga", Role::operator_, "*"));
+  auto any = RoomsClient::reach(address(), 5s, {}, people_.credentials("olga", Role::operator_, "*"));
   ASSERT_TRUE(any.has_value());
   EXPECT_EQ(any->remove("ward", true).value_or(std::vector<std::string>()).size(), 2u);
 }
 
-TEST_F(Doors, ShowNothingOfARoomInWhichOneIsNoInstructor) {
+TEST_F(Authentication, ShowNothingOfARoomInWhichOneIsNoInstructor) {
   people_.append_access("role ina trainee theatre");
   server_->rooms().gate->look();
-  const auto ina = join(people_.door("ina", Role::instructor, "*"));
+  const auto ina = join(people_.credentials("ina", Role::instructor, "*"));
   ASSERT_TRUE(ina.has_value()) << ina.error().message;
   v1::DemonstrateRequest shown;
   shown.set_author(ina->author.value);
@@ -514,7 +514,7 @@ TEST(DoorsSomewhere, HaveTheFastPathWhereverTheServerListens) {
     // By the names that are in the certificate.
     const std::string name = host == "localhost" ? host : host.front() == '[' ? "[::1]" : "127.0.0.1";
     const std::string at = name + (*server)->address().substr((*server)->address().rfind(':'));
-    test::Surgeon surgeon(at, dir / "cache", "", "ward", people.door("sue", Role::trainee, "ward"));
+    test::Surgeon surgeon(at, dir / "cache", "", "ward", people.credentials("sue", Role::trainee, "ward"));
     EXPECT_TRUE(test::wait_until([&] { return surgeon.session().fast_path().alive; }, test::kPatience)) << host;
     ++heard;
   }
@@ -540,7 +540,7 @@ TEST(DoorsSomewhere, HaveTheFastPathAtThePortThatIsAskedFor) {
   const auto server = start(at);
   ASSERT_TRUE(server.has_value()) << server.error().message;
   EXPECT_EQ((*server)->link_port(), port);
-  test::Surgeon surgeon((*server)->address(), dir / "cache", "", "ward", people.door("sue", Role::trainee, "ward"));
+  test::Surgeon surgeon((*server)->address(), dir / "cache", "", "ward", people.credentials("sue", Role::trainee, "ward"));
   EXPECT_TRUE(test::wait_until([&] { return surgeon.session().fast_path().alive; }, test::kPatience));
   // A second server finds it taken, before it prepares anything too.
   const auto second = start(at);
@@ -553,11 +553,11 @@ TEST(DoorsSomewhere, HaveTheFastPathAtThePortThatIsAskedFor) {
 }
 
 // A surgeon of the ward at work, and somebody beside who is in trouble.
-class DoorsAtWork : public Doors {
+class DoorsAtWork : public Authentication {
  protected:
   void SetUp() override {
-    Doors::SetUp();
-    surgeon_ = std::make_unique<test::Surgeon>(address(), dir_ / "cache", "", "ward", people_.door("sue", Role::trainee, "ward"));
+    Authentication::SetUp();
+    surgeon_ = std::make_unique<test::Surgeon>(address(), dir_ / "cache", "", "ward", people_.credentials("sue", Role::trainee, "ward"));
     ASSERT_TRUE(test::wait_until([&] { return surgeon_->complete(); }, test::kPatience));
   }
   // Cuts on, and expects it to arrive; her session is the one that she began with.
@@ -595,7 +595,7 @@ class DoorsAtWork : public Doors {
 };
 
 TEST_F(DoorsAtWork, EndTheStreamsOfSomebodyWhoIsRevoked) {
-  auto ben = join(people_.door("ben", Role::observer, "ward"));
+  auto ben = join(people_.credentials("ben", Role::observer, "ward"));
   ASSERT_TRUE(ben.has_value()) << ben.error().message;
   Watcher watcher(*ben);
   EXPECT_FALSE(watcher.over(600ms));
@@ -604,32 +604,32 @@ TEST_F(DoorsAtWork, EndTheStreamsOfSomebodyWhoIsRevoked) {
   const grpc::Status end = watcher.end.get();
   EXPECT_EQ(end.error_code(), StatusCode::UNAUTHENTICATED);
   EXPECT_THAT(end.error_message(), HasSubstr("revoked"));
-  EXPECT_NE(refusal(people_.door("ben", Role::observer, "ward")), "");
+  EXPECT_NE(refusal(people_.credentials("ben", Role::observer, "ward")), "");
   expect_undisturbed();
 }
 
 // Who does not read hears no reason, and is gone all the same: also what is on its way to nobody.
 TEST_F(DoorsAtWork, EndTheStreamsOfSomebodyWhoDoesNotRead) {
-  auto ben = join(people_.door("ben", Role::observer, "ward"));
+  auto ben = join(people_.credentials("ben", Role::observer, "ward"));
   ASSERT_TRUE(ben.has_value()) << ben.error().message;
-  const std::size_t others = server_->door_health().gate.streams;
+  const std::size_t others = server_->connection_health().gate.streams;
   std::filesystem::resize_file(dir_ / "case" / "bone.vdb", 32 << 20);  // more than any line holds by itself
   grpc::ClientContext context;
   v1::GetCaseRequest request;
   request.set_case_hash(wire::to_wire(test::test_block().hash()));
   const auto unread = v1::RoomService::NewStub(ben->channel)->GetCase(&context, request);
-  ASSERT_TRUE(test::wait_until([&] { return server_->door_health().gate.streams == others + 1; }, test::kPatience));
-  EXPECT_FALSE(test::wait_until([&] { return server_->door_health().gate.streams == others; }, 2s)) << "by itself it goes on";
+  ASSERT_TRUE(test::wait_until([&] { return server_->connection_health().gate.streams == others + 1; }, test::kPatience));
+  EXPECT_FALSE(test::wait_until([&] { return server_->connection_health().gate.streams == others; }, 2s)) << "by itself it goes on";
   people_.certs({"revoke", "ben"});
-  EXPECT_TRUE(test::wait_until([&] { return server_->door_health().gate.streams == others; }, 10s));
+  EXPECT_TRUE(test::wait_until([&] { return server_->connection_health().gate.streams == others; }, 10s));
   context.TryCancel();
   expect_undisturbed();
 }
 
 // A newer program of the same person, and the older one coming again behind it: whoever is in the queue, the newer one stays.
-TEST_F(Doors, GiveThePlaceToTheNewestAlsoInAQueue) {
-  const wire::Door door = people_.door("ben", Role::observer, "ward");
-  const auto older = join(door);
+TEST_F(Authentication, GiveThePlaceToTheNewestAlsoInAQueue) {
+  const wire::ClientCredentials credentials = people_.credentials("ben", Role::observer, "ward");
+  const auto older = join(credentials);
   ASSERT_TRUE(older.has_value()) << older.error().message;
   std::promise<void> go_on, held;
   (*server_->rooms().find("ward"))->host().run_slowly([&, wait = go_on.get_future().share()] {
@@ -637,7 +637,7 @@ TEST_F(Doors, GiveThePlaceToTheNewestAlsoInAQueue) {
     wait.wait();
   });
   held.get_future().wait();
-  const auto admitted = [&] { return server_->door_health().gate.admitted; };
+  const auto admitted = [&] { return server_->connection_health().gate.admitted; };
   const auto queue = [&](auto ask) {
     const std::uint64_t before = admitted();
     auto answer = std::async(std::launch::async, std::move(ask));
@@ -645,7 +645,7 @@ TEST_F(Doors, GiveThePlaceToTheNewestAlsoInAQueue) {
     std::this_thread::sleep_for(200ms);  // from the gate into the queue
     return answer;
   };
-  auto newer = queue([&] { return join(door); });
+  auto newer = queue([&] { return join(credentials); });
   auto again = queue([&] { return wire::join_again(*older, wire::ClientKind::viewer, {}); });
   go_on.set_value();
   const auto newest = newer.get();
@@ -657,13 +657,13 @@ TEST_F(Doors, GiveThePlaceToTheNewestAlsoInAQueue) {
 }
 
 TEST_F(DoorsAtWork, EndTheSessionOfSomebodyWhoseRoleIsTakenAway) {
-  test::Surgeon ben(address(), dir_ / "cache", "", "ward", people_.door("ben", Role::collaborator, "ward"));
+  test::Surgeon ben(address(), dir_ / "cache", "", "ward", people_.credentials("ben", Role::collaborator, "ward"));
   ASSERT_TRUE(test::wait_until([&] { return ben.complete(); }, test::kPatience));
   people_.append_access("role ben observer ward");
   ASSERT_TRUE(test::wait_until([&] { return !ben.lost().empty(); }, 10s));
   EXPECT_THAT(ben.lost(), HasSubstr("an observer may not call Session"));
   EXPECT_EQ(ben.interruptions(), 0) << "it does not come again by itself";
-  EXPECT_TRUE(join(people_.door("ben", Role::collaborator, "ward"))) << "but may watch";
+  EXPECT_TRUE(join(people_.credentials("ben", Role::collaborator, "ward"))) << "but may watch";
   expect_undisturbed();
 }
 
@@ -677,10 +677,10 @@ TEST_F(DoorsAtWork, EndTheStreamsOfATicketThatExpires) {
 }
 
 TEST_F(DoorsAtWork, GiveTheNewerSessionOfAPersonThePlace) {
-  const wire::Door door = people_.door("ben", Role::observer, "ward");
-  const auto first = join(door);
+  const wire::ClientCredentials credentials = people_.credentials("ben", Role::observer, "ward");
+  const auto first = join(credentials);
   Watcher older(*first);
-  const auto second = join(door);
+  const auto second = join(credentials);
   ASSERT_TRUE(second.has_value());
   Watcher newer(*second);
   ASSERT_TRUE(older.over(10s));
@@ -693,15 +693,15 @@ TEST_F(DoorsAtWork, GiveTheNewerSessionOfAPersonThePlace) {
 
 // A person's console has a place of its own beside their window.
 TEST_F(DoorsAtWork, GiveAConsoleAPlaceBesideTheWindow) {
-  const wire::Door door = people_.door("ina", Role::instructor, "ward");
-  const auto window = join(door);
+  const wire::ClientCredentials credentials = people_.credentials("ina", Role::instructor, "ward");
+  const auto window = join(credentials);
   ASSERT_TRUE(window.has_value());
   Watcher seen(*window);
-  const auto first = join(door, wire::ClientKind::console);
+  const auto first = join(credentials, wire::ClientKind::console);
   ASSERT_TRUE(first.has_value()) << first.error().message;
   Watcher older(*first);
   EXPECT_FALSE(older.over(600ms));
-  const auto second = join(door, wire::ClientKind::console);
+  const auto second = join(credentials, wire::ClientKind::console);
   ASSERT_TRUE(second.has_value());
   Watcher newer(*second);
   ASSERT_TRUE(older.over(10s));
@@ -714,9 +714,9 @@ TEST_F(DoorsAtWork, GiveAConsoleAPlaceBesideTheWindow) {
 }
 
 TEST_F(DoorsAtWork, StandWhatIsTooLargeOrNoMessage) {
-  const wire::Door door = people_.door("ben", Role::trainee, "ward");
-  const auto line = channel(door);
-  const std::map<std::string, std::string> metadata{{"osteon-room-bin", "ward"}, {"osteon-ticket", wire::ticket_text(door)}};
+  const wire::ClientCredentials credentials = people_.credentials("ben", Role::trainee, "ward");
+  const auto line = channel(credentials);
+  const std::map<std::string, std::string> metadata{{"osteon-room-bin", "ward"}, {"osteon-ticket", wire::ticket_text(credentials)}};
   const std::string large(5 * 1024 * 1024, 'x'), nonsense = "\xff\xff\xff\xff\xff\x01\x02";
   for (const char* method : {"/osteon.v1.RoomService/Join", "/osteon.v1.RoomService/AddTool", "/osteon.v1.WatchService/WatchMesh", "/osteon.v1.CuttingService/Session"}) {
     const grpc::Slice too_large(large), no_message(nonsense);
@@ -735,16 +735,16 @@ TEST_F(DoorsAtWork, StandWhatIsTooLargeOrNoMessage) {
 }
 
 TEST_F(DoorsAtWork, RefuseFurtherConnectionsAndLetThemInAgain) {
-  const ListenerCounts before = server_->door_health().connections;
+  const ListenerCounts before = server_->connection_health().connections;
   std::vector<std::unique_ptr<RawConnection>> strangers;
   for (std::size_t i = 0; i < 2 * kMostConnections; ++i) strangers.push_back(std::make_unique<RawConnection>(address()));
-  ASSERT_TRUE(test::wait_until([&] { return server_->door_health().connections.refused > before.refused; }, 10s));
-  EXPECT_LE(server_->door_health().connections.open, kMostConnections);
+  ASSERT_TRUE(test::wait_until([&] { return server_->connection_health().connections.refused > before.refused; }, 10s));
+  EXPECT_LE(server_->connection_health().connections.open, kMostConnections);
   expect_undisturbed();
   strangers.clear();
-  EXPECT_TRUE(test::wait_until([&] { return server_->door_health().connections.open <= before.open; }, test::kPatience))
+  EXPECT_TRUE(test::wait_until([&] { return server_->connection_health().connections.open <= before.open; }, test::kPatience))
       << "connections that are gone are counted";
-  EXPECT_TRUE(test::wait_until([&] { return refusal(people_.door("ben", Role::observer, "ward")).empty(); }, test::kPatience));
+  EXPECT_TRUE(test::wait_until([&] { return refusal(people_.credentials("ben", Role::observer, "ward")).empty(); }, test::kPatience));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "tests/support/doors/wrong_certificates.hpp"
+#include "tests/support/authentication/wrong_certificates.hpp"
 
 #include <openssl/evp.h>
 #include <openssl/pem.h>

@@ -23,7 +23,7 @@
 #include "osteon/v1/room.grpc.pb.h"
 #include "server/net/refused_calls.hpp"
 #include "server/net/room_server.hpp"
-#include "tests/support/doors/people.hpp"
+#include "tests/support/authentication/people.hpp"
 #include "tests/support/wait.hpp"
 #include "tests/unit/room/cuts.hpp"
 #include "tests/unit/room/members.hpp"
@@ -60,7 +60,7 @@ class Refused : public ::testing::Test {
     ASSERT_TRUE(started.has_value()) << started.error().message;
     server_ = std::move(*started);
     sue_ = std::make_unique<test::Surgeon>(address(), dir_ / "cache", "", "ward",
-                                           people_.door("sue", Role::trainee, "ward"));
+                                           people_.credentials("sue", Role::trainee, "ward"));
     ASSERT_TRUE(test::wait_until([&] { return sue_->complete(); }, test::kPatience));
     for (const auto& [reason, count] : server_->rooms().refusals.counts())
       ADD_FAILURE() << "refused before anything was: " << reason;
@@ -77,8 +77,8 @@ class Refused : public ::testing::Test {
     EXPECT_EQ(sue_->lost(), "");
   }
   const std::string& address() { return server_->address(); }
-  std::string refusal(const wire::Door& door, const std::string& room = "ward") {
-    const auto joined = wire::join_room(address(), wire::ClientKind::viewer, "whatever", 500ms, {}, room, door);
+  std::string refusal(const wire::ClientCredentials& credentials, const std::string& room = "ward") {
+    const auto joined = wire::join_room(address(), wire::ClientKind::viewer, "whatever", 500ms, {}, room, credentials);
     return joined ? std::string() : joined.error().message;
   }
   std::uint64_t counted(const std::string& reason) {
@@ -119,7 +119,7 @@ class Refused : public ::testing::Test {
 };
 
 TEST_F(Refused, ATicketIsItsOwnersAlone) {
-  const wire::Door anna = people_.door("anna", Role::trainee, "ward");
+  const wire::ClientCredentials anna = people_.credentials("anna", Role::trainee, "ward");
   auto first = wire::join_room(address(), wire::ClientKind::viewer, "whatever", 5s, {}, "ward", anna);
   ASSERT_TRUE(first.has_value()) << first.error().message;
   grpc::ClientContext watching;
@@ -139,11 +139,11 @@ TEST_F(Refused, ATicketIsItsOwnersAlone) {
   while (watch->Read(&said)) continue;
   EXPECT_THAT(watch->Finish().error_message(), HasSubstr("a newer session of anna took the place of this one"));
   // Twice with one call: two readers might take different ones.
-  const auto channel = grpc::CreateChannel(address(), wire::credentials_of(anna, address()).value());
+  const auto channel = grpc::CreateChannel(address(), wire::channel_credentials(anna, address()).value());
   for (int i = 0; i < kTimes; ++i) {
     grpc::ClientContext context;
     context.AddMetadata("osteon-ticket", wire::ticket_text(anna));
-    context.AddMetadata("osteon-ticket", wire::ticket_text(people_.door("anna", Role::instructor, "ward")));
+    context.AddMetadata("osteon-ticket", wire::ticket_text(people_.credentials("anna", Role::instructor, "ward")));
     v1::GetStatusResponse response;
     const grpc::Status status = v1::RoomService::NewStub(channel)->GetStatus(&context, {}, &response);
     EXPECT_EQ(status.error_code(), StatusCode::INVALID_ARGUMENT) << status.error_message();
@@ -181,14 +181,14 @@ TEST_F(Refused, StrangersAreCountedAndLoggedOnce) {
 }
 
 TEST_F(Refused, JoinsAreLoggedOnceForEachKind) {
-  const wire::Door eve = people_.door("eve", Role::observer, "ward");
+  const wire::ClientCredentials eve = people_.credentials("eve", Role::observer, "ward");
   for (int i = 0; i < kTimes; ++i) {
     const auto hand = wire::join_room(address(), wire::ClientKind::haptic, "whatever", 5s, {}, "ward", eve);
     ASSERT_FALSE(hand);
     EXPECT_THAT(hand.error().message, HasSubstr("holds no tool"));
   }
   EXPECT_EQ(counted("role"), static_cast<std::uint64_t>(kTimes));
-  const auto channel = grpc::CreateChannel(address(), wire::credentials_of(eve, address()).value());
+  const auto channel = grpc::CreateChannel(address(), wire::channel_credentials(eve, address()).value());
   for (int i = 0; i < kTimes; ++i) {
     grpc::ClientContext context;
     context.AddMetadata("osteon-ticket", wire::ticket_text(eve));
@@ -205,8 +205,8 @@ TEST_F(Refused, JoinsAreLoggedOnceForEachKind) {
 }
 
 TEST_F(Refused, WhatMakesNoSenseIsRefusedWithAStatus) {
-  const wire::Door door = people_.door("ina", Role::instructor, "ward");
-  const auto ina = wire::join_room(address(), wire::ClientKind::haptic, "whatever", 5s, {}, "ward", door);
+  const wire::ClientCredentials credentials = people_.credentials("ina", Role::instructor, "ward");
+  const auto ina = wire::join_room(address(), wire::ClientKind::haptic, "whatever", 5s, {}, "ward", credentials);
   ASSERT_TRUE(ina.has_value()) << ina.error().message;
   const std::uint64_t author = ina->author.value;
   const auto room = v1::RoomService::NewStub(ina->channel);
@@ -305,7 +305,7 @@ TEST_F(Refused, WhatMakesNoSenseIsRefusedWithAStatus) {
 
 TEST_F(Refused, WhatIsTooLargeIsRefusedWithAStatus) {
   const auto ina = wire::join_room(address(), wire::ClientKind::viewer, "whatever", 5s, {}, "ward",
-                                   people_.door("ina", Role::instructor, "ward"));
+                                   people_.credentials("ina", Role::instructor, "ward"));
   ASSERT_TRUE(ina.has_value()) << ina.error().message;
   for (int i = 0; i < kTimes; ++i) {
     grpc::ClientContext context;

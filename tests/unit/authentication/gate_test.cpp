@@ -11,7 +11,7 @@
 #include <string>
 
 #include "server/net/person_certificate.hpp"
-#include "tests/support/doors/people.hpp"
+#include "tests/support/authentication/people.hpp"
 #include "tests/support/wait.hpp"
 
 namespace osteon {

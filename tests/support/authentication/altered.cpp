@@ -1,4 +1,4 @@
-#include "tests/support/doors/altered.hpp"
+#include "tests/support/authentication/altered.hpp"
 
 #include <openssl/pem.h>
 #include <openssl/x509.h>

@@ -12,7 +12,7 @@
 #include "server/net/room_owners.hpp"
 #include "server/net/room_server.hpp"
 #include "server/net/rooms_client.hpp"
-#include "tests/support/doors/people.hpp"
+#include "tests/support/authentication/people.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/support/wait.hpp"
 #include "tests/unit/room/cuts.hpp"
@@ -45,7 +45,7 @@ class Owners : public ::testing::Test {
     server_ = std::move(*started);
   }
   RoomsClient as(const std::string& name, Role role, const std::string& room) {
-    return RoomsClient::reach(server_->address(), 5s, {}, people_.door(name, role, room)).value();
+    return RoomsClient::reach(server_->address(), 5s, {}, people_.credentials(name, role, room)).value();
   }
   static std::set<std::string> names(RoomsClient client) {
     std::set<std::string> names;

@@ -1,4 +1,4 @@
-"""Figures of closed doors: strangers who knock as often as they like, and bytes of every kind. Hands are simulated."""
+"""Figures of closed certificates: strangers who knock as often as they like, and bytes of every kind. Hands are simulated."""
 import functools
 import json
 import os
@@ -15,7 +15,7 @@ import plans
 import record
 import registry
 from processes import Failure, Household
-from together import ROOM, Doors
+from together import ROOM, Certificates
 
 ROOT = Path(__file__).resolve().parents[3]
 KNOCKS = 100_000
@@ -101,20 +101,20 @@ def knocking(run):
     run.say(f"{KNOCKS} strangers at the door of a server in which a hand works")
     out = run.folder / "knocking"
     (out / "logs").mkdir(parents=True, exist_ok=True)
-    doors = Doors(run.programs, out)  # of a folder that is new with every run
+    certificates = Certificates(run.programs, out)  # of a folder that is new with every run
     with Household(out / "logs") as household:
         noticed = open_door(run, household, out)
         address_file = out / "logs" / "address"
         address_file.unlink(missing_ok=True)
         server = household.start("osteon-server", [run.programs / "osteon-server", "--case", run.phantom(), "--listen", "127.0.0.1:0",
-                                                   *doors.server, "--address-file", address_file, "--summary", out / "server.json",
+                                                   *certificates.server, "--address-file", address_file, "--summary", out / "server.json",
                                                    "--journal", out / f"{ROOM}.journal"])
         address = household.wait_for_file(address_file, "osteon-server", 60.0)
         host, port = address.rsplit(":", 1)
         plan = out / "plan.json"
         # Slow enough that it is at work all the while.
         plan.write_text(json.dumps(plans.drill("rig", feed_mm_per_s=0.14, beyond_mm=1)), encoding="utf-8")
-        hand = household.start("hand", [run.programs / "osteon-haptic", "--server", address, *doors.person("anna", "trainee"),
+        hand = household.start("hand", [run.programs / "osteon-haptic", "--server", address, *certificates.person("anna", "trainee"),
                                         "--room", ROOM, "--plan", plan, "--cut-log", out / "cuts.csv", "--summary", out / "hand.json",
                                         "--session-log", out / "hand.csv"])
         hand.may_end = True

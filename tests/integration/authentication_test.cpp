@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "tests/integration/stage.hpp"
-#include "tests/support/doors/people.hpp"
+#include "tests/support/authentication/people.hpp"
 #include "tests/support/wait.hpp"
 #include "tests/support/xvfb.hpp"
 
@@ -35,7 +35,7 @@ class DoorsOfPrograms : public ::testing::Test {
     EXPECT_THAT(made.err, HasSubstr("ticket ")) << "its id, by which it is revoked";
     return people_.ticket_file(made.out.substr(0, made.out.find('\n')));
   }
-  std::vector<std::string> door(const std::string& user, const std::filesystem::path& with) {
+  std::vector<std::string> credentials(const std::string& user, const std::filesystem::path& with) {
     return {"--certificates", people_.person(user), "--ticket", with};
   }
   // An audio client that is turned away: one sentence that says why, and an exit code.
@@ -50,7 +50,7 @@ class DoorsOfPrograms : public ::testing::Test {
     const auto file = stage_ / (name + "-plan.json");
     std::ofstream(file) << plan.dump();
     return stage_.start("osteon-haptic", plus({"--server", stage_.address(), "--plan", file, "--summary", stage_ / (name + ".json"), "--cache", stage_ / "cache"},
-                                              door(user, ticket(user, role))));
+                                              credentials(user, ticket(user, role))));
   }
   // Connects and says what is neither TLS nor HTTP.
   void say_nonsense() {
@@ -74,7 +74,7 @@ class DoorsOfPrograms : public ::testing::Test {
 TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
   Process sue = haptic("sue", "sue", "trainee", {{"steps", {drill_at(0, 0, "rig")}}});
   Process dora = haptic("dora", "dora", "collaborator", {{"steps", {drill_at(9, 9, "rig")}}});
-  Process ben = stage_.start("osteon-audio", plus({"--server", stage_.address(), "--output", "none"}, door("ben", ticket("ben", "observer"))));
+  Process ben = stage_.start("osteon-audio", plus({"--server", stage_.address(), "--output", "none"}, credentials("ben", ticket("ben", "observer"))));
 
   // With nothing, with plain text, with what another authority has made.
   EXPECT_THAT(turned_away({}, {.environment = {}, .without = {}, .folder = {}, .as_given = true}), HasSubstr("--certificates DIR with --ticket FILE"));
@@ -85,12 +85,12 @@ TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
   say_nonsense();
 
   // With a certificate, and a ticket that does not fit.
-  EXPECT_THAT(turned_away(door("eve", people_.ticket("eve", "room", Role::observer, -5s))), HasSubstr("the ticket expired"));
-  EXPECT_THAT(turned_away(door("eve", ticket("sue", "trainee"))), HasSubstr("the ticket is for sue and the certificate for eve"));
-  EXPECT_THAT(turned_away(plus(door("eve", ticket("eve", "observer", "theatre")), {"--room", "room"})), HasSubstr("the ticket is for room theatre"));
-  EXPECT_THAT(turned_away(door("eve", people_.ticket_file("osteon1.AAAA.AAAA"))), HasSubstr("malformed"));
-  EXPECT_THAT(turned_away(door("eve", strangers.ticket("eve", "room", Role::instructor))), HasSubstr("signature"));
-  const RunResult closing = run(program("osteon-server"), plus({"rooms", "close", "room", "--server", stage_.address()}, door("eve", ticket("eve", "instructor"))));
+  EXPECT_THAT(turned_away(credentials("eve", people_.ticket("eve", "room", Role::observer, -5s))), HasSubstr("the ticket expired"));
+  EXPECT_THAT(turned_away(credentials("eve", ticket("sue", "trainee"))), HasSubstr("the ticket is for sue and the certificate for eve"));
+  EXPECT_THAT(turned_away(plus(credentials("eve", ticket("eve", "observer", "theatre")), {"--room", "room"})), HasSubstr("the ticket is for room theatre"));
+  EXPECT_THAT(turned_away(credentials("eve", people_.ticket_file("osteon1.AAAA.AAAA"))), HasSubstr("malformed"));
+  EXPECT_THAT(turned_away(credentials("eve", strangers.ticket("eve", "room", Role::instructor))), HasSubstr("signature"));
+  const RunResult closing = run(program("osteon-server"), plus({"rooms", "close", "room", "--server", stage_.address()}, credentials("eve", ticket("eve", "instructor"))));
   EXPECT_NE(closing.exit_code, 0);
   EXPECT_THAT(closing.err, HasSubstr("an instructor may not call CloseRoom"));
 
@@ -127,7 +127,7 @@ TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
 TEST_F(DoorsOfPrograms, AConsoleAndAWindowOfOnePersonStayBesideEachOther) {
   const auto screen = Xvfb::start();
   ASSERT_TRUE(screen) << "Xvfb, of Debian's package xvfb, did not start";
-  const auto ida = door("ida", ticket("ida", "instructor"));
+  const auto ida = credentials("ida", ticket("ida", "instructor"));
   ScriptedViewer window(stage_.address(), *screen, ida);
   ASSERT_TRUE(window.tell("wait surface")) << window.process().err();
   const auto start = [&] { return stage_.start("osteon-viewer", plus({"--console", "--server", stage_.address()}, ida)); };

@@ -1,4 +1,4 @@
-#include "tests/support/doors/proxy.hpp"
+#include "tests/support/authentication/proxy.hpp"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/access/ticket.hpp"
-#include "common/wire/door.hpp"
+#include "common/wire/credentials.hpp"
 #include "tests/support/temp_dir.hpp"
 
 namespace osteon::test {
@@ -24,8 +24,8 @@ class People {
   [[nodiscard]] std::filesystem::path ticket(const std::string& user, const std::string& room, Role role,
                                              std::chrono::seconds good_for = std::chrono::hours(1));
   [[nodiscard]] std::filesystem::path ticket_file(const std::string& text);
-  // The door of somebody with a ticket of their own.
-  [[nodiscard]] wire::Door door(const std::string& name, Role role, const std::string& room);
+  // The credentials of somebody with a ticket of their own.
+  [[nodiscard]] wire::ClientCredentials credentials(const std::string& name, Role role, const std::string& room);
   // What deploy/certs says; fails the test where it fails.
   void certs(const std::vector<std::string>& arguments);
   // A line more in the server's list of who was revoked and whose role has changed.

@@ -1,4 +1,4 @@
-#include "tests/support/doors/people.hpp"
+#include "tests/support/authentication/people.hpp"
 
 #include <fstream>
 #include <iterator>
@@ -47,7 +47,7 @@ std::filesystem::path People::ticket(const std::string& user, const std::string&
   return ticket_file(sign_ticket(make_ticket(room, user, role, now + good_for).value(), key()));
 }
 
-wire::Door People::door(const std::string& name, Role role, const std::string& room) {
+wire::ClientCredentials People::credentials(const std::string& name, Role role, const std::string& room) {
   return {.certificates = person(name), .ticket = ticket(name, room, role)};
 }
 

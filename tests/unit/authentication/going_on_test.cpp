@@ -14,7 +14,7 @@
 #include "osteon/v1/cases.grpc.pb.h"
 #include "osteon/v1/people.grpc.pb.h"
 #include "server/net/room_server.hpp"
-#include "tests/support/doors/people.hpp"
+#include "tests/support/authentication/people.hpp"
 #include "tests/support/wait.hpp"
 #include "tests/unit/room/cuts.hpp"
 #include "tests/unit/room/members.hpp"
@@ -34,7 +34,7 @@ std::string content(const fs::path& file) {
 
 class GoingOn : public ::testing::Test {
  protected:
-  void start(DoorOptions doors = {}, IntakeQuota quota = {}, const fs::path& checker = "/bin/false") {
+  void start(ConnectionOptions doors = {}, IntakeQuota quota = {}, const fs::path& checker = "/bin/false") {
     const Case bone = test::test_block();
     ASSERT_TRUE(bone.save(dir_ / "case"));
     auto store = CaseStore::open(dir_ / "cases", checker, quota);
@@ -50,14 +50,14 @@ class GoingOn : public ::testing::Test {
     server_ = std::move(*started);
   }
   RoomHost& host() { return (*server_->rooms().find("ward"))->host(); }
-  wire::JoinedRoom join(const wire::Door& door) {
-    auto joined = wire::join_room(server_->address(), wire::ClientKind::viewer, "whatever", 5s, {}, "ward", door);
+  wire::JoinedRoom join(const wire::ClientCredentials& credentials) {
+    auto joined = wire::join_room(server_->address(), wire::ClientKind::viewer, "whatever", 5s, {}, "ward", credentials);
     EXPECT_TRUE(joined.has_value()) << joined.error().message;
     return joined.value();
   }
   std::unique_ptr<test::Surgeon> surgeon(const std::string& name) {
-    const wire::Door door = people_.door(name, Role::trainee, "ward");
-    auto one = std::make_unique<test::Surgeon>(server_->address(), dir_ / "cache", "", "ward", door);
+    const wire::ClientCredentials credentials = people_.credentials(name, Role::trainee, "ward");
+    auto one = std::make_unique<test::Surgeon>(server_->address(), dir_ / "cache", "", "ward", credentials);
     EXPECT_TRUE(test::wait_until([&] { return one->complete(); }, test::kPatience));
     return one;
   }
@@ -103,8 +103,8 @@ TEST_F(GoingOn, ADemonstrationEndsWithTheRightOfWhoStartedIt) {
     grpc::ClientContext context;
     return v1::PeopleService::NewStub(by.channel)->EndDemonstration(&context, request, &response);
   };
-  const auto ina = join(people_.door("ina", Role::instructor, "ward")), ira = join(people_.door("ira", Role::instructor, "ward")),
-             ida = join(people_.door("ida", Role::instructor, "ward"));
+  const auto ina = join(people_.credentials("ina", Role::instructor, "ward")), ira = join(people_.credentials("ira", Role::instructor, "ward")),
+             ida = join(people_.credentials("ida", Role::instructor, "ward"));
   const std::uint64_t of_ina = show(ina), of_ira = show(ira), of_ida = show(ida);
   const auto sessions = [&] { return host().health().sessions; };
   ASSERT_EQ(sessions(), 4u);
@@ -127,15 +127,15 @@ TEST_F(GoingOn, ADemonstrationGoesOnWhenItsStarterComesAnew) {
   start();
   const auto sue = surgeon("sue");
   for (int i = 0; i < 10; ++i) cut(*sue, 1);
-  const wire::Door door = people_.door("ina", Role::instructor, "ward");
-  const auto before = join(door);
+  const wire::ClientCredentials credentials = people_.credentials("ina", Role::instructor, "ward");
+  const auto before = join(credentials);
   v1::DemonstrateRequest request;
   request.set_author(before.author.value);
   request.set_speed(0.001);
   v1::DemonstrateResponse response;
   grpc::ClientContext context;
   ASSERT_TRUE(v1::PeopleService::NewStub(before.channel)->Demonstrate(&context, request, &response).ok());
-  const auto after = join(door);
+  const auto after = join(credentials);
   EXPECT_NE(after.author, before.author);
   server_->rooms().gate->look();
   v1::EndDemonstrationRequest ending;
@@ -149,10 +149,10 @@ TEST_F(GoingOn, ADemonstrationGoesOnWhenItsStarterComesAnew) {
 
 // An upload as some client makes it, piece by piece.
 struct Sending {
-  Sending(const std::string& address, const wire::Door& door) {
+  Sending(const std::string& address, const wire::ClientCredentials& credentials) {
     context.set_deadline(std::chrono::system_clock::now() + 2 * test::kPatience);  // where nobody ends it
-    context.AddMetadata("osteon-ticket", wire::ticket_text(door));
-    const auto channel = grpc::CreateChannel(address, wire::credentials_of(door, address).value());
+    context.AddMetadata("osteon-ticket", wire::ticket_text(credentials));
+    const auto channel = grpc::CreateChannel(address, wire::channel_credentials(credentials, address).value());
     writer = v1::CaseService::NewStub(channel)->UploadCase(&context, &response);
   }
   bool send() {
@@ -179,7 +179,7 @@ class Uploads : public GoingOn {
 
 TEST_F(Uploads, EndWithTheRightOfWhoSendsThem) {
   start();
-  const wire::Door otto = people_.door("otto", Role::operator_, "*");
+  const wire::ClientCredentials otto = people_.credentials("otto", Role::operator_, "*");
   Sending sending(server_->address(), otto);
   ASSERT_TRUE(sending.send());
   ASSERT_TRUE(test::wait_until([&] { return !fs::is_empty(dir_ / "cases"); }, test::kPatience));
@@ -197,7 +197,7 @@ TEST_F(Uploads, EndAlsoWhileTheyAreLookedThrough) {
   fs::permissions(checker, fs::perms::owner_all);
   start({}, {}, checker);
   ASSERT_TRUE(pack_case(dir_ / "case", dir_ / "case.zip"));
-  Sending sending(server_->address(), people_.door("otto", Role::operator_, "*"));
+  Sending sending(server_->address(), people_.credentials("otto", Role::operator_, "*"));
   v1::UploadCaseRequest whole;
   whole.set_data(content(dir_ / "case.zip"));
   ASSERT_LE(whole.data().size(), 1u << 20);
@@ -217,7 +217,7 @@ TEST_F(Uploads, EndAlsoWhileTheyAreLookedThrough) {
 
 TEST_F(Uploads, EndWhereNothingComesOrTheyTakeTooLong) {
   start({}, {.idle = 300ms, .sending = 1500ms});
-  const wire::Door otto = people_.door("otto", Role::operator_, "*");
+  const wire::ClientCredentials otto = people_.credentials("otto", Role::operator_, "*");
   Sending silent(server_->address(), otto);
   ASSERT_TRUE(silent.send());
   const grpc::Status idle = silent.writer->Finish();
@@ -234,13 +234,13 @@ TEST_F(GoingOn, ASessionDoesNotNoticeTheAgeOfItsConnection) {
   start({.connection_age = 400ms});
   const auto sue = surgeon("sue");
   cut(*sue, 5);
-  const std::uint64_t before = server_->door_health().connections.accepted;
+  const std::uint64_t before = server_->connection_health().connections.accepted;
   // Calls go over newer connections, each with a handshake of its own.
   EXPECT_TRUE(test::wait_until(
       [&] {
         std::this_thread::sleep_for(20ms);  // who asks without a pause is cut off
         EXPECT_GT(test::status_of(sue->session().room()).room_seq(), 0u);
-        return server_->door_health().connections.accepted >= before + 3;
+        return server_->connection_health().connections.accepted >= before + 3;
       },
       test::kPatience));
   cut(*sue, 5);

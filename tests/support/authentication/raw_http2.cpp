@@ -1,4 +1,4 @@
-#include "tests/support/doors/raw_http2.hpp"
+#include "tests/support/authentication/raw_http2.hpp"
 
 #include <arpa/inet.h>
 #include <linux/filter.h>

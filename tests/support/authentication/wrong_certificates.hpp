@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/doors/people.hpp"
+#include "tests/support/authentication/people.hpp"
 
 namespace osteon::test {
 

@@ -1,4 +1,4 @@
-#include "common/wire/door.hpp"
+#include "common/wire/credentials.hpp"
 
 #include <grpcpp/grpcpp.h>
 
@@ -31,28 +31,28 @@ bool is_ascii(const std::string& text) {
 
 }  // namespace
 
-void add_door_options(CLI::App& app, DoorArguments& arguments) {
+void add_credential_options(CLI::App& app, CredentialArguments& arguments) {
   app.add_option("--certificates", arguments.certificates, "Folder with ca.pem, person.pem and person.key: who the server is, and who you are");
   app.add_option("--ticket", arguments.ticket, "File with the ticket that says which room you may come into, and in what role");
   app.add_flag("--plain", arguments.plain, "Plain text without a certificate, to a server on this machine that was started so");
 }
 
-Result<Door> door_of(const DoorArguments& arguments) {
+Result<ClientCredentials> client_credentials(const CredentialArguments& arguments) {
   if (arguments.plain && (!arguments.certificates.empty() || !arguments.ticket.empty()))
     return failure(ErrorCode::invalid_input, "--plain goes without --certificates and --ticket; give one or the other");
-  if (arguments.plain) return Door{};
+  if (arguments.plain) return ClientCredentials{};
   if (arguments.certificates.empty() || arguments.ticket.empty()) return failure(ErrorCode::invalid_input, std::string("say how to come to the server: ") + kWays);
-  Door door{.certificates = arguments.certificates, .ticket = arguments.ticket};
-  const std::string ticket = first_word(door.ticket);
+  ClientCredentials credentials{.certificates = arguments.certificates, .ticket = arguments.ticket};
+  const std::string ticket = first_word(credentials.ticket);
   if (ticket.empty())
-    return failure(ErrorCode::not_found, door.ticket.string() + ", the ticket, is missing or empty; ask whoever runs " +
+    return failure(ErrorCode::not_found, credentials.ticket.string() + ", the ticket, is missing or empty; ask whoever runs " +
                                              "the server for it");
   if (!is_ascii(ticket))
-    return failure(ErrorCode::invalid_input, door.ticket.string() + ", the ticket, is no plain text (it may be " +
+    return failure(ErrorCode::invalid_input, credentials.ticket.string() + ", the ticket, is no plain text (it may be " +
                                                  "UTF-16, or begin with a byte order mark); save it as ASCII");
-  if (const Result<ProbeFiles> files = read_certificate_files(door.certificates); !files)
+  if (const Result<ProbeFiles> files = read_certificate_files(credentials.certificates); !files)
     return tl::unexpected(files.error());
-  return door;
+  return credentials;
 }
 
 bool is_loopback(const std::string& host) {
@@ -69,19 +69,19 @@ bool is_loopback(const std::string& host) {
   return at == last && parts[0] == 127;
 }
 
-Result<std::shared_ptr<grpc::ChannelCredentials>> credentials_of(const Door& door, const std::string& address) {
-  if (door.certificates.empty()) {
+Result<std::shared_ptr<grpc::ChannelCredentials>> channel_credentials(const ClientCredentials& credentials, const std::string& address) {
+  if (credentials.certificates.empty()) {
     if (is_loopback(address.substr(0, address.rfind(':')))) return grpc::InsecureChannelCredentials();
     return failure(ErrorCode::invalid_input, "plain text goes to a server on this machine alone, and " + address + " is another; give --certificates DIR with --ticket FILE");
   }
-  const Result<ProbeFiles> files = read_certificate_files(door.certificates);
+  const Result<ProbeFiles> files = read_certificate_files(credentials.certificates);
   if (!files) return tl::unexpected(files.error());
   return grpc::SslCredentials(
       {.pem_root_certs = files->authority, .pem_private_key = files->key, .pem_cert_chain = files->certificate});
 }
 
-std::string ticket_text(const Door& door) {
-  const std::string ticket = door.ticket.empty() ? std::string() : first_word(door.ticket);
+std::string ticket_text(const ClientCredentials& credentials) {
+  const std::string ticket = credentials.ticket.empty() ? std::string() : first_word(credentials.ticket);
   return is_ascii(ticket) ? ticket : std::string();
 }
 

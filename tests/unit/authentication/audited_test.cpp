@@ -17,7 +17,7 @@
 #include "server/net/audited_calls.hpp"
 #include "server/net/person_certificate.hpp"
 #include "server/net/rooms_client.hpp"
-#include "tests/support/doors/people.hpp"
+#include "tests/support/authentication/people.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/wait.hpp"
 #include "tests/unit/room/cuts.hpp"
@@ -57,18 +57,18 @@ class Audited : public ::testing::Test {
 
   struct Someone {
     std::string name{};
-    wire::Door door{};
+    wire::ClientCredentials credentials{};
     std::string serial{}, ticket{};
   };
   Someone come(const std::string& name, Role role, const std::string& room) {
-    Someone one{.name = name, .door = people_.door(name, role, room)};
-    one.serial = read_person_certificate(content(one.door.certificates / "person.pem")).value().serial;
-    std::string text = content(one.door.ticket);
+    Someone one{.name = name, .credentials = people_.credentials(name, role, room)};
+    one.serial = read_person_certificate(content(one.credentials.certificates / "person.pem")).value().serial;
+    std::string text = content(one.credentials.ticket);
     text.erase(text.find_last_not_of('\n') + 1);
     one.ticket = to_hex(open_ticket(text, check_key_of(people_.key())).value().id);
     return one;
   }
-  RoomsClient as(const Someone& one) { return RoomsClient::reach(address_, 5s, {}, one.door).value(); }
+  RoomsClient as(const Someone& one) { return RoomsClient::reach(address_, 5s, {}, one.credentials).value(); }
 
   test::RunResult audit(const std::vector<std::string>& arguments) {
     std::vector<std::string> all{"audit"};
@@ -144,7 +144,7 @@ TEST_F(Audited, SaysWhoMadeDeletedJoinedAndWasRefused) {
   EXPECT_EQ(find("DeleteRoom", "failed", "olga").value("detail", ""), "not found");
 
   const Someone anna = come("anna", Role::trainee, "hall");
-  ASSERT_TRUE(wire::join_room(address_, wire::ClientKind::viewer, "anna", 5s, {}, "hall", anna.door));
+  ASSERT_TRUE(wire::join_room(address_, wire::ClientKind::viewer, "anna", 5s, {}, "hall", anna.credentials));
   const json joined = find("Join", "ok", "anna");
   expect_is(joined, anna);
   EXPECT_EQ(joined.value("object", ""), "hall");
@@ -156,7 +156,7 @@ TEST_F(Audited, SaysWhoMadeDeletedJoinedAndWasRefused) {
   json revoked;
   ASSERT_TRUE(test::wait_until(
       [&] {
-        auto line = RoomsClient::reach(address_, 1s, {}, mallory.door);
+        auto line = RoomsClient::reach(address_, 1s, {}, mallory.credentials);
         if (line) (void)line->list();
         for (const json& one : shown({"--person", "mallory"}))
           if (one["detail"] == "revoked") revoked = one;
@@ -186,7 +186,7 @@ TEST_F(Audited, SaysWhoMadeDeletedJoinedAndWasRefused) {
 TEST_F(Audited, TakesDownWhatCommandsDoToJournalsAndForgets) {
   ASSERT_TRUE(as(olga_).create("hall", ""));
   const Someone anna = come("anna", Role::trainee, "hall");
-  ASSERT_TRUE(wire::join_room(address_, wire::ClientKind::viewer, "anna", 5s, {}, "hall", anna.door));
+  ASSERT_TRUE(wire::join_room(address_, wire::ClientKind::viewer, "anna", 5s, {}, "hall", anna.credentials));
   ASSERT_EQ(server_->terminate(30s), 0) << server_->err();
   const std::string journal = rooms() / "hall.journal";
   const auto command = [&](std::vector<std::string> arguments) {

@@ -14,8 +14,8 @@
 
 #include "common/wire/room_client.hpp"
 #include "server/net/room_server.hpp"
-#include "tests/support/doors/people.hpp"
-#include "tests/support/doors/raw_http2.hpp"
+#include "tests/support/authentication/people.hpp"
+#include "tests/support/authentication/raw_http2.hpp"
 #include "tests/support/wait.hpp"
 #include "tests/unit/room/cuts.hpp"
 #include "tests/unit/room/members.hpp"
@@ -45,7 +45,7 @@ class Insiders : public ::testing::Test {
                           {.certificates = people_.server(), .flood = {.at_once = kCalls, .per_second = 1.0}});
     ASSERT_TRUE(started.has_value()) << started.error().message;
     server_ = std::move(*started);
-    anna_ = people_.door("anna", Role::trainee, "ward");
+    anna_ = people_.credentials("anna", Role::trainee, "ward");
     (void)people_.person("mallory");
     testing::internal::CaptureStdout();  // where a program that has not opened its log writes it
     capturing_ = true;
@@ -80,7 +80,7 @@ class Insiders : public ::testing::Test {
 
   test::TempDir dir_;
   test::People people_;
-  wire::Door anna_;
+  wire::ClientCredentials anna_;
   std::unique_ptr<RoomServer> server_;
   bool capturing_ = false;
 };
@@ -98,7 +98,7 @@ TEST_F(Insiders, AreRefusedForHeadersThatNoClientHas) {
       EXPECT_TRUE(is_answered(line)) << path << " " << headers.front().first;
     }
   // Nobody has come in without a ticket; without a strange header that alone is why.
-  EXPECT_EQ(server_->door_health().gate.admitted, 0u);
+  EXPECT_EQ(server_->connection_health().gate.admitted, 0u);
   RawHttp2 line(address(), people_.person("mallory"));
   ASSERT_TRUE(line.call(1, kSession));
   EXPECT_TRUE(is_answered(line));
@@ -118,7 +118,7 @@ TEST_F(Insiders, WhoAreRevokedFailInTheHandshake) {
         return !line.read(5s);
       },
       kPatience));
-  const std::uint64_t refused = server_->door_health().gate.refused;
+  const std::uint64_t refused = server_->connection_health().gate.refused;
   for (int i = 0; i < 5; ++i) {
     RawHttp2 line(address(), people_.person("mallory"));
     (void)line.call(1, kGetStatus, {{"grpclb_client_stats", "x"}});
@@ -126,7 +126,7 @@ TEST_F(Insiders, WhoAreRevokedFailInTheHandshake) {
     EXPECT_FALSE(line.read(5s).has_value());
     EXPECT_TRUE(line.closed_within(kPatience));
   }
-  EXPECT_EQ(server_->door_health().gate.refused, refused) << "calls came through";
+  EXPECT_EQ(server_->connection_health().gate.refused, refused) << "calls came through";
   EXPECT_GE(counted("revoked"), 5u);
   const std::string said = log();
   EXPECT_THAT(said, HasSubstr("mallory, certificate "));
@@ -140,7 +140,7 @@ TEST_F(Insiders, WhoAreRevokedLoseTheConnectionsThatTheyHave) {
   ASSERT_TRUE(is_answered(of_a_call));
   RawHttp2 of_no_call(address(), people_.person("mallory"));
   ASSERT_TRUE(of_no_call.read(5s).has_value());  // the server's settings: the handshake is over
-  const wire::Door anna = anna_;
+  const wire::ClientCredentials anna = anna_;
   RawHttp2 annas(address(), people_.person("anna"));
   ASSERT_TRUE(annas.call(1, kSession));
   ASSERT_TRUE(is_answered(annas));
@@ -149,7 +149,7 @@ TEST_F(Insiders, WhoAreRevokedLoseTheConnectionsThatTheyHave) {
   EXPECT_TRUE(of_a_call.closed_within(kPatience));
   EXPECT_TRUE(of_no_call.closed_within(kPatience));
   EXPECT_FALSE(annas.closed_within(1s)) << "the connection of somebody else was closed";
-  EXPECT_TRUE(test::wait_until([&] { return server_->door_health().connections.open == 1; }, kPatience));
+  EXPECT_TRUE(test::wait_until([&] { return server_->connection_health().connections.open == 1; }, kPatience));
 }
 
 // Whoever is about to make a first call notices nothing of the role of somebody else.
@@ -181,7 +181,7 @@ TEST_F(Insiders, WhoResetCallsRapidlyAreCutOffAndWait) {
   EXPECT_TRUE(line.closed_within(kPatience));
   EXPECT_GE(counted("flood"), 1u);
   // What had arrived when the connection was closed may still begin; it is refused.
-  EXPECT_LT(server_->door_health().gate.admitted + server_->door_health().gate.refused, 20'000u);
+  EXPECT_LT(server_->connection_health().gate.admitted + server_->connection_health().gate.refused, 20'000u);
   // They do not come again at once, whatever connection they take.
   EXPECT_FALSE(RawHttp2(address(), people_.person("mallory")).read(5s).has_value());
   EXPECT_TRUE(RawHttp2(address(), people_.person("anna")).read(5s).has_value());

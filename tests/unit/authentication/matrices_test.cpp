@@ -17,7 +17,7 @@
 #include "common/wire/room_client.hpp"
 #include "osteon/v1/people.grpc.pb.h"
 #include "server/net/room_server.hpp"
-#include "tests/support/doors/people.hpp"
+#include "tests/support/authentication/people.hpp"
 #include "tests/support/wait.hpp"
 #include "tests/unit/room/cuts.hpp"
 #include "tests/unit/room/members.hpp"
@@ -250,13 +250,13 @@ class Matrices : public ::testing::Test {
     ASSERT_TRUE(started.has_value()) << started.error().message;
     server_ = std::move(*started);
     sue_ = std::make_unique<test::Surgeon>(address(), dir_ / "cache", "", "ward",
-                                           people_.door("sue", Role::trainee, "ward"));
-    ina_ = join(people_.door("ina", Role::instructor, "ward"), wire::ClientKind::viewer).author;
+                                           people_.credentials("sue", Role::trainee, "ward"));
+    ina_ = join(people_.credentials("ina", Role::instructor, "ward"), wire::ClientKind::viewer).author;
     ASSERT_TRUE(test::wait_until([&] { return sue_->complete(); }, test::kPatience));
   }
   const std::string& address() { return server_->address(); }
-  wire::JoinedRoom join(const wire::Door& door, wire::ClientKind kind) {
-    auto joined = wire::join_room(address(), kind, "whatever", 5s, {}, "ward", door);
+  wire::JoinedRoom join(const wire::ClientCredentials& credentials, wire::ClientKind kind) {
+    auto joined = wire::join_room(address(), kind, "whatever", 5s, {}, "ward", credentials);
     EXPECT_TRUE(joined.has_value()) << joined.error().message;
     return joined.value_or(wire::JoinedRoom{});
   }
@@ -328,7 +328,7 @@ TEST_F(Matrices, EveryStreamTellsEveryRoleWhatIsForIt) {
   for (const Role role : {Role::observer, Role::trainee, Role::collaborator, Role::instructor}) {
     SCOPED_TRACE(to_string(role));
     const bool hand = role != Role::observer;
-    Member reader(join(people_.door("reader-" + std::string(to_string(role)), role, "ward"),
+    Member reader(join(people_.credentials("reader-" + std::string(to_string(role)), role, "ward"),
                        hand ? wire::ClientKind::haptic : wire::ClientKind::viewer));
     reader.watch();
     if (hand) {
@@ -351,8 +351,8 @@ TEST_F(Matrices, EveryStreamTellsEveryRoleWhatIsForIt) {
 }
 
 TEST_F(Matrices, NoStreamTellsAnOperatorOfARoom) {
-  const wire::Door door = people_.door("otto", Role::operator_, "ward");
-  const auto joined = wire::join_room(address(), wire::ClientKind::viewer, "whatever", 5s, {}, "ward", door);
+  const wire::ClientCredentials credentials = people_.credentials("otto", Role::operator_, "ward");
+  const auto joined = wire::join_room(address(), wire::ClientKind::viewer, "whatever", 5s, {}, "ward", credentials);
   ASSERT_FALSE(joined);
   EXPECT_THAT(joined.error().message, HasSubstr("an operator may not call"));
 }
@@ -361,8 +361,8 @@ TEST_F(Matrices, DatagramsBringEveryHandAllThatIsForIt) {
   for (const Role role : kHands) {
     SCOPED_TRACE(to_string(role));
     const std::string name = "hand-" + std::string(to_string(role));
-    Member hand(join(people_.door(name, role, "ward"), wire::ClientKind::haptic));
-    Member observer(join(people_.door("observer", Role::observer, "ward"), wire::ClientKind::viewer));
+    Member hand(join(people_.credentials(name, role, "ward"), wire::ClientKind::haptic));
+    Member observer(join(people_.credentials("observer", Role::observer, "ward"), wire::ClientKind::viewer));
     observer.watch();
     std::promise<v1::LinkOffer> offered;
     hand.open([&](const v1::LinkOffer& offer) { offered.set_value(offer); });
@@ -417,19 +417,19 @@ TEST_F(Matrices, DatagramsBringEveryHandAllThatIsForIt) {
 TEST_F(Matrices, DatagramsBringNothingToWhoHoldsNoTool) {
   for (const Role role : {Role::observer, Role::operator_}) {
     SCOPED_TRACE(to_string(role));
-    const wire::Door door = people_.door("eve-" + std::string(to_string(role)), role, "ward");
-    const auto as_hand = wire::join_room(address(), wire::ClientKind::haptic, "whatever", 5s, {}, "ward", door);
+    const wire::ClientCredentials credentials = people_.credentials("eve-" + std::string(to_string(role)), role, "ward");
+    const auto as_hand = wire::join_room(address(), wire::ClientKind::haptic, "whatever", 5s, {}, "ward", credentials);
     ASSERT_FALSE(as_hand);
     EXPECT_EQ(as_hand.error().code, ErrorCode::denied);
     EXPECT_THAT(as_hand.error().message,
                 HasSubstr(role == Role::observer ? "holds no tool" : "may not call Join"));
     // Nor does a session of a watcher, or of another's hand, get as far as the keys.
     std::uint64_t author = sue_->author().value;
-    if (role == Role::observer) author = join(door, wire::ClientKind::viewer).author.value;
+    if (role == Role::observer) author = join(credentials, wire::ClientKind::viewer).author.value;
     grpc::ClientContext context;
     context.AddMetadata("osteon-room-bin", "ward");
-    context.AddMetadata("osteon-ticket", wire::ticket_text(door));
-    const auto channel = grpc::CreateChannel(address(), wire::credentials_of(door, address()).value());
+    context.AddMetadata("osteon-ticket", wire::ticket_text(credentials));
+    const auto channel = grpc::CreateChannel(address(), wire::channel_credentials(credentials, address()).value());
     const auto session = v1::CuttingService::NewStub(channel)->Session(&context);
     v1::SessionRequest open;
     open.mutable_open()->set_author(author);
