@@ -23,7 +23,7 @@ struct ServerConfig {
   std::vector<std::filesystem::path> case_folders;
   std::string listen = "127.0.0.1:0";   // HOST:PORT
   std::string udp_listen;               // HOST:PORT of the fast path; empty: where `listen` is, a free port
-  std::filesystem::path certificates;   // folder, as Gate::open has it
+  std::filesystem::path certificates;   // folder, as Authorizer::open has it
   std::filesystem::path proxy_socket;   // Unix socket for a proxy of this machine; empty: none
   bool plain = false;                   // without: plain text, on this machine alone
   int most_ticket_hours = 0;            // 0: however long a ticket is good

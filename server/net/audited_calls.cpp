@@ -15,7 +15,7 @@
 #include "osteon/v1/room.pb.h"
 #include "osteon/v1/rooms.pb.h"
 #include "server/audit/audit_trail.hpp"
-#include "server/net/gate.hpp"
+#include "server/net/authorizer.hpp"
 #include "server/net/peer_claims.hpp"
 #include "server/net/refused_calls.hpp"
 
@@ -172,8 +172,8 @@ std::string header(const grpc::ServerContextBase& context, const char* key) {
 // One call. gRPC runs its hooks one after the other.
 class AuditedCall final : public grpc::experimental::Interceptor {
  public:
-  AuditedCall(AuditTrail& trail, Gate* gate, grpc::experimental::ServerRpcInfo& call)
-      : trail_(trail), gate_(gate), call_(call), row_(find_row(call.method())) {}
+  AuditedCall(AuditTrail& trail, Authorizer* authorizer, grpc::experimental::ServerRpcInfo& call)
+      : trail_(trail), authorizer_(authorizer), call_(call), row_(find_row(call.method())) {}
 
   void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
     using Point = InterceptionHookPoints;
@@ -202,8 +202,8 @@ class AuditedCall final : public grpc::experimental::Interceptor {
     event_.action = call_name(call_.method());
     event_.object = room;
     event_.who.address = peer.address;
-    if (gate_) {
-      Gate::CallTrace trace = gate_->trace_of({.peer = peer, .ticket = ticket, .room = room});
+    if (authorizer_) {
+      Authorizer::CallTrace trace = authorizer_->trace_of({.peer = peer, .ticket = ticket, .room = room});
       event_.who = std::move(trace.who);
       event_.object = std::move(trace.room);
     }
@@ -223,7 +223,7 @@ class AuditedCall final : public grpc::experimental::Interceptor {
   }
 
   AuditTrail& trail_;
-  Gate* const gate_;
+  Authorizer* const authorizer_;
   grpc::experimental::ServerRpcInfo& call_;
   const Row* const row_;  // null: of calls that are not audited unless they are refused
   AuditEvent event_{.action = "", .result = kOk};
@@ -232,14 +232,14 @@ class AuditedCall final : public grpc::experimental::Interceptor {
 
 class AuditedCalls final : public grpc::experimental::ServerInterceptorFactoryInterface {
  public:
-  AuditedCalls(AuditTrail& trail, Gate* gate) : trail_(trail), gate_(gate) {}
+  AuditedCalls(AuditTrail& trail, Authorizer* authorizer) : trail_(trail), authorizer_(authorizer) {}
   grpc::experimental::Interceptor* CreateServerInterceptor(grpc::experimental::ServerRpcInfo* call) override {
-    return new AuditedCall(trail_, gate_, *call);  // gRPC deletes it
+    return new AuditedCall(trail_, authorizer_, *call);  // gRPC deletes it
   }
 
  private:
   AuditTrail& trail_;
-  Gate* const gate_;
+  Authorizer* const authorizer_;
 };
 
 }  // namespace
@@ -251,8 +251,8 @@ std::string_view call_name(std::string_view method) {
 
 bool is_audited(std::string_view method) { return find_row(method) != nullptr; }
 
-std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> audited_calls(AuditTrail& trail, Gate* gate) {
-  return std::make_unique<AuditedCalls>(trail, gate);
+std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> audited_calls(AuditTrail& trail, Authorizer* authorizer) {
+  return std::make_unique<AuditedCalls>(trail, authorizer);
 }
 
 }  // namespace osteon

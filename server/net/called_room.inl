@@ -14,7 +14,7 @@
 #include "common/access/role_table.hpp"
 #include "common/core/check.hpp"
 #include "common/runtime/log.hpp"
-#include "server/net/gate.hpp"
+#include "server/net/authorizer.hpp"
 #include "server/net/out_stream.inl"
 #include "server/net/peer_claims.hpp"
 #include "server/net/refused_calls.hpp"
@@ -38,18 +38,18 @@ inline bool is_known_header(std::string_view name, bool by_proxy) {
   return std::ranges::find(kKnown, name) != kKnown.end();
 }
 
-inline tl::expected<Caller, Refusal> judged(Gate& gate, const grpc::CallbackServerContext& context, const std::string& room,
+inline tl::expected<Caller, Refusal> judged(Authorizer& authorizer, const grpc::CallbackServerContext& context, const std::string& room,
                                             std::string_view method) {
   const PeerClaims peer = peer_claims(context);
   const std::string ticket = metadata_of(context, "osteon-ticket").value_or("");
-  return gate.judge({.peer = peer, .ticket = ticket, .room = room, .method = method});
+  return authorizer.judge({.peer = peer, .ticket = ticket, .room = room, .method = method});
 }
 
 // Authorizes a call at its beginning: certificate, ticket, role, headers and how often. Null: it may go on. The one
 // place where calls are counted as admitted or refused; every handler begins with it.
 inline std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServerContext& context,
                                         std::string_view method) {
-  if (!rooms.gate) return {};
+  if (!rooms.authorizer) return {};
   const PeerClaims peer = peer_claims(context);
   const std::optional<std::string> room = metadata_of(context, "osteon-room-bin"),
                                    ticket = metadata_of(context, "osteon-ticket");
@@ -63,14 +63,14 @@ inline std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServer
   };
   const auto wrong = [&](std::string sentence) {
     tell("request");
-    rooms.gate->note_refused("request", sentence, call);
+    rooms.authorizer->note_refused("request", sentence, call);
     return Status(StatusCode::INVALID_ARGUMENT, short_words(std::move(sentence)));
   };
   for (const auto& [key, value] : context.client_metadata())
     if (!is_known_header({key.data(), key.size()}, peer.by_proxy))
       return wrong("the call has a header that this server does not know; leave out " + std::string(key.data(), key.size()));
   if (!room || !ticket) return wrong("the call says twice which ticket or room is meant");
-  const auto caller = rooms.gate->admit(call);
+  const auto caller = rooms.authorizer->admit(call);
   if (caller) return {};
   tell(caller.error().reason);
   return status_of(caller.error());
@@ -107,8 +107,8 @@ bool admitted(const Rooms& rooms, grpc::CallbackServerContext& context, grpc::Se
 // Who calls. Over plain text nobody says so: `user` is empty then, and the caller may do anything. Error denied: the caller's
 // right has ended since the call was let in.
 inline Result<Caller> caller_of(const Rooms& rooms, const grpc::CallbackServerContext& context) {
-  if (!rooms.gate) return Caller{};
-  auto caller = judged(*rooms.gate, context, metadata_of(context, "osteon-room-bin").value_or(""), {});
+  if (!rooms.authorizer) return Caller{};
+  auto caller = judged(*rooms.authorizer, context, metadata_of(context, "osteon-room-bin").value_or(""), {});
   if (!caller) return failure(ErrorCode::denied, caller.error().sentence);
   return std::move(*caller);
 }
@@ -117,8 +117,8 @@ inline Result<Caller> caller_of(const Rooms& rooms, const grpc::CallbackServerCo
 // by which it was let in. Error denied: the ticket is not for that room, or the role there may not make the call `method`.
 inline Result<Caller> caller_in(const Rooms& rooms, const grpc::CallbackServerContext& context, const std::string& room,
                                 std::string_view method) {
-  if (!rooms.gate) return Caller{};
-  auto caller = judged(*rooms.gate, context, room, method);
+  if (!rooms.authorizer) return Caller{};
+  auto caller = judged(*rooms.authorizer, context, room, method);
   if (!caller) return failure(ErrorCode::denied, "not in room " + room + ": " + caller.error().sentence);
   return std::move(*caller);
 }
@@ -135,10 +135,10 @@ inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const g
 // The same, of a call that is made as `author`. Error denied: that is not who calls.
 inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const grpc::CallbackServerContext& context, AuthorId author) {
   Result<std::shared_ptr<OpenRoom>> room = called_room(rooms, context);
-  if (!room || !rooms.gate) return room;
+  if (!room || !rooms.authorizer) return room;
   const Result<Caller> caller = caller_of(rooms, context);
   if (!caller) return tl::unexpected(caller.error());
-  if (const Result<void> own = rooms.gate->check_author(*caller, (*room)->name, author); !own) return tl::unexpected(own.error());
+  if (const Result<void> own = rooms.authorizer->check_author(*caller, (*room)->name, author); !own) return tl::unexpected(own.error());
   return room;
 }
 

@@ -47,7 +47,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
 
   UploadStream(Rooms& rooms, v1::UploadCaseResponse* response) : rooms_(rooms), store_(rooms.store()), response_(response) {}
 
-  // gRPC holds the stream until OnDone; the thread that looks cases through, the gate and the alarm may hold it longer.
+  // gRPC holds the stream until OnDone; the thread that looks cases through, the authorizer and the alarm may hold it longer.
   static UploadStream* launch(const std::shared_ptr<UploadStream>& stream, const Result<Caller>& caller) {
     stream->self_ = stream;
     stream->start(caller);
@@ -96,8 +96,8 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
     const std::lock_guard lock(mutex_);
     if (!caller) return finish(status_of(caller.error()));
     if (!store_) return finish({StatusCode::FAILED_PRECONDITION, "this server takes no cases; start it with --uploads FOLDER"});
-    if (rooms_.gate) {
-      auto entered = rooms_.gate->enter(*caller, caller->room, {}, kMethod, [weak = std::weak_ptr(self_)](const Refusal& why) {
+    if (rooms_.authorizer) {
+      auto entered = rooms_.authorizer->enter(*caller, caller->room, {}, kMethod, [weak = std::weak_ptr(self_)](const Refusal& why) {
         if (const auto self = weak.lock()) self->end(status_of(why));
       });
       if (!entered) return finish(status_of(entered.error()));
@@ -174,7 +174,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
   v1::UploadCaseResponse* const response_;  // until it has finished
   v1::UploadCaseRequest request_;
   std::atomic<bool> cancelled_{false};
-  std::shared_ptr<OpenStream> watched_;     // shared with the gate while it ends the stream
+  std::shared_ptr<OpenStream> watched_;     // shared with the authorizer while it ends the stream
   std::mutex mutex_;
   std::shared_ptr<UploadStream> self_;
   std::unique_ptr<Upload> upload_;          // once all has come, of the thread that keeps it

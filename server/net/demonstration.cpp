@@ -15,7 +15,7 @@
 
 #include "common/runtime/log.hpp"
 #include "osteon/v1/cutting.pb.h"
-#include "server/net/gate.hpp"
+#include "server/net/authorizer.hpp"
 #include "server/net/playback.hpp"
 #include "server/net/rooms.hpp"
 
@@ -43,11 +43,11 @@ class Demonstration final : public SessionSink, public std::enable_shared_from_t
       : host_(host), author_(author), cuts_(std::move(cuts)), speed_(speed) {}
 
   // Before start(). `by` may be whoever they were when they asked; a newer session of theirs leaves what they started alone.
-  [[nodiscard]] Result<void> stand_under(Gate& gate, const Caller& by, const std::string& room) {
+  [[nodiscard]] Result<void> stand_under(Authorizer& authorizer, const Caller& by, const std::string& room) {
     const auto end = [weak = weak_from_this()](const Refusal& why) {
       if (const auto self = weak.lock()) self->refuse({ErrorCode::denied, why.sentence});
     };
-    auto entered = gate.enter(by, room, {}, "/osteon.v1.PeopleService/Demonstrate", end);
+    auto entered = authorizer.enter(by, room, {}, "/osteon.v1.PeopleService/Demonstrate", end);
     if (!entered) return failure(ErrorCode::denied, entered.error().sentence);
     watched_ = std::move(*entered);
     return {};
@@ -218,7 +218,7 @@ class Demonstration final : public SessionSink, public std::enable_shared_from_t
   Clock::time_point due_{};
   bool stopped_ = false, over_ = false;
   std::string why_;
-  std::shared_ptr<OpenStream> watched_;        // shared with the gate while it ends this
+  std::shared_ptr<OpenStream> watched_;        // shared with the authorizer while it ends this
   std::thread thread_;
 };
 
@@ -313,8 +313,8 @@ Result<Shown> Demonstrations::begin(Rooms& rooms, OpenRoom& in, AuthorId by, con
   if (!author) return tl::unexpected(author.error());
   const Shown shown{*author, recording->cuts.size()};
   const auto one = std::make_shared<Demonstration>(host, *author, std::move(recording->cuts), what.speed);
-  if (rooms.gate)
-    if (const Result<void> may = one->stand_under(*rooms.gate, caller, in.name); !may) return tl::unexpected(may.error());
+  if (rooms.authorizer)
+    if (const Result<void> may = one->stand_under(*rooms.authorizer, caller, in.name); !may) return tl::unexpected(may.error());
   if (const Result<void> started = one->start(); !started) return tl::unexpected(started.error());
   going_on_.push_back(one);
   return shown;

@@ -53,7 +53,7 @@ class Demonstrations {
   void end_all();
 
  private:
-  std::mutex mutex_;  // taken before those of the room, the gate and a demonstration, within none
+  std::mutex mutex_;  // taken before those of the room, the authorizer and a demonstration, within none
   std::vector<std::shared_ptr<Demonstration>> going_on_;  // shared with the cuts that they have queued
   std::atomic<bool> over_{false};
 };

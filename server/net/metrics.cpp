@@ -150,7 +150,7 @@ std::vector<MetricFamily> figures_of(RoomServer& server, const fs::path& certifi
   page.counter("osteon_connections_refused_total", "Connections closed at once, beyond the limit.", {},
                static_cast<double>(connections.connections.refused));
   page.counter("osteon_streams_ended_total", "Streams ended since a right to them was over.", {},
-               static_cast<double>(connections.gate.ended));
+               static_cast<double>(connections.authorizer.ended));
   const LinkServerHealth links = server.link_health();
   const char* paths = "Fast paths, and those over which datagrams have come lately.";
   page.gauge("osteon_links", paths, {{"state", "open"}}, static_cast<double>(links.links));

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "common/core/bounded_text.hpp"
-#include "server/net/gate.hpp"
+#include "server/net/authorizer.hpp"
 #include "server/net/outbox.hpp"
 
 namespace osteon {
@@ -77,12 +77,12 @@ class OutStream : public Reactor {
     return raw;
   }
 
-  // From now on `gate` ends it when its caller may have it no more, or has come anew; null, over plain text: nothing does.
+  // From now on `authorizer` ends it when its caller may have it no more, or has come anew; null, over plain text: nothing does.
   // Before the stream is given to gRPC, or in its reactions to reads. False: the caller, or `author` where it is not null, may
   // not have it now, and it ends with the reason.
-  [[nodiscard]] bool stand_under(Gate* gate, const Caller& caller, const std::string& room, AuthorId author, std::string_view method) {
-    if (gate == nullptr) return true;
-    auto entered = gate->enter(caller, room, author, method, [this, weak = std::weak_ptr<void>(self_)](const Refusal& why) {
+  [[nodiscard]] bool stand_under(Authorizer* authorizer, const Caller& caller, const std::string& room, AuthorId author, std::string_view method) {
+    if (authorizer == nullptr) return true;
+    auto entered = authorizer->enter(caller, room, author, method, [this, weak = std::weak_ptr<void>(self_)](const Refusal& why) {
       if (const std::shared_ptr<void> keep = weak.lock()) close(status_of(why));
     });
     if (entered)
@@ -178,7 +178,7 @@ class OutStream : public Reactor {
   bool can_let_go_ = false;   // set before anybody else has the stream
   std::unique_ptr<grpc::Alarm> alarm_;
   std::shared_ptr<void> self_;
-  std::shared_ptr<OpenStream> watched_;  // shared with the gate while it ends the stream
+  std::shared_ptr<OpenStream> watched_;  // shared with the authorizer while it ends the stream
   std::optional<Status> closing_;
   bool writing_ = false, finished_ = false, done_ = false;
   ByteBuffer message_;

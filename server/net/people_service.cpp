@@ -78,7 +78,7 @@ class PeopleServiceImpl final : public PeopleBase {
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused(status_of(caller.error()));
     PeopleStream* stream = PeopleStream::launch(std::make_shared<PeopleStream>(*room, author), context);
-    if (stream->stand_under(rooms_.gate, *caller, (*room)->name, author, "/osteon.v1.PeopleService/WatchPeople")) stream->begin();
+    if (stream->stand_under(rooms_.authorizer, *caller, (*room)->name, author, "/osteon.v1.PeopleService/WatchPeople")) stream->begin();
     return stream;
   }
 

@@ -1,4 +1,4 @@
-// What is refused beside the gate: handshakes that fail, which gRPC alone hears of, and calls whose messages make no
+// What is refused beside the authorizer: handshakes that fail, which gRPC alone hears of, and calls whose messages make no
 // sense.
 #pragma once
 #include <memory>
@@ -36,11 +36,11 @@ class HandshakeWatch {
   AuditTrail* trail_ = nullptr;  // null: nothing is taken down
 };
 
-// The trailing header of a call that the gate refused: its reason in one word. The gate has noted the call.
+// The trailing header of a call that the authorizer refused: its reason in one word. The authorizer has noted the call.
 inline constexpr const char* kRefusalTrailer = "osteon-refusal";
 
 // Notes every call that ends since its message was malformed or nonsense ("request"), asked for too much ("quota"), or
-// was not its caller's to make ("denied"), by the caller's address. Join and the gate note their own. `refusals` outlives the server.
+// was not its caller's to make ("denied"), by the caller's address. Join and the authorizer note their own. `refusals` outlives the server.
 [[nodiscard]] std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> refused_call_notes(
     RefusalCounts& refusals);
 

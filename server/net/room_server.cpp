@@ -14,7 +14,7 @@
 #include "server/net/call_flood.hpp"
 #include "server/net/certificate.hpp"
 #include "server/net/cipher_order.hpp"
-#include "server/net/gate.hpp"
+#include "server/net/authorizer.hpp"
 #include "server/net/health_watch.hpp"
 #include "server/net/host_port.hpp"
 #include "server/net/link_server.hpp"
@@ -81,10 +81,10 @@ constexpr std::chrono::milliseconds kComeAgainAfter{1000}, kDrainLook{5};
 struct RoomServer::Impl {
   std::unique_ptr<Rooms> rooms;
   std::unique_ptr<HandshakeWatch> handshakes;
-  std::unique_ptr<Listener> listener;  // hands connections to the acceptor; its table of them outlives the gate
+  std::unique_ptr<Listener> listener;  // hands connections to the acceptor; its table of them outlives the authorizer
   std::unique_ptr<Listener> proxy_listener;  // null: there is no proxy
   std::unique_ptr<CallFlood> flood;    // null: plain text
-  std::unique_ptr<Gate> gate;          // null: plain text; outlives the streams
+  std::unique_ptr<Authorizer> authorizer;          // null: plain text; outlives the streams
   std::unique_ptr<LinkServer> links;   // outlives the streams
   std::vector<std::unique_ptr<grpc::Service>> services;
   std::unique_ptr<grpc::CallbackGenericService> unknown_calls;
@@ -133,23 +133,23 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   std::shared_ptr<grpc::ServerCredentials> credentials = grpc::InsecureServerCredentials();  // shared with gRPC
   if (!connections.certificates.empty()) {
     if (Result<void> preferred = prefer_own_cipher_order(); !preferred) return tl::unexpected(preferred.error());
-    Result<std::unique_ptr<Gate>> gate = Gate::open(connections.certificates, impl->rooms->refusals);
-    if (!gate) return tl::unexpected(gate.error());
+    Result<std::unique_ptr<Authorizer>> authorizer = Authorizer::open(connections.certificates, impl->rooms->refusals);
+    if (!authorizer) return tl::unexpected(authorizer.error());
     log_server_certificate(connections.certificates / "server.pem",
                            std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now()));
-    impl->gate = std::move(*gate);
-    impl->rooms->gate = impl->gate.get();
-    impl->gate->set_most_ticket_life(connections.most_ticket_life);
-    impl->gate->set_connections(impl->listener->connections());
-    if (impl->rooms->trail()) impl->gate->set_trail(*impl->rooms->trail());
-    impl->gate->set_only_room([all = impl->rooms.get()] {
+    impl->authorizer = std::move(*authorizer);
+    impl->rooms->authorizer = impl->authorizer.get();
+    impl->authorizer->set_most_ticket_life(connections.most_ticket_life);
+    impl->authorizer->set_connections(impl->listener->connections());
+    if (impl->rooms->trail()) impl->authorizer->set_trail(*impl->rooms->trail());
+    impl->authorizer->set_only_room([all = impl->rooms.get()] {
       const Result<std::shared_ptr<OpenRoom>> only = all->find("");
       return only ? (*only)->name : std::string();
     });
-    credentials = impl->gate->credentials();
+    credentials = impl->authorizer->credentials();
   }
   if (!connections.proxy_socket.empty()) {
-    if (!impl->gate)
+    if (!impl->authorizer)
       return failure(ErrorCode::invalid_input,
                      "--proxy-socket needs --certificates DIR: a proxy brings calls of people");
     Result<std::unique_ptr<Listener>> proxy = Listener::open_at(connections.proxy_socket, connections.most_connections);
@@ -194,14 +194,14 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   builder.SetMaxReceiveMessageSize(kMaxReceiveBytes);
   builder.SetMaxSendMessageSize(kMaxSendBytes);
   auto interceptors = refused_call_notes(impl->rooms->refusals);
-  if (impl->gate) {
+  if (impl->authorizer) {
     impl->flood = std::make_unique<CallFlood>(connections.flood);
     interceptors.push_back(
-        flood_watch(*impl->flood, [gate = impl->gate.get()](const PeerClaims& peer) { gate->note_flood(peer); }));
+        flood_watch(*impl->flood, [authorizer = impl->authorizer.get()](const PeerClaims& peer) { authorizer->note_flood(peer); }));
   }
   if (impl->rooms->trail()) {
     impl->handshakes->set_trail(*impl->rooms->trail());
-    interceptors.push_back(audited_calls(*impl->rooms->trail(), impl->gate.get()));
+    interceptors.push_back(audited_calls(*impl->rooms->trail(), impl->authorizer.get()));
   }
   builder.experimental().SetInterceptorCreators(std::move(interceptors));
   // Calls that no service has are authorized, counted and bounded as all others are.
@@ -218,7 +218,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
       acceptor->HandleNewConnection(&connection);
     };
   };
-  if (!impl->gate)
+  if (!impl->authorizer)
     impl->listener->watch_for_tls([watch = impl->handshakes.get()] {
       watch->note("a stranger: TLS",
                   "it speaks TLS, and this server plain text; give the server --certificates DIR, or "
@@ -228,7 +228,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   if (impl->proxy_listener) impl->proxy_listener->start(hand_to(impl->proxy_acceptor.get()));
   impl->health =
       std::make_unique<HealthWatch>(*impl->rooms, *impl->server->GetHealthCheckService(),
-                                    impl->gate ? HealthWatch::Of::server : HealthWatch::Of::server_and_rooms);
+                                    impl->authorizer ? HealthWatch::Of::server : HealthWatch::Of::server_and_rooms);
   impl->address = parse_host_port(listen, "--listen")->host + ":" + std::to_string(impl->listener->port());
   return std::unique_ptr<RoomServer>(new RoomServer(std::move(impl)));
 }
@@ -241,7 +241,7 @@ HostHealth RoomServer::health() const {
 }
 std::uint16_t RoomServer::link_port() const { return impl_->links ? impl_->links->port() : 0; }
 ConnectionHealth RoomServer::connection_health() const {
-  return {impl_->listener->counts(), impl_->gate ? impl_->gate->counts() : GateCounts{}};
+  return {impl_->listener->counts(), impl_->authorizer ? impl_->authorizer->counts() : AuthorizerCounts{}};
 }
 LinkServerHealth RoomServer::link_health() const { return impl_->links ? impl_->links->health() : LinkServerHealth{}; }
 

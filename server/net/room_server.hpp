@@ -9,7 +9,7 @@
 
 #include "common/core/result.hpp"
 #include "server/net/call_flood.hpp"
-#include "server/net/gate.hpp"
+#include "server/net/authorizer.hpp"
 #include "server/net/link_server.hpp"
 #include "server/net/listener.hpp"
 #include "server/net/room_host.hpp"
@@ -19,7 +19,7 @@
 namespace osteon {
 
 struct ConnectionOptions {
-  std::filesystem::path certificates{};  // as Gate::open has them; empty: plain text, on this machine alone
+  std::filesystem::path certificates{};  // as Authorizer::open has them; empty: plain text, on this machine alone
   std::size_t most_connections = 512;    // further ones are closed at once
   // A Unix socket at which a proxy of this machine brings calls in plain text, and says of each whose it is
   // (peer_claims.hpp); empty: there is none. Needs certificates.
@@ -39,7 +39,7 @@ struct ConnectionOptions {
 
 struct ConnectionHealth {
   ListenerCounts connections;
-  GateCounts gate;  // of none over plain text
+  AuthorizerCounts authorizer;  // of none over plain text
 };
 
 struct RoomServerOptions {

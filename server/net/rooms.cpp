@@ -12,7 +12,7 @@
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
 #include "common/wire/version.hpp"
-#include "server/net/gate.hpp"
+#include "server/net/authorizer.hpp"
 #include "server/net/journal_rows.hpp"
 #include "server/net/room_files.hpp"
 #include "server/net/room_owners.hpp"

@@ -32,7 +32,7 @@ namespace osteon {
 
 struct Caller;
 
-class Gate;
+class Authorizer;
 
 struct RoomSummary {
   Digest case_hash;
@@ -189,7 +189,7 @@ class Rooms {
   JobThread checks;      // uploaded cases, each looked through by a process, for as long as IntakeQuota lets it
   void end_calls();      // after those that wait; later ones run where they are made
   RefusalCounts refusals;  // of all doors
-  Gate* gate = nullptr;    // before every call; null: plain text, and everybody may do anything. It outlives the rooms' calls
+  Authorizer* authorizer = nullptr;    // before every call; null: plain text, and everybody may do anything. It outlives the rooms' calls
 
  private:
   [[nodiscard]] std::filesystem::path journal_of(const std::string& name) const;

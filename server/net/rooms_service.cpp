@@ -8,7 +8,7 @@
 #include "common/wire/convert.hpp"
 #include "osteon/v1/rooms.grpc.pb.h"
 #include "server/net/called_room.inl"
-#include "server/net/gate.hpp"
+#include "server/net/authorizer.hpp"
 #include "server/net/services.hpp"
 
 namespace osteon {
@@ -69,7 +69,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     return slowly(context, "CloseRoom", request->name(), [this, request, response] {
       const Result<RoomSummary> closed = rooms_.close(request->name());
       if (!closed) return status_of(closed.error());
-      if (rooms_.gate) rooms_.gate->forget_room(request->name());
+      if (rooms_.authorizer) rooms_.authorizer->forget_room(request->name());
       response->mutable_room()->set_name(request->name());
       for (const RoomListing& listing : rooms_.list())
         if (listing.name == request->name()) *response->mutable_room() = to_wire(listing);
@@ -94,7 +94,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
       const Result<std::vector<std::string>> gone = rooms_.remove(request->name(), request->with_branches(), may);
       if (!gone) return status_of(gone.error());
       for (const std::string& name : *gone) {
-        if (rooms_.gate) rooms_.gate->forget_room(name);
+        if (rooms_.authorizer) rooms_.authorizer->forget_room(name);
         response->add_deleted(name);
       }
       return Status(Status::OK);
@@ -153,12 +153,12 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
   }
   // An operator, and who made it: also with a ticket for another room, as of a branch that they made.
   [[nodiscard]] Result<void> may_delete(Context& context, const std::string& name) const {
-    if (!rooms_.gate) return {};
+    if (!rooms_.authorizer) return {};
     const std::string call = method("DeleteRoom");
     const Result<Caller> in_room = caller_in(rooms_, context, name, call), caller = caller_of(rooms_, context);
     if (!caller) return tl::unexpected(caller.error());
     if (in_room && in_room->role == Role::operator_) return {};
-    if (is_owner(*caller, name) && may_call(rooms_.gate->role_in(*caller, name), call)) return {};
+    if (is_owner(*caller, name) && may_call(rooms_.authorizer->role_in(*caller, name), call)) return {};
     if (!in_room) return tl::unexpected(in_room.error());
     return failure(ErrorCode::denied, name + " is not yours; only who made it, or an operator, may delete it");
   }

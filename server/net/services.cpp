@@ -139,7 +139,7 @@ class RoomServiceImpl final : public RoomBase {
       RoomHost& host = room->host();
       const Case& bone = host.bone();
       const bool again = request->resume_author() != 0;
-      const Gate::Coming coming = again ? Gate::Coming::again : Gate::Coming::anew;
+      const Authorizer::Coming coming = again ? Authorizer::Coming::again : Authorizer::Coming::anew;
       // First what the caller was told is kept: after a loss the caller's number may be another's.
       if (const Result<void> kept = again ? check_kept(host, *request) : Result<void>(); !kept) {
         rooms_.refusals.note("loss", address_of(context->peer()), kept.error().message);
@@ -150,15 +150,15 @@ class RoomServiceImpl final : public RoomBase {
         rooms_.refusals.note("role", address_of(context->peer()), may.error().message);
         return reactor->Finish(status_of(may.error()));
       }
-      const std::optional<Role> role = rooms_.gate ? std::optional(caller.role) : std::nullopt;
+      const std::optional<Role> role = rooms_.authorizer ? std::optional(caller.role) : std::nullopt;
       const Result<AuthorId> author =
           again ? come_back(host, *request, role) : come(host, *request, *response, caller);
       if (!author) {
         rooms_.refusals.note("room", address_of(context->peer()), author.error().message);
         return reactor->Finish(status_of(author.error()));
       }
-      if (rooms_.gate)
-        if (const Result<void> seated = rooms_.gate->joined(caller, room->name, request->kind(), *author, coming); !seated)
+      if (rooms_.authorizer)
+        if (const Result<void> seated = rooms_.authorizer->joined(caller, room->name, request->kind(), *author, coming); !seated)
           return reactor->Finish(status_of(seated.error()));
       room->note_version(*author, request->protocol_version());
       log::info("joined", {{"room", room->name},
@@ -228,7 +228,7 @@ class RoomServiceImpl final : public RoomBase {
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused(status_of(caller.error()));
     std::string of_room;
-    if (rooms_.gate) {
+    if (rooms_.authorizer) {
       // A ticket for a room opens no other room's case.
       const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context);
       if (!room) return refused(status_of(room.error()));
@@ -237,7 +237,7 @@ class RoomServiceImpl final : public RoomBase {
       of_room = (*room)->name;
     }
     CaseStream* stream = CaseStream::launch(std::make_shared<CaseStream>(rooms_.files, served->folder), context);
-    if (stream->stand_under(rooms_.gate, *caller, of_room, {}, "/osteon.v1.RoomService/GetCase")) stream->start();
+    if (stream->stand_under(rooms_.authorizer, *caller, of_room, {}, "/osteon.v1.RoomService/GetCase")) stream->start();
     return stream;
   }
 
@@ -429,12 +429,12 @@ class RoomServiceImpl final : public RoomBase {
   }
   [[nodiscard]] Result<void> may_resume(const Caller& caller, const OpenRoom& room,
                                         const v1::JoinRequest& request) const {
-    if (!rooms_.gate) return {};
-    return rooms_.gate->check_resume(caller, room.name, request.kind(), AuthorId{request.resume_author()});
+    if (!rooms_.authorizer) return {};
+    return rooms_.authorizer->check_resume(caller, room.name, request.kind(), AuthorId{request.resume_author()});
   }
   // What the name of the call does not say.
   [[nodiscard]] Result<void> may_join(const Caller& caller, const v1::JoinRequest& request) const {
-    if (rooms_.gate && request.kind() == v1::CLIENT_KIND_HAPTIC && !has_right(caller.role, Right::hold_a_tool))
+    if (rooms_.authorizer && request.kind() == v1::CLIENT_KIND_HAPTIC && !has_right(caller.role, Right::hold_a_tool))
       return failure(ErrorCode::denied, "your role here, " + std::string(to_string(caller.role)) +
                                             ", holds no tool; come as a viewer, or ask for a ticket of another role");
     return {};

@@ -31,10 +31,10 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   static constexpr int kMostUnheard = 1024;  // cuts that a haptic client sends before it has heard of the first
   static constexpr std::string_view kMethod = "/osteon.v1.CuttingService/Session";
 
-  SessionStream(std::shared_ptr<OpenRoom> room, LinkServer* links, Gate* gate, Caller caller)
-      : room_(std::move(room)), host_(room_->host()), links_(links), gate_(gate), caller_(std::move(caller)) {}
+  SessionStream(std::shared_ptr<OpenRoom> room, LinkServer* links, Authorizer* authorizer, Caller caller)
+      : room_(std::move(room)), host_(room_->host()), links_(links), authorizer_(authorizer), caller_(std::move(caller)) {}
   void start() {
-    if (stand_under(gate_, caller_, room_->name, {}, kMethod)) StartRead(&request_);
+    if (stand_under(authorizer_, caller_, room_->name, {}, kMethod)) StartRead(&request_);
   }
 
   AuthorId author() const override { return author_; }
@@ -160,7 +160,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
  private:
   void open(const v1::SessionOpen& request) {
     if (opened_) return close(invalid("open was sent before"));
-    if (!stand_under(gate_, caller_, room_->name, AuthorId{request.author()}, kMethod)) return;
+    if (!stand_under(authorizer_, caller_, room_->name, AuthorId{request.author()}, kMethod)) return;
     if (request.server_epoch() != room_->server_epoch)
       // It joined a server that was killed meanwhile: this one knows it, if it joins again.
       return close({StatusCode::UNAVAILABLE, "open.server_epoch is " + std::to_string(request.server_epoch()) + " and the server's " +
@@ -346,7 +346,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
   RoomHost& host_;                        // of room_
   LinkServer* const links_;
-  Gate* const gate_;  // null: plain text
+  Authorizer* const authorizer_;  // null: plain text
   const Caller caller_;
   std::shared_ptr<SessionLink> link_;  // with the link server; set before the host tells of rows
   ByteBuffer request_;
@@ -373,7 +373,7 @@ class CuttingServiceImpl final : public v1::CuttingService::WithRawCallbackMetho
     Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused<BidiReactor>(status_of(caller.error()));
     SessionStream* stream =
-        SessionStream::launch(std::make_shared<SessionStream>(std::move(*room), links_, rooms_.gate, std::move(*caller)), context);
+        SessionStream::launch(std::make_shared<SessionStream>(std::move(*room), links_, rooms_.authorizer, std::move(*caller)), context);
     stream->start();
     return stream;
   }

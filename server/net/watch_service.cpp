@@ -117,7 +117,7 @@ class WatchServiceImpl final : public WatchBase {
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused(status_of(caller.error()));
     MeshStream* stream = MeshStream::launch(std::make_shared<MeshStream>(*room, AuthorId{request->author()}), context);
-    if (stream->stand_under(rooms_.gate, *caller, (*room)->name, AuthorId{request->author()}, "/osteon.v1.WatchService/WatchMesh"))
+    if (stream->stand_under(rooms_.authorizer, *caller, (*room)->name, AuthorId{request->author()}, "/osteon.v1.WatchService/WatchMesh"))
       (*room)->host().watch_mesh(*stream, look);
     return stream;
   }
@@ -152,7 +152,7 @@ class WatchServiceImpl final : public WatchBase {
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused(status_of(caller.error()));
     CuttingStream* stream = CuttingStream::launch(std::make_shared<CuttingStream>(*room, AuthorId{request->author()}, apart), context);
-    if (stream->stand_under(rooms_.gate, *caller, (*room)->name, AuthorId{request->author()}, "/osteon.v1.WatchService/WatchCutting"))
+    if (stream->stand_under(rooms_.authorizer, *caller, (*room)->name, AuthorId{request->author()}, "/osteon.v1.WatchService/WatchCutting"))
       (*room)->host().watch_cutting(*stream);
     return stream;
   }

@@ -250,7 +250,7 @@ TEST_F(AuthenticationBehindAProxy, BelieveNoHeaderThatAClientSends) {
     EXPECT_NE(called.status.error_code(), StatusCode::OK) << place;
     EXPECT_FALSE(called.answered) << place;
   }
-  EXPECT_EQ(server_->connection_health().gate.admitted, 0u);
+  EXPECT_EQ(server_->connection_health().authorizer.admitted, 0u);
 }
 
 TEST_F(AuthenticationBehindAProxy, AreShutToWhoWasRevokedAndToOtherAuthorities) {
@@ -285,7 +285,7 @@ TEST_F(AuthenticationBehindAProxy, KeepInsidersFromTheServer) {
     if (!line.call(stream, "/osteon.v1.CuttingService/Session") || !line.reset(stream)) break;
   EXPECT_TRUE(proxy_->running());
   EXPECT_EQ(refusal(people_.credentials("anna", Role::trainee, "ward")), "");
-  EXPECT_LT(server_->connection_health().gate.admitted + server_->connection_health().gate.refused, 8'000u);
+  EXPECT_LT(server_->connection_health().authorizer.admitted + server_->connection_health().authorizer.refused, 8'000u);
 }
 
 TEST_F(Authentication, LetNobodyCallAsSomebodyElse) {
@@ -441,7 +441,7 @@ TEST_F(Authentication, JudgeCallsAboutRoomsByTheRoomsThatTheyName) {
   ASSERT_TRUE(server_->rooms().create("annex", nullptr));
   people_.append_access("role bob operator annex");
   people_.append_access("role otto observer ward");
-  server_->rooms().gate->look();
+  server_->rooms().authorizer->look();
   const wire::ClientCredentials bob = people_.credentials("bob", Role::observer, "*");
   EXPECT_EQ(asked(bob, "annex", "ward").error_code(), StatusCode::PERMISSION_DENIED);
   EXPECT_TRUE(is_there("ward"));
@@ -480,7 +480,7 @@ TEST_F(Authentication, DeleteNoBranchThatATicketIsNotFor) {
 
 TEST_F(Authentication, ShowNothingOfARoomInWhichOneIsNoInstructor) {
   people_.append_access("role ina trainee theatre");
-  server_->rooms().gate->look();
+  server_->rooms().authorizer->look();
   const auto ina = join(people_.credentials("ina", Role::instructor, "*"));
   ASSERT_TRUE(ina.has_value()) << ina.error().message;
   v1::DemonstrateRequest shown;
@@ -612,16 +612,16 @@ TEST_F(DoorsAtWork, EndTheStreamsOfSomebodyWhoIsRevoked) {
 TEST_F(DoorsAtWork, EndTheStreamsOfSomebodyWhoDoesNotRead) {
   auto ben = join(people_.credentials("ben", Role::observer, "ward"));
   ASSERT_TRUE(ben.has_value()) << ben.error().message;
-  const std::size_t others = server_->connection_health().gate.streams;
+  const std::size_t others = server_->connection_health().authorizer.streams;
   std::filesystem::resize_file(dir_ / "case" / "bone.vdb", 32 << 20);  // more than any line holds by itself
   grpc::ClientContext context;
   v1::GetCaseRequest request;
   request.set_case_hash(wire::to_wire(test::test_block().hash()));
   const auto unread = v1::RoomService::NewStub(ben->channel)->GetCase(&context, request);
-  ASSERT_TRUE(test::wait_until([&] { return server_->connection_health().gate.streams == others + 1; }, test::kPatience));
-  EXPECT_FALSE(test::wait_until([&] { return server_->connection_health().gate.streams == others; }, 2s)) << "by itself it goes on";
+  ASSERT_TRUE(test::wait_until([&] { return server_->connection_health().authorizer.streams == others + 1; }, test::kPatience));
+  EXPECT_FALSE(test::wait_until([&] { return server_->connection_health().authorizer.streams == others; }, 2s)) << "by itself it goes on";
   people_.certs({"revoke", "ben"});
-  EXPECT_TRUE(test::wait_until([&] { return server_->connection_health().gate.streams == others; }, 10s));
+  EXPECT_TRUE(test::wait_until([&] { return server_->connection_health().authorizer.streams == others; }, 10s));
   context.TryCancel();
   expect_undisturbed();
 }
@@ -637,12 +637,12 @@ TEST_F(Authentication, GiveThePlaceToTheNewestAlsoInAQueue) {
     wait.wait();
   });
   held.get_future().wait();
-  const auto admitted = [&] { return server_->connection_health().gate.admitted; };
+  const auto admitted = [&] { return server_->connection_health().authorizer.admitted; };
   const auto queue = [&](auto ask) {
     const std::uint64_t before = admitted();
     auto answer = std::async(std::launch::async, std::move(ask));
     EXPECT_TRUE(test::wait_until([&] { return admitted() > before; }, test::kPatience));
-    std::this_thread::sleep_for(200ms);  // from the gate into the queue
+    std::this_thread::sleep_for(200ms);  // from the authorizer into the queue
     return answer;
   };
   auto newer = queue([&] { return join(credentials); });

@@ -151,7 +151,7 @@ TEST_P(BothWays, RefuseEveryWrongCertificateAndNoteItsAddress) {
   ASSERT_GE(wrong.size(), 13u);
   serve();
   EXPECT_TRUE(is_told(people_.person("anna"), "anna")) << "the right certificate";
-  const std::uint64_t admitted = server_->connection_health().gate.admitted;
+  const std::uint64_t admitted = server_->connection_health().authorizer.admitted;
   for (const test::WrongCertificate& one : wrong) {
     SCOPED_TRACE(one.kind);
     const std::uint64_t noted = refusals() + noted_by_proxy();
@@ -159,7 +159,7 @@ TEST_P(BothWays, RefuseEveryWrongCertificateAndNoteItsAddress) {
     EXPECT_TRUE(test::wait_until([&] { return refusals() + noted_by_proxy() > noted; }, kPatience))
         << "nobody notes it";
   }
-  EXPECT_EQ(server_->connection_health().gate.admitted, admitted);
+  EXPECT_EQ(server_->connection_health().authorizer.admitted, admitted);
   EXPECT_TRUE(is_told(people_.person("anna"), "anna"));
   EXPECT_THAT(log(), HasSubstr("127.0.0.1"));
 }
@@ -216,7 +216,7 @@ TEST_P(BothWays, LiveOnWhenAnybodySendsAHeaderThatOnceEndedTheServer) {
     EXPECT_FALSE(call(people_.person("mallory"), path)) << "revoked";
     EXPECT_FALSE(call({}, path)) << "without a certificate";
   }
-  EXPECT_EQ(server_->connection_health().gate.admitted, 0u);
+  EXPECT_EQ(server_->connection_health().authorizer.admitted, 0u);
   const std::string said = log();
   EXPECT_TRUE(is_named(said, "ben"));
   EXPECT_TRUE(is_named(said, "mallory"));
@@ -234,7 +234,7 @@ TEST_P(BothWays, LiveOnWhenAnybodyResetsCallsRapidly) {
       if (!line.call(stream, kGetStatus) || !line.reset(stream)) break;
     EXPECT_TRUE(line.closed_within(kPatience)) << "may go on for ever";
   }
-  EXPECT_LT(server_->connection_health().gate.admitted + server_->connection_health().gate.refused, 8'000u);
+  EXPECT_LT(server_->connection_health().authorizer.admitted + server_->connection_health().authorizer.refused, 8'000u);
   const std::string said = log();
   EXPECT_TRUE(is_named(said, "ben"));
   EXPECT_TRUE(is_named(said, "mallory"));
@@ -248,9 +248,9 @@ TEST_P(BothWays, EndTheStreamsOfAMachineThatAnswersNothing) {
                                {"clitcpka-cnt 3", "clitcpka-cnt 2"},
                                {"tcp-ut 25s", "tcp-ut 2s"}});
   const auto mallorys = stream_of("mallory");
-  ASSERT_EQ(server_->connection_health().gate.streams, 1u);
+  ASSERT_EQ(server_->connection_health().authorizer.streams, 1u);
   mallorys->go_deaf();
-  EXPECT_TRUE(test::wait_until([&] { return server_->connection_health().gate.streams == 0; }, kPatience));
+  EXPECT_TRUE(test::wait_until([&] { return server_->connection_health().authorizer.streams == 0; }, kPatience));
 }
 
 // Seconds that the configuration gives to a word of it.

@@ -137,7 +137,7 @@ TEST_F(GoingOn, ADemonstrationGoesOnWhenItsStarterComesAnew) {
   ASSERT_TRUE(v1::PeopleService::NewStub(before.channel)->Demonstrate(&context, request, &response).ok());
   const auto after = join(credentials);
   EXPECT_NE(after.author, before.author);
-  server_->rooms().gate->look();
+  server_->rooms().authorizer->look();
   v1::EndDemonstrationRequest ending;
   ending.set_author(after.author.value);
   ending.set_demonstrator(response.demonstrator());

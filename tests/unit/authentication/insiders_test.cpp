@@ -98,7 +98,7 @@ TEST_F(Insiders, AreRefusedForHeadersThatNoClientHas) {
       EXPECT_TRUE(is_answered(line)) << path << " " << headers.front().first;
     }
   // Nobody has come in without a ticket; without a strange header that alone is why.
-  EXPECT_EQ(server_->connection_health().gate.admitted, 0u);
+  EXPECT_EQ(server_->connection_health().authorizer.admitted, 0u);
   RawHttp2 line(address(), people_.person("mallory"));
   ASSERT_TRUE(line.call(1, kSession));
   EXPECT_TRUE(is_answered(line));
@@ -118,7 +118,7 @@ TEST_F(Insiders, WhoAreRevokedFailInTheHandshake) {
         return !line.read(5s);
       },
       kPatience));
-  const std::uint64_t refused = server_->connection_health().gate.refused;
+  const std::uint64_t refused = server_->connection_health().authorizer.refused;
   for (int i = 0; i < 5; ++i) {
     RawHttp2 line(address(), people_.person("mallory"));
     (void)line.call(1, kGetStatus, {{"grpclb_client_stats", "x"}});
@@ -126,7 +126,7 @@ TEST_F(Insiders, WhoAreRevokedFailInTheHandshake) {
     EXPECT_FALSE(line.read(5s).has_value());
     EXPECT_TRUE(line.closed_within(kPatience));
   }
-  EXPECT_EQ(server_->connection_health().gate.refused, refused) << "calls came through";
+  EXPECT_EQ(server_->connection_health().authorizer.refused, refused) << "calls came through";
   EXPECT_GE(counted("revoked"), 5u);
   const std::string said = log();
   EXPECT_THAT(said, HasSubstr("mallory, certificate "));
@@ -157,7 +157,7 @@ TEST_F(Insiders, LoseNoConnectionByAChangedRole) {
   RawHttp2 line(address(), people_.person("anna"));
   ASSERT_TRUE(line.read(5s).has_value());
   people_.append_access("role mallory observer ward");
-  for (int i = 0; i < 3; ++i) server_->rooms().gate->look();
+  for (int i = 0; i < 3; ++i) server_->rooms().authorizer->look();
   ASSERT_TRUE(line.call(1, kSession));
   EXPECT_TRUE(is_answered(line));
 }
@@ -181,7 +181,7 @@ TEST_F(Insiders, WhoResetCallsRapidlyAreCutOffAndWait) {
   EXPECT_TRUE(line.closed_within(kPatience));
   EXPECT_GE(counted("flood"), 1u);
   // What had arrived when the connection was closed may still begin; it is refused.
-  EXPECT_LT(server_->connection_health().gate.admitted + server_->connection_health().gate.refused, 20'000u);
+  EXPECT_LT(server_->connection_health().authorizer.admitted + server_->connection_health().authorizer.refused, 20'000u);
   // They do not come again at once, whatever connection they take.
   EXPECT_FALSE(RawHttp2(address(), people_.person("mallory")).read(5s).has_value());
   EXPECT_TRUE(RawHttp2(address(), people_.person("anna")).read(5s).has_value());

@@ -120,7 +120,7 @@ TEST_F(Owners, DeleteTheirRoomsAndNobodyElseBelowAnOperatorDoes) {
   EXPECT_TRUE(as("otto", Role::operator_, "*").remove("third", false));
   // Whom the list of access calls less in that room, is less there.
   people_.append_access("role ina observer second");
-  server_->rooms().gate->look();
+  server_->rooms().authorizer->look();
   EXPECT_FALSE(as("ina", Role::instructor, "ward").remove("second", false));
   EXPECT_TRUE(server_->rooms().find("second"));
 }

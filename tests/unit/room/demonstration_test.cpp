@@ -12,7 +12,7 @@
 #include "osteon/v1/people.grpc.pb.h"
 #include "osteon/v1/rooms.grpc.pb.h"
 #include "server/intake/case_archive.hpp"
-#include "server/net/gate.hpp"
+#include "server/net/authorizer.hpp"
 #include "server/net/room_server.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/room/kept_room.hpp"

@@ -1,4 +1,4 @@
-#include "server/net/gate.hpp"
+#include "server/net/authorizer.hpp"
 
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/security/server_credentials.h>
@@ -62,31 +62,31 @@ void make_space(Map& map) {
 // once.
 class HandshakeCheck final : public grpc::experimental::ExternalCertificateVerifier {
  public:
-  explicit HandshakeCheck(Gate& gate) : gate_(gate) {}
+  explicit HandshakeCheck(Authorizer& authorizer) : authorizer_(authorizer) {}
   bool Verify(grpc::experimental::TlsCustomVerificationCheckRequest* request, std::function<void(grpc::Status)>,
               grpc::Status* at_once) override {
     // At a server OpenSSL has the client's own certificate apart from the others of its chain.
     const grpc::string_ref own = request->peer_cert(), others = request->peer_cert_full_chain();
     const std::string chain = std::string(own.data(), own.size()) + std::string(others.data(), others.size());
-    const std::optional<Refusal> why = gate_.judge_handshake(chain);
+    const std::optional<Refusal> why = authorizer_.judge_handshake(chain);
     if (why) *at_once = {grpc::StatusCode::UNAUTHENTICATED, why->sentence};
     return true;
   }
   void Cancel(grpc::experimental::TlsCustomVerificationCheckRequest*) override {}
 
  private:
-  Gate& gate_;
+  Authorizer& authorizer_;
 };
 
 }  // namespace
 
-class Gate::Watched final : public OpenStream {
+class Authorizer::Watched final : public OpenStream {
  public:
-  Watched(Gate& gate, Caller who, std::string in, AuthorId as, std::string_view what, End when)
-      : caller(std::move(who)), room(std::move(in)), author(as), method(what), gate_(gate), end_(std::move(when)), role_(caller.role) {}
+  Watched(Authorizer& authorizer, Caller who, std::string in, AuthorId as, std::string_view what, End when)
+      : caller(std::move(who)), room(std::move(in)), author(as), method(what), authorizer_(authorizer), end_(std::move(when)), role_(caller.role) {}
   ~Watched() override {
-    const std::lock_guard lock(gate_.mutex_);
-    gate_.streams_.remove_if([](const std::weak_ptr<Watched>& stream) { return stream.expired(); });
+    const std::lock_guard lock(authorizer_.mutex_);
+    authorizer_.streams_.remove_if([](const std::weak_ptr<Watched>& stream) { return stream.expired(); });
   }
   Role role() const override { return role_; }
   void set_role(Role role) { role_ = role; }
@@ -97,25 +97,25 @@ class Gate::Watched final : public OpenStream {
     if (!ended_.exchange(true)) end_(why);
   }
 
-  Caller caller;  // under the gate's mutex
+  Caller caller;  // under the authorizer's mutex
   const std::string room;
   const AuthorId author;
   const std::string method;
 
  private:
-  Gate& gate_;
+  Authorizer& authorizer_;
   const End end_;
   std::atomic<bool> ended_ = false;
   std::atomic<Role> role_;
 };
 
-Gate::Gate(std::filesystem::path folder, RefusalCounts& counts, Now now)
+Authorizer::Authorizer(std::filesystem::path folder, RefusalCounts& counts, Now now)
     : folder_(std::move(folder)),
       refusals_(counts),
       now_(now ? std::move(now) : Now(system_now)),
       access_(folder_ / "access.txt") {}
 
-Gate::~Gate() {
+Authorizer::~Authorizer() {
   if (!thread_.joinable()) return;
   {
     const std::lock_guard lock(mutex_);
@@ -125,7 +125,7 @@ Gate::~Gate() {
   thread_.join();
 }
 
-Result<std::unique_ptr<Gate>> Gate::open(const std::filesystem::path& folder, RefusalCounts& counts, Now now) {
+Result<std::unique_ptr<Authorizer>> Authorizer::open(const std::filesystem::path& folder, RefusalCounts& counts, Now now) {
   const Result<std::string> authority = read_all(folder / "ca.pem"), certificate = read_all(folder / "server.pem"),
                             secret = read_all(folder / "server.key");
   for (const auto* file : {&authority, &certificate, &secret})
@@ -134,17 +134,17 @@ Result<std::unique_ptr<Gate>> Gate::open(const std::filesystem::path& folder, Re
     return failure(ErrorCode::invalid_input, (folder / "server.pem").string() + " and server.key: " + pair.error().message +
                                                  "; make both anew with deploy/certs server");
   warn_of_readable_secrets(folder);
-  std::unique_ptr<Gate> gate(new Gate(folder, counts, std::move(now)));
-  if (const Result<bool> read = gate->read_ticket_keys(); !read) return tl::unexpected(read.error());
+  std::unique_ptr<Authorizer> authorizer(new Authorizer(folder, counts, std::move(now)));
+  if (const Result<bool> read = authorizer->read_ticket_keys(); !read) return tl::unexpected(read.error());
   // A list that is wrong at the start would let in whom it is to keep out.
-  if (const Result<bool> read = gate->access_.refresh(); !read) return tl::unexpected(read.error());
-  gate->access_list_ = gate->access_.list();
-  if (const Result<bool> read = gate->read_authorities(); !read) return tl::unexpected(read.error());
-  gate->thread_ = std::thread([raw = gate.get()] { raw->run(); });
-  return gate;
+  if (const Result<bool> read = authorizer->access_.refresh(); !read) return tl::unexpected(read.error());
+  authorizer->access_list_ = authorizer->access_.list();
+  if (const Result<bool> read = authorizer->read_authorities(); !read) return tl::unexpected(read.error());
+  authorizer->thread_ = std::thread([raw = authorizer.get()] { raw->run(); });
+  return authorizer;
 }
 
-std::shared_ptr<grpc::ServerCredentials> Gate::credentials() {
+std::shared_ptr<grpc::ServerCredentials> Authorizer::credentials() {
   // Read again while the server runs; a renewed certificate disturbs nobody who is in.
   const auto files = std::make_shared<grpc::experimental::FileWatcherCertificateProvider>(  // shared with gRPC
       (folder_ / "server.key").string(), (folder_ / "server.pem").string(), (folder_ / "ca.pem").string(), kCertificatesEverySeconds);
@@ -157,7 +157,7 @@ std::shared_ptr<grpc::ServerCredentials> Gate::credentials() {
   return grpc::experimental::TlsServerCredentials(options);
 }
 
-std::optional<Refusal> Gate::judge_handshake(std::string_view chain_pem) {
+std::optional<Refusal> Authorizer::judge_handshake(std::string_view chain_pem) {
   std::shared_ptr<const Authorities> authorities;
   {
     const std::lock_guard lock(mutex_);
@@ -198,7 +198,7 @@ std::optional<Refusal> Gate::judge_handshake(std::string_view chain_pem) {
   return refusal;
 }
 
-Gate::CallTrace Gate::trace_of(const CallClaims& call) {
+Authorizer::CallTrace Authorizer::trace_of(const CallClaims& call) {
   CallTrace trace{.who = {.address = call.peer.address}, .room = std::string(call.room)};
   const std::lock_guard lock(mutex_);
   if (const Result<PersonCertificate> certificate = certificate_of(call.peer.certificate_pem)) {
@@ -213,7 +213,7 @@ Gate::CallTrace Gate::trace_of(const CallClaims& call) {
   return trace;
 }
 
-void Gate::audit_refusal(std::string_view reason, const CallClaims& call) {
+void Authorizer::audit_refusal(std::string_view reason, const CallClaims& call) {
   if (!trail_) return;
   CallTrace trace = trace_of(call);
   trail_->record({.who = std::move(trace.who),
@@ -223,7 +223,7 @@ void Gate::audit_refusal(std::string_view reason, const CallClaims& call) {
                   .detail = std::string(reason)});
 }
 
-Result<PersonCertificate> Gate::certificate_of(std::string_view pem) {
+Result<PersonCertificate> Authorizer::certificate_of(std::string_view pem) {
   if (const auto known = certificates_.find(std::string(pem)); known != certificates_.end()) return known->second;
   Result<PersonCertificate> read = read_person_certificate(pem);
   if (!read) return read;
@@ -233,7 +233,7 @@ Result<PersonCertificate> Gate::certificate_of(std::string_view pem) {
 
 // The handshake checked what came over TLS. What a proxy shows is checked here: a mistake in its configuration opens
 // nothing.
-Result<void> Gate::check_shown(const PeerClaims& peer) {
+Result<void> Authorizer::check_shown(const PeerClaims& peer) {
   if (!peer.by_proxy || checked_.contains(peer.certificate_pem)) return {};
   const auto chain = check_client_chain(peer.certificate_pem, *authorities_, now_());
   if (!chain) return failure(ErrorCode::denied, chain.error().sentence);
@@ -242,7 +242,7 @@ Result<void> Gate::check_shown(const PeerClaims& peer) {
   return {};
 }
 
-Result<Gate::CheckedTicket> Gate::ticket_of(std::string_view text) {
+Result<Authorizer::CheckedTicket> Authorizer::ticket_of(std::string_view text) {
   if (const auto known = tickets_.find(std::string(text)); known != tickets_.end()) return known->second;
   Result<Ticket> opened;
   for (const TicketCheckKey& key : ticket_keys_) {
@@ -254,7 +254,7 @@ Result<Gate::CheckedTicket> Gate::ticket_of(std::string_view text) {
   return tl::unexpected(opened.error());
 }
 
-std::optional<Refusal> Gate::judge_again(Caller& caller, const std::string& room, std::string_view method) const {
+std::optional<Refusal> Authorizer::judge_again(Caller& caller, const std::string& room, std::string_view method) const {
   const UnixTime now = now_();
   if (now >= caller.certificate_ends) return Refusal{"certificate", false, "the certificate has expired; ask for a new one"};
   if (const auto why = revoked(caller.serial, caller.user, caller.ticket_id)) return Refusal{"revoked", false, *why};
@@ -272,18 +272,18 @@ std::optional<Refusal> Gate::judge_again(Caller& caller, const std::string& room
                                    "; ask whoever runs the server for a ticket of another role"};
 }
 
-std::optional<std::string> Gate::revoked(const std::string& serial, const std::string& user,
+std::optional<std::string> Authorizer::revoked(const std::string& serial, const std::string& user,
                                          const std::string& ticket_id) const {
   if (listed_serials_.contains(serial)) return "the certificate was revoked; ask for a new one";
   return access_list_.refuses(serial, user, ticket_id);
 }
 
-bool Gate::is_paused(const std::string& user) const {
+bool Authorizer::is_paused(const std::string& user) const {
   const auto found = paused_.find(user);
   return found != paused_.end() && std::chrono::steady_clock::now() < found->second;
 }
 
-tl::expected<Caller, Refusal> Gate::judge(const CallClaims& call) {
+tl::expected<Caller, Refusal> Authorizer::judge(const CallClaims& call) {
   const std::lock_guard lock(mutex_);
   const auto refused = [](std::string_view reason, bool is_known, std::string sentence) {
     return tl::unexpected(Refusal{reason, is_known, std::move(sentence)});
@@ -320,7 +320,7 @@ tl::expected<Caller, Refusal> Gate::judge(const CallClaims& call) {
   return caller;
 }
 
-tl::expected<Caller, Refusal> Gate::admit(const CallClaims& call) {
+tl::expected<Caller, Refusal> Authorizer::admit(const CallClaims& call) {
   auto caller = judge(call);
   std::string who = "a certificate without a name";
   {
@@ -341,7 +341,7 @@ tl::expected<Caller, Refusal> Gate::admit(const CallClaims& call) {
   return caller;
 }
 
-void Gate::note_refused(std::string_view reason, std::string_view sentence, const CallClaims& call) {
+void Authorizer::note_refused(std::string_view reason, std::string_view sentence, const CallClaims& call) {
   {
     const std::lock_guard lock(mutex_);
     ++counts_.refused;
@@ -350,7 +350,7 @@ void Gate::note_refused(std::string_view reason, std::string_view sentence, cons
   audit_refusal(reason, call);
 }
 
-void Gate::note_flood(const PeerClaims& peer) {
+void Authorizer::note_flood(const PeerClaims& peer) {
   // gRPC had read these calls before the connection was closed.
   if (connections_ && connections_->is_cut_off(peer.peer)) return;
   std::string who = "a stranger";
@@ -369,12 +369,12 @@ void Gate::note_flood(const PeerClaims& peer) {
     connections_->close_if([&](const Connection& one) { return one.peer == peer.peer || one.user == who; });
 }
 
-Result<void> Gate::check_resume(const Caller& caller, const std::string& room, int kind, AuthorId author) const {
+Result<void> Authorizer::check_resume(const Caller& caller, const std::string& room, int kind, AuthorId author) const {
   const std::lock_guard lock(mutex_);
   return check_resume_locked(caller, room, kind, author);
 }
 
-Result<void> Gate::check_resume_locked(const Caller& caller, const std::string& room, int kind, AuthorId author) const {
+Result<void> Authorizer::check_resume_locked(const Caller& caller, const std::string& room, int kind, AuthorId author) const {
   const Seat seat{room, caller.user, kind};
   if (const auto known = authors_.find({room, author}); known != authors_.end()) {
     if (known->second.seat != seat) return failure(ErrorCode::denied, "author " + std::to_string(author.value) + " is another person's; join anew");
@@ -385,7 +385,7 @@ Result<void> Gate::check_resume_locked(const Caller& caller, const std::string& 
   return {};
 }
 
-Result<void> Gate::joined(const Caller& caller, const std::string& room, int kind, AuthorId author, Coming coming) {
+Result<void> Authorizer::joined(const Caller& caller, const std::string& room, int kind, AuthorId author, Coming coming) {
   std::vector<std::shared_ptr<Watched>> held, displaced;  // let go of without the lock, which their end takes
   {
     const std::lock_guard lock(mutex_);
@@ -411,7 +411,7 @@ Result<void> Gate::joined(const Caller& caller, const std::string& room, int kin
   return {};
 }
 
-std::optional<Refusal> Gate::judge_author(const Caller& caller, const std::string& room, AuthorId author) const {
+std::optional<Refusal> Authorizer::judge_author(const Caller& caller, const std::string& room, AuthorId author) const {
   const auto known = authors_.find({room, author});
   if (known == authors_.end() || std::get<1>(known->second.seat) != caller.user)
     return Refusal{"author", true,
@@ -420,19 +420,19 @@ std::optional<Refusal> Gate::judge_author(const Caller& caller, const std::strin
   return {};
 }
 
-Result<void> Gate::check_author(const Caller& caller, const std::string& room, AuthorId author) const {
+Result<void> Authorizer::check_author(const Caller& caller, const std::string& room, AuthorId author) const {
   const std::lock_guard lock(mutex_);
   if (const std::optional<Refusal> why = judge_author(caller, room, author)) return failure(ErrorCode::denied, why->sentence);
   return {};
 }
 
-void Gate::forget_room(const std::string& room) {
+void Authorizer::forget_room(const std::string& room) {
   const std::lock_guard lock(mutex_);
   std::erase_if(seats_, [&](const auto& seat) { return std::get<0>(seat.first) == room; });
   std::erase_if(authors_, [&](const auto& author) { return author.first.first == room; });
 }
 
-Gate::Entered Gate::enter(const Caller& caller, const std::string& room, AuthorId author, std::string_view method, End end) {
+Authorizer::Entered Authorizer::enter(const Caller& caller, const std::string& room, AuthorId author, std::string_view method, End end) {
   auto stream = std::make_shared<Watched>(*this, caller, room, author, method, std::move(end));  // shared with look() while it ends it
   const std::lock_guard lock(mutex_);
   std::optional<Refusal> refusal = judge_again(stream->caller, room, method);
@@ -443,19 +443,19 @@ Gate::Entered Gate::enter(const Caller& caller, const std::string& room, AuthorI
   return std::shared_ptr<OpenStream>(stream);
 }
 
-Role Gate::role_in(const Caller& caller, const std::string& room) const {
+Role Authorizer::role_in(const Caller& caller, const std::string& room) const {
   const std::lock_guard lock(mutex_);
   return access_list_.role(caller.user, room, caller.ticket_role);
 }
 
-GateCounts Gate::counts() const {
+AuthorizerCounts Authorizer::counts() const {
   const std::lock_guard lock(mutex_);
-  GateCounts counts = counts_;
+  AuthorizerCounts counts = counts_;
   counts.streams = streams_.size();
   return counts;
 }
 
-Result<bool> Gate::read_authorities() {
+Result<bool> Authorizer::read_authorities() {
   Result<std::string> certificates = read_all(folder_ / "ca.pem");
   if (!certificates) return tl::unexpected(certificates.error());
   Authorities now{.certificates = std::move(*certificates), .revocation_lists = {}};
@@ -478,7 +478,7 @@ Result<bool> Gate::read_authorities() {
   return true;
 }
 
-Result<bool> Gate::read_ticket_keys() {
+Result<bool> Authorizer::read_ticket_keys() {
   const std::filesystem::path file = folder_ / "tickets.pub";
   const Result<std::string> text = read_all(file);
   if (!text) return tl::unexpected(text.error());
@@ -492,7 +492,7 @@ Result<bool> Gate::read_ticket_keys() {
 }
 
 // A disk that is slow lets no call wait: only what was read is put in under the lock that calls take.
-void Gate::refresh() {
+void Authorizer::refresh() {
   const std::lock_guard reading(reading_);
   const auto tell = [](std::string_view what, const Result<bool>& read, std::string& told) {
     const std::string fault = read ? std::string() : read.error().message;
@@ -518,7 +518,7 @@ void Gate::refresh() {
   revoked_anew_ = is_revocation || (authorities && *authorities);
 }
 
-void Gate::close_revoked() {
+void Authorizer::close_revoked() {
   if (!connections_) return;
   const std::lock_guard lock(mutex_);
   // Whose connection has made no call may have come with a certificate that is revoked now. Who may come does so again.
@@ -528,7 +528,7 @@ void Gate::close_revoked() {
     log::info("connections closed", {{"of", "revoked certificates and before a first call"}, {"count", closed}});
 }
 
-void Gate::look() {
+void Authorizer::look() {
   std::vector<std::pair<std::shared_ptr<Watched>, Refusal>> ending;
   std::vector<std::shared_ptr<Watched>> held;  // let go of without the lock, which their end takes
   // One look later than their streams end: so the clients still hear why.
@@ -568,7 +568,7 @@ void Gate::look() {
   }
 }
 
-void Gate::run() {
+void Authorizer::run() {
   std::unique_lock lock(mutex_);
   while (!end_) {
     lock.unlock();

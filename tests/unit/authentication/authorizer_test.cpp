@@ -1,4 +1,4 @@
-#include "server/net/gate.hpp"
+#include "server/net/authorizer.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -34,9 +34,9 @@ class GateTest : public ::testing::Test {
   static void TearDownTestSuite() { delete people_; }
   void SetUp() override {
     std::ofstream(people_->server() / "access.txt") << "";
-    Result<std::unique_ptr<Gate>> gate = Gate::open(people_->server(), refusals_, [this] { return UnixTime{std::chrono::seconds(now_)}; });
-    ASSERT_TRUE(gate.has_value()) << gate.error().message;
-    gate_ = std::move(*gate);
+    Result<std::unique_ptr<Authorizer>> authorizer = Authorizer::open(people_->server(), refusals_, [this] { return UnixTime{std::chrono::seconds(now_)}; });
+    ASSERT_TRUE(authorizer.has_value()) << authorizer.error().message;
+    authorizer_ = std::move(*authorizer);
   }
   std::string certificate(const std::string& user) { return content(people_->person(user) / "person.pem"); }
   std::string ticket(const std::string& user, const std::string& room, Role role, std::chrono::seconds good_for = 1h) {
@@ -45,13 +45,13 @@ class GateTest : public ::testing::Test {
   // The refusal's sentence, with the word it is counted under; empty: let in.
   std::string refused(const std::string& user, const std::string& with, const std::string& room, const std::string& method, bool is_known) {
     const auto caller =
-        gate_->admit({.peer = shown(certificate(user)), .ticket = with, .room = room, .method = method});
+        authorizer_->admit({.peer = shown(certificate(user)), .ticket = with, .room = room, .method = method});
     if (caller) return {};
     EXPECT_EQ(caller.error().is_known, is_known) << caller.error().sentence;
     return std::string(caller.error().reason) + ": " + caller.error().sentence;
   }
   Caller let_in(const std::string& user, Role role, const std::string& room = "ward") {
-    const auto caller = gate_->admit({.peer = shown(certificate(user)),
+    const auto caller = authorizer_->admit({.peer = shown(certificate(user)),
                                       .ticket = ticket(user, room, role),
                                       .room = room,
                                       .method = "/osteon.v1.RoomService/GetStatus"});
@@ -64,13 +64,13 @@ class GateTest : public ::testing::Test {
   }
   bool let_in_with(const std::string& certificate) {
     const std::string text = ticket("anna", "ward", Role::trainee);
-    return gate_->admit({.peer = shown(certificate), .ticket = text, .room = "ward", .method = kUndo}).has_value();
+    return authorizer_->admit({.peer = shown(certificate), .ticket = text, .room = "ward", .method = kUndo}).has_value();
   }
 
   static test::People* people_;
   RefusalCounts refusals_;
   std::atomic<std::int64_t> now_ = std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
-  std::unique_ptr<Gate> gate_;
+  std::unique_ptr<Authorizer> authorizer_;
 };
 test::People* GateTest::people_ = nullptr;
 
@@ -92,7 +92,7 @@ TEST_F(GateTest, LetsInWhoHasBoth) {
   EXPECT_EQ(refused("anna", ticket("anna", "ward", Role::trainee), "ward", kUndo, true), "");
   EXPECT_EQ(refused("anna", ticket("anna", "*", Role::collaborator), "other", kUndo, true), "");
   EXPECT_EQ(refused("anna", ticket("anna", "ward", Role::trainee), "", kUndo, true), "");
-  EXPECT_EQ(gate_->counts().admitted, 3u);
+  EXPECT_EQ(authorizer_->counts().admitted, 3u);
 }
 
 TEST_F(GateTest, SaysWhyNot) {
@@ -112,7 +112,7 @@ TEST_F(GateTest, SaysWhyNot) {
   EXPECT_EQ(counts.at("ticket"), 4u);
   EXPECT_EQ(counts.at("certificate"), 2u);
   EXPECT_EQ(counts.at("role"), 1u);
-  EXPECT_EQ(gate_->counts().refused, 10u);
+  EXPECT_EQ(authorizer_->counts().refused, 10u);
 }
 
 TEST_F(GateTest, GoesByTheClock) {
@@ -127,7 +127,7 @@ TEST_F(GateTest, GoesByTheClock) {
 TEST_F(GateTest, TakesNoTicketThatIsGoodForTooLong) {
   const std::string day = ticket("anna", "ward", Role::trainee, 24h), more = ticket("anna", "ward", Role::trainee, 26h);
   EXPECT_EQ(refused("anna", more, "ward", kUndo, true), "") << "unless somebody says otherwise";
-  gate_->set_most_ticket_life(24h);
+  authorizer_->set_most_ticket_life(24h);
   EXPECT_EQ(refused("anna", day, "ward", kUndo, true), "");
   EXPECT_EQ(refused("anna", more, "ward", kUndo, false),
             "ticket: the ticket is good for 26 more hours, and this server takes none for more than 24; ask for a "
@@ -144,11 +144,11 @@ TEST_F(GateTest, TakesNoTicketThatIsGoodForTooLong) {
 TEST_F(GateTest, ReadsTheListWhileItRuns) {
   const std::string good = ticket("anna", "ward", Role::trainee), instead = ticket("ben", "ward", Role::trainee);
   people_->append_access("role anna observer ward");
-  gate_->look();
+  authorizer_->look();
   EXPECT_THAT(refused("anna", good, "ward", kUndo, true), HasSubstr("an observer may not"));
   EXPECT_EQ(refused("anna", good, "ward", kWatch, true), "");
   people_->append_access("revoke user anna");
-  gate_->look();
+  authorizer_->look();
   EXPECT_THAT(refused("anna", good, "ward", kWatch, false), HasSubstr("revoked"));
   EXPECT_EQ(refused("ben", instead, "ward", kUndo, true), "");
 }
@@ -158,17 +158,17 @@ TEST_F(GateTest, ReadsTheKeysOfTicketsWhileItRuns) {
   const Caller anna = let_in("anna", Role::trainee);
   std::optional<Refusal> ended;
   std::atomic<int> calls = 0;
-  const auto stream = gate_->enter(anna, "ward", AuthorId{}, kWatch, [&](const Refusal& why) { ended = why, ++calls; });
+  const auto stream = authorizer_->enter(anna, "ward", AuthorId{}, kWatch, [&](const Refusal& why) { ended = why, ++calls; });
   ASSERT_TRUE(stream.has_value());
   people_->certs({"rotate-tickets"});
   EXPECT_THROW(people_->certs({"rotate-tickets"}), std::runtime_error) << "one rotation at a time";
-  gate_->look();
+  authorizer_->look();
   const std::string fresh = ticket("anna", "ward", Role::trainee);
   EXPECT_EQ(refused("anna", old, "ward", kUndo, true), "");
   EXPECT_EQ(refused("anna", fresh, "ward", kUndo, true), "");
   EXPECT_EQ(calls, 0);
   people_->certs({"rotate-tickets", "--finish"});
-  gate_->look();
+  authorizer_->look();
   EXPECT_THAT(refused("anna", old, "ward", kUndo, false), HasSubstr("signature"));
   EXPECT_EQ(refused("anna", fresh, "ward", kUndo, true), "");
   ASSERT_TRUE(test::wait_until([&] { return calls == 1; }, 5s)) << "what is open by a ticket of the old key ends too";
@@ -182,15 +182,15 @@ TEST_F(GateTest, GoesOnWithTheKeysOfTicketsThatItHasWhereNewOnesAreWrong) {
   testing::internal::CaptureStdout();  // where a program that has not opened its log writes it
   for (const std::string& wrong : {std::string("nonsense\n"), keys + "nonsense\n", std::string()}) {
     std::ofstream(file) << wrong;
-    gate_->look();
-    gate_->look();
+    authorizer_->look();
+    authorizer_->look();
     EXPECT_EQ(refused("anna", good, "ward", kUndo, true), "") << wrong;
   }
   std::filesystem::remove(file);
-  gate_->look();
+  authorizer_->look();
   EXPECT_EQ(refused("anna", good, "ward", kUndo, true), "");
   std::ofstream(file) << keys;
-  gate_->look();
+  authorizer_->look();
   const std::string log = testing::internal::GetCapturedStdout();
   EXPECT_THAT(log, HasSubstr("ticket keys were not read, and those before count on"));
   EXPECT_THAT(log, HasSubstr("line 2: "));
@@ -199,7 +199,7 @@ TEST_F(GateTest, GoesOnWithTheKeysOfTicketsThatItHasWhereNewOnesAreWrong) {
 
 TEST_F(GateTest, DoesNotOpenWithAWrongList) {
   people_->append_access("nonsense");
-  EXPECT_THAT(Gate::open(people_->server(), refusals_).error().message, HasSubstr("access.txt:1"));
+  EXPECT_THAT(Authorizer::open(people_->server(), refusals_).error().message, HasSubstr("access.txt:1"));
 }
 
 TEST_F(GateTest, NamesTheFileThatIsWrong) {
@@ -208,12 +208,12 @@ TEST_F(GateTest, NamesTheFileThatIsWrong) {
     std::filesystem::remove_all(dir / "d");
     std::filesystem::copy(people_->server(), dir / "d");
     std::filesystem::remove(dir / "d" / lacking);
-    EXPECT_THAT(Gate::open(dir / "d", refusals_).error().message, HasSubstr(lacking));
+    EXPECT_THAT(Authorizer::open(dir / "d", refusals_).error().message, HasSubstr(lacking));
   }
   std::filesystem::remove_all(dir / "d");
   std::filesystem::copy(people_->server(), dir / "d");
   std::filesystem::copy(people_->person("anna") / "person.key", dir / "d" / "server.key", std::filesystem::copy_options::overwrite_existing);
-  EXPECT_THAT(Gate::open(dir / "d", refusals_).error().message, HasSubstr("not that of the certificate"));
+  EXPECT_THAT(Authorizer::open(dir / "d", refusals_).error().message, HasSubstr("not that of the certificate"));
 }
 
 TEST_F(GateTest, WarnsOfSecretKeysThatOthersMayRead) {
@@ -222,7 +222,7 @@ TEST_F(GateTest, WarnsOfSecretKeysThatOthersMayRead) {
   const auto said = [&](fs::perms of_key) {
     fs::permissions(key, of_key);
     testing::internal::CaptureStdout();  // where a program that has not opened its log writes it
-    EXPECT_TRUE(Gate::open(people_->server(), refusals_));
+    EXPECT_TRUE(Authorizer::open(people_->server(), refusals_));
     return testing::internal::GetCapturedStdout();
   };
   EXPECT_THAT(said(fs::perms(0600)), testing::Not(HasSubstr("READABLE SECRET KEY")));
@@ -239,62 +239,62 @@ TEST_F(GateTest, WarnsOfSecretKeysThatOthersMayRead) {
 
 TEST_F(GateTest, KeepsAuthorsToTheirPeople) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
-  (void)gate_->joined(anna, "ward", 1, AuthorId{1});
-  (void)gate_->joined(anna, "ward", 2, AuthorId{2});
-  (void)gate_->joined(ben, "ward", 1, AuthorId{3});
-  EXPECT_TRUE(gate_->check_author(anna, "ward", AuthorId{1}));
-  EXPECT_TRUE(gate_->check_author(anna, "ward", AuthorId{2}));
-  EXPECT_TRUE(gate_->check_author(ben, "ward", AuthorId{3}));
+  (void)authorizer_->joined(anna, "ward", 1, AuthorId{1});
+  (void)authorizer_->joined(anna, "ward", 2, AuthorId{2});
+  (void)authorizer_->joined(ben, "ward", 1, AuthorId{3});
+  EXPECT_TRUE(authorizer_->check_author(anna, "ward", AuthorId{1}));
+  EXPECT_TRUE(authorizer_->check_author(anna, "ward", AuthorId{2}));
+  EXPECT_TRUE(authorizer_->check_author(ben, "ward", AuthorId{3}));
   for (const auto author : {AuthorId{0}, AuthorId{3}, AuthorId{4}}) {
-    ASSERT_FALSE(gate_->check_author(anna, "ward", author)) << author.value;
-    EXPECT_EQ(gate_->check_author(anna, "ward", author).error().code, ErrorCode::denied);
+    ASSERT_FALSE(authorizer_->check_author(anna, "ward", author)) << author.value;
+    EXPECT_EQ(authorizer_->check_author(anna, "ward", author).error().code, ErrorCode::denied);
   }
-  EXPECT_FALSE(gate_->check_author(anna, "other", AuthorId{1}));
-  EXPECT_TRUE(gate_->check_resume(anna, "ward", 1, AuthorId{1}));
-  EXPECT_FALSE(gate_->check_resume(anna, "ward", 2, AuthorId{1}));
-  EXPECT_FALSE(gate_->check_resume(ben, "ward", 1, AuthorId{1}));
+  EXPECT_FALSE(authorizer_->check_author(anna, "other", AuthorId{1}));
+  EXPECT_TRUE(authorizer_->check_resume(anna, "ward", 1, AuthorId{1}));
+  EXPECT_FALSE(authorizer_->check_resume(anna, "ward", 2, AuthorId{1}));
+  EXPECT_FALSE(authorizer_->check_resume(ben, "ward", 1, AuthorId{1}));
   // A room that is opened again counts its authors anew, or goes on from its journal.
-  gate_->forget_room("ward");
-  EXPECT_FALSE(gate_->check_author(anna, "ward", AuthorId{1}));
-  EXPECT_TRUE(gate_->check_resume(anna, "ward", 1, AuthorId{1}));
+  authorizer_->forget_room("ward");
+  EXPECT_FALSE(authorizer_->check_author(anna, "ward", AuthorId{1}));
+  EXPECT_TRUE(authorizer_->check_resume(anna, "ward", 1, AuthorId{1}));
 }
 
 TEST_F(GateTest, ANewerSessionTakesThePlaceOfAnOlderOne) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
-  (void)gate_->joined(anna, "ward", 1, AuthorId{1});
-  (void)gate_->joined(ben, "ward", 1, AuthorId{2});
+  (void)authorizer_->joined(anna, "ward", 1, AuthorId{1});
+  (void)authorizer_->joined(ben, "ward", 1, AuthorId{2});
   std::string ended, bystander;
-  const auto older = gate_->enter(anna, "ward", AuthorId{1}, kWatch, [&](const Refusal& why) { ended += why.sentence; });
-  const auto others = gate_->enter(ben, "ward", AuthorId{2}, kWatch, [&](const Refusal& why) { bystander += why.sentence; });
-  (void)gate_->joined(anna, "ward", 2, AuthorId{3});
-  (void)gate_->joined(anna, "other", 1, AuthorId{1});
+  const auto older = authorizer_->enter(anna, "ward", AuthorId{1}, kWatch, [&](const Refusal& why) { ended += why.sentence; });
+  const auto others = authorizer_->enter(ben, "ward", AuthorId{2}, kWatch, [&](const Refusal& why) { bystander += why.sentence; });
+  (void)authorizer_->joined(anna, "ward", 2, AuthorId{3});
+  (void)authorizer_->joined(anna, "other", 1, AuthorId{1});
   EXPECT_EQ(ended, "") << "another kind of program, another room";
-  (void)gate_->joined(anna, "ward", 1, AuthorId{4});
+  (void)authorizer_->joined(anna, "ward", 1, AuthorId{4});
   EXPECT_THAT(ended, HasSubstr("newer session of anna"));
   EXPECT_EQ(bystander, "");
-  EXPECT_FALSE(gate_->check_author(anna, "ward", AuthorId{1}));
-  EXPECT_TRUE(gate_->check_author(anna, "ward", AuthorId{4}));
-  EXPECT_FALSE(gate_->check_resume(anna, "ward", 1, AuthorId{1})) << "or they would push out each other for ever";
-  EXPECT_EQ(gate_->counts().displaced, 1u);
-  (void)gate_->joined(anna, "ward", 1, AuthorId{4});
-  EXPECT_EQ(gate_->counts().displaced, 1u);
+  EXPECT_FALSE(authorizer_->check_author(anna, "ward", AuthorId{1}));
+  EXPECT_TRUE(authorizer_->check_author(anna, "ward", AuthorId{4}));
+  EXPECT_FALSE(authorizer_->check_resume(anna, "ward", 1, AuthorId{1})) << "or they would push out each other for ever";
+  EXPECT_EQ(authorizer_->counts().displaced, 1u);
+  (void)authorizer_->joined(anna, "ward", 1, AuthorId{4});
+  EXPECT_EQ(authorizer_->counts().displaced, 1u);
 }
 
 TEST_F(GateTest, WhoComesAgainTooLateTakesNoPlace) {
   const Caller anna = let_in("anna", Role::trainee);
-  ASSERT_TRUE(gate_->joined(anna, "ward", 1, AuthorId{1}));
-  EXPECT_TRUE(gate_->joined(anna, "ward", 1, AuthorId{1}, Gate::Coming::again));
-  ASSERT_TRUE(gate_->check_resume(anna, "ward", 1, AuthorId{1}));
+  ASSERT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{1}));
+  EXPECT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{1}, Authorizer::Coming::again));
+  ASSERT_TRUE(authorizer_->check_resume(anna, "ward", 1, AuthorId{1}));
   // A newer program comes between the question and the answer.
-  ASSERT_TRUE(gate_->joined(anna, "ward", 1, AuthorId{2}));
+  ASSERT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{2}));
   std::string ended;
-  const auto newer = gate_->enter(anna, "ward", AuthorId{2}, kWatch, [&](const Refusal& why) { ended += why.sentence; });
-  const auto late = gate_->joined(anna, "ward", 1, AuthorId{1}, Gate::Coming::again);
+  const auto newer = authorizer_->enter(anna, "ward", AuthorId{2}, kWatch, [&](const Refusal& why) { ended += why.sentence; });
+  const auto late = authorizer_->joined(anna, "ward", 1, AuthorId{1}, Authorizer::Coming::again);
   ASSERT_FALSE(late);
   EXPECT_THAT(late.error().message, HasSubstr("newer session of anna"));
   EXPECT_EQ(ended, "");
-  EXPECT_TRUE(gate_->check_author(anna, "ward", AuthorId{2}));
-  EXPECT_FALSE(gate_->check_author(anna, "ward", AuthorId{1}));
+  EXPECT_TRUE(authorizer_->check_author(anna, "ward", AuthorId{2}));
+  EXPECT_FALSE(authorizer_->check_author(anna, "ward", AuthorId{1}));
 }
 
 TEST_F(GateTest, StopsWhoCallsMoreOftenThanAnybodyDoesByHand) {
@@ -315,66 +315,66 @@ TEST_F(GateTest, StopsWhoCallsMoreOftenThanAnybodyDoesByHand) {
 // Between the question whose an identity is and the beginning of its stream there is no moment in which it is lost unseen.
 TEST_F(GateTest, LooksAgainWhoItIsWhenAStreamBegins) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
-  ASSERT_TRUE(gate_->joined(anna, "ward", 1, AuthorId{1}) && gate_->joined(ben, "ward", 1, AuthorId{2}));
-  ASSERT_TRUE(gate_->check_author(anna, "ward", AuthorId{1}));
+  ASSERT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{1}) && authorizer_->joined(ben, "ward", 1, AuthorId{2}));
+  ASSERT_TRUE(authorizer_->check_author(anna, "ward", AuthorId{1}));
   const auto enter = [&](const Caller& who, AuthorId as) {
-    const auto entered = gate_->enter(who, "ward", as, kWatch, [](const Refusal&) {});
+    const auto entered = authorizer_->enter(who, "ward", as, kWatch, [](const Refusal&) {});
     return entered ? std::string() : entered.error().sentence;
   };
   EXPECT_EQ(enter(anna, AuthorId{1}), "");
   EXPECT_THAT(enter(anna, AuthorId{2}), HasSubstr("author 2 is not yours"));
-  ASSERT_TRUE(gate_->joined(anna, "ward", 1, AuthorId{3}));
+  ASSERT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{3}));
   EXPECT_THAT(enter(anna, AuthorId{1}), HasSubstr("author 1 is not yours in this room, or no more")) << "a newer session took its place";
   EXPECT_EQ(enter(anna, AuthorId{3}), "");
   EXPECT_EQ(enter(anna, {}), "") << "as nobody";
   people_->append_access("role anna observer");
-  gate_->look();
+  authorizer_->look();
   EXPECT_THAT(enter(anna, AuthorId{3}), HasSubstr("your role has changed to observer"));
   EXPECT_THAT(enter(anna, {}), HasSubstr("your role has changed to observer"));
   people_->append_access("revoke user ben");
-  gate_->look();
+  authorizer_->look();
   EXPECT_THAT(enter(ben, AuthorId{2}), HasSubstr("revoked"));
-  EXPECT_EQ(gate_->counts().streams, 0u);
+  EXPECT_EQ(authorizer_->counts().streams, 0u);
 }
 
 TEST_F(GateTest, ARoomThatIsMadeAnewLeavesItsNewPeopleAlone) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
-  (void)gate_->joined(anna, "ward", 1, AuthorId{1});
-  // Deleted and made again behind the gate's back: its authors are counted anew.
-  (void)gate_->joined(ben, "ward", 1, AuthorId{1});
+  (void)authorizer_->joined(anna, "ward", 1, AuthorId{1});
+  // Deleted and made again behind the authorizer's back: its authors are counted anew.
+  (void)authorizer_->joined(ben, "ward", 1, AuthorId{1});
   std::string ended;
-  const auto bens = gate_->enter(ben, "ward", AuthorId{1}, kWatch, [&](const Refusal& why) { ended += why.sentence; });
-  (void)gate_->joined(anna, "ward", 1, AuthorId{2});
+  const auto bens = authorizer_->enter(ben, "ward", AuthorId{1}, kWatch, [&](const Refusal& why) { ended += why.sentence; });
+  (void)authorizer_->joined(anna, "ward", 1, AuthorId{2});
   EXPECT_EQ(ended, "");
-  EXPECT_TRUE(gate_->check_author(ben, "ward", AuthorId{1}));
-  EXPECT_TRUE(gate_->check_author(anna, "ward", AuthorId{2}));
+  EXPECT_TRUE(authorizer_->check_author(ben, "ward", AuthorId{1}));
+  EXPECT_TRUE(authorizer_->check_author(anna, "ward", AuthorId{2}));
 }
 
 TEST_F(GateTest, KnowsWhichRoomIsMeantThatIsNotNamed) {
   people_->append_access("role anna observer ward");
-  gate_->look();
+  authorizer_->look();
   const std::string everywhere = ticket("anna", "*", Role::instructor);
-  gate_->set_only_room([] { return std::string("ward"); });
+  authorizer_->set_only_room([] { return std::string("ward"); });
   EXPECT_THAT(refused("anna", everywhere, "", kUndo, true), HasSubstr("an observer may not"));
   EXPECT_THAT(refused("anna", everywhere, "ward", kUndo, true), HasSubstr("an observer may not"));
-  gate_->set_only_room([] { return std::string("theatre"); });
+  authorizer_->set_only_room([] { return std::string("theatre"); });
   EXPECT_EQ(refused("anna", everywhere, "", kUndo, true), "");
 }
 
 TEST_F(GateTest, EndsStreamsOfWhoMayHaveThemNoMore) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
-  ASSERT_TRUE(gate_->joined(anna, "ward", 1, AuthorId{1}) && gate_->joined(ben, "ward", 1, AuthorId{2}));
+  ASSERT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{1}) && authorizer_->joined(ben, "ward", 1, AuthorId{2}));
   std::optional<Refusal> ended[3];
   std::atomic<int> calls = 0;
   const auto into = [&](int i) { return [&, i](const Refusal& why) { ended[i] = why, ++calls; }; };
-  const auto first = gate_->enter(anna, "ward", AuthorId{1}, kWatch, into(0));
-  const auto second = gate_->enter(ben, "ward", AuthorId{2}, kWatch, into(1));
-  auto gone = gate_->enter(anna, "ward", AuthorId{1}, kWatch, into(2));
-  EXPECT_EQ(gate_->counts().streams, 3u);
+  const auto first = authorizer_->enter(anna, "ward", AuthorId{1}, kWatch, into(0));
+  const auto second = authorizer_->enter(ben, "ward", AuthorId{2}, kWatch, into(1));
+  auto gone = authorizer_->enter(anna, "ward", AuthorId{1}, kWatch, into(2));
+  EXPECT_EQ(authorizer_->counts().streams, 3u);
   gone->reset();
-  EXPECT_EQ(gate_->counts().streams, 2u);
+  EXPECT_EQ(authorizer_->counts().streams, 2u);
   EXPECT_EQ((*first)->role(), Role::trainee);
-  // Nobody asks: the gate looks by itself.
+  // Nobody asks: the authorizer looks by itself.
   people_->append_access("role anna observer");
   ASSERT_TRUE(test::wait_until([&] { return calls == 1; }, 5s));
   EXPECT_THAT(ended[0]->sentence, HasSubstr("your role has changed to observer"));
@@ -383,19 +383,19 @@ TEST_F(GateTest, EndsStreamsOfWhoMayHaveThemNoMore) {
   now_ += 3600;
   ASSERT_TRUE(test::wait_until([&] { return calls == 2; }, 5s));
   EXPECT_THAT(ended[1]->sentence, HasSubstr("expired"));
-  gate_->look();
+  authorizer_->look();
   EXPECT_EQ(calls, 2) << "a stream ends once";
 }
 
 TEST_F(GateTest, KnowsAPersonWhoseRoleHasChangedOnlyAfterAnotherJoin) {
   const Caller before = let_in("anna", Role::collaborator);
-  (void)gate_->joined(before, "ward", 1, AuthorId{1});
+  (void)authorizer_->joined(before, "ward", 1, AuthorId{1});
   people_->append_access("role anna trainee");
-  gate_->look();
+  authorizer_->look();
   const Caller after = let_in("anna", Role::collaborator);
   EXPECT_EQ(after.role, Role::trainee);
-  EXPECT_THAT(gate_->check_author(after, "ward", AuthorId{1}).error().message, HasSubstr("role has changed"));
-  EXPECT_THAT(gate_->check_resume(after, "ward", 1, AuthorId{1}).error().message, HasSubstr("role has changed"));
+  EXPECT_THAT(authorizer_->check_author(after, "ward", AuthorId{1}).error().message, HasSubstr("role has changed"));
+  EXPECT_THAT(authorizer_->check_resume(after, "ward", 1, AuthorId{1}).error().message, HasSubstr("role has changed"));
 }
 
 TEST(CallRates, LetThroughAsManyAsTheTimeAllows) {

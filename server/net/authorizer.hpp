@@ -77,13 +77,13 @@ class OpenStream {
   [[nodiscard]] virtual Role role() const = 0;  // what holds now
 };
 
-struct GateCounts {
+struct AuthorizerCounts {
   std::uint64_t admitted = 0, refused = 0, ended = 0, displaced = 0;  // calls, calls, streams, sessions
   std::size_t streams = 0;                                           // open now
 };
 
 // Any thread.
-class Gate {
+class Authorizer {
  public:
   static constexpr std::chrono::milliseconds kLookEvery{250};
   using Now = std::function<UnixTime()>;
@@ -91,10 +91,10 @@ class Gate {
   // `folder`: ca.pem, server.pem, server.key, tickets.pub; access.txt and crl.pem where somebody was revoked. All are
   // read again when they change. `counts` outlives it. Errors: not_found, invalid_input; the sentence
   // names the file.
-  [[nodiscard]] static Result<std::unique_ptr<Gate>> open(const std::filesystem::path& folder, RefusalCounts& counts, Now now = {});
-  ~Gate();
-  Gate(const Gate&) = delete;
-  Gate& operator=(const Gate&) = delete;
+  [[nodiscard]] static Result<std::unique_ptr<Authorizer>> open(const std::filesystem::path& folder, RefusalCounts& counts, Now now = {});
+  ~Authorizer();
+  Authorizer(const Authorizer&) = delete;
+  Authorizer& operator=(const Authorizer&) = delete;
 
   // Which room a call is to that names none, with a ticket for every room; empty: there is no such. Before the first call.
   void set_only_room(std::function<std::string()> name) { only_room_ = std::move(name); }
@@ -102,10 +102,10 @@ class Gate {
   // Tickets that are good for longer, counted from now, are refused; zero: none is. Before the first call.
   void set_most_ticket_life(std::chrono::hours most) { most_ticket_life_ = most; }
 
-  // Through which connections are closed whose certificate is revoked; they outlive the gate. Before the first call.
+  // Through which connections are closed whose certificate is revoked; they outlive the authorizer. Before the first call.
   void set_connections(Connections& connections) { connections_ = &connections; }
 
-  // Takes down every refusal; it outlives the gate. Before the first call.
+  // Takes down every refusal; it outlives the authorizer. Before the first call.
   void set_trail(AuditTrail& trail) { trail_ = &trail; }
   // What is known of who makes a call, whether they may or not. `room`: that the call or its ticket names.
   struct CallTrace {
@@ -114,7 +114,7 @@ class Gate {
   };
   [[nodiscard]] CallTrace trace_of(const CallClaims& call);
 
-  // Mutual TLS, with this gate in every handshake. It outlives the server.
+  // Mutual TLS, with this authorizer in every handshake. It outlives the server.
   [[nodiscard]] std::shared_ptr<grpc::ServerCredentials> credentials();
 
   // Of a connection: whether its certificates, the client's first, are of the authority and let somebody in. Counted
@@ -142,19 +142,19 @@ class Gate {
   void forget_room(const std::string& room);
 
   // Looks again who it is, and as whom (`author` null: as nobody), in one step with the beginning: whose right ends meanwhile
-  // is refused here or hears of it. `end` is called once, on a thread of the gate's own, when the caller may have the stream no
+  // is refused here or hears of it. `end` is called once, on a thread of the authorizer's own, when the caller may have the stream no
   // more; not after the result has been destroyed, except while that happens.
   using End = std::function<void(const Refusal& why)>;
   using Entered = tl::expected<std::shared_ptr<OpenStream>, Refusal>;
   [[nodiscard]] Entered enter(const Caller& caller, const std::string& room, AuthorId author, std::string_view method, End end);
   // What a caller would be in another room than that of the call, if the ticket were for it.
   [[nodiscard]] Role role_in(const Caller& caller, const std::string& room) const;
-  [[nodiscard]] GateCounts counts() const;
+  [[nodiscard]] AuthorizerCounts counts() const;
   void look();  // at all streams, now
 
  private:
   class Watched;
-  Gate(std::filesystem::path folder, RefusalCounts& counts, Now now);
+  Authorizer(std::filesystem::path folder, RefusalCounts& counts, Now now);
   // Reads ca.pem and crl.pem. True: they are other ones now. Under reading_.
   [[nodiscard]] Result<bool> read_authorities();
   // Reads tickets.pub. True: it has other keys now. Under reading_.
@@ -184,7 +184,7 @@ class Gate {
   const Now now_;
   std::function<std::string()> only_room_;
   std::chrono::hours most_ticket_life_{0};
-  Connections* connections_ = nullptr;  // null: of a gate without a server
+  Connections* connections_ = nullptr;  // null: of a authorizer without a server
   AuditTrail* trail_ = nullptr;         // null: nothing is taken down
   std::mutex reading_;         // taken before mutex_, never within it
   AccessFile access_;          // under reading_, as the next
@@ -208,7 +208,7 @@ class Gate {
   };
   std::map<std::pair<std::string, AuthorId>, Member> authors_;
   std::list<std::weak_ptr<Watched>> streams_;
-  GateCounts counts_;
+  AuthorizerCounts counts_;
   std::condition_variable wake_;
   bool end_ = false;
   std::thread thread_;
