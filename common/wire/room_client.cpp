@@ -213,7 +213,7 @@ Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const 
   return joined;
 }
 
-Result<JoinedRoom> join_again(const JoinedRoom& room, ClientKind kind, const std::optional<KeptEvents>& kept) {
+Result<JoinedRoom> join_again(const JoinedRoom& room, ClientKind kind, const std::optional<DurableSeq>& kept) {
   v1::JoinRequest request = request_of(kind);
   request.set_resume_author(room.author.value);
   request.set_secret(room.secret);

@@ -50,10 +50,10 @@ struct JoinedRoom {
 
 // The same author again over the same channel, after the stream or the server was lost. `kept`: the newest event that the
 // server said is kept, its chain and the server's seal. Errors: unavailable (try again), any other (the room knows this client no more).
-struct KeptEvents {
+struct DurableSeq {
   RoomSeq room_seq;
   Digest chain, seal;
 };
-[[nodiscard]] Result<JoinedRoom> join_again(const JoinedRoom& room, ClientKind kind, const std::optional<KeptEvents>& kept);
+[[nodiscard]] Result<JoinedRoom> join_again(const JoinedRoom& room, ClientKind kind, const std::optional<DurableSeq>& kept);
 
 }  // namespace osteon::wire

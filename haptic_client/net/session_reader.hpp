@@ -39,7 +39,7 @@ class SessionReader {
   // The newest event of the present stream that was passed on, or that its leaves contain once all of them have come.
   [[nodiscard]] RoomSeq place() const { return place_; }
   // The newest that the room has said is kept.
-  [[nodiscard]] const std::optional<wire::KeptEvents>& kept() const { return kept_; }
+  [[nodiscard]] const std::optional<wire::DurableSeq>& kept() const { return kept_; }
 
  private:
   using Row = std::variant<v1::SessionResponse, wire::SessionRow>;
@@ -56,7 +56,7 @@ class SessionReader {
   const RoomEvents events_;
   const std::function<void(std::uint64_t)> decided_, complete_;
   ReceiveWindow<Row> rows_;
-  std::optional<wire::KeptEvents> kept_;
+  std::optional<wire::DurableSeq> kept_;
   RoomSeq place_;
   bool supervised_ = false;  // of the present stream, before its leaves are complete
   std::map<AuthorId, std::uint64_t> partners_;  // newest state_seq of each

@@ -26,7 +26,7 @@
 #include "server/app/key_command.hpp"
 #include "server/journal/journal_file.hpp"
 #include "server/journal/signing.hpp"
-#include "server/journal/upkeep.hpp"
+#include "server/journal/maintenance.hpp"
 #include "server/net/forgetting.hpp"
 #include "server/net/journal_rows.hpp"
 #include "server/net/room_files.hpp"

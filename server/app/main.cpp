@@ -149,19 +149,19 @@ Result<Room> make_room(const ServerConfig& options, const Case& bone, std::share
 
 // The room that the journal keeps, or a new one in a new journal.
 Result<Room> open_journal(const ServerConfig& options, const Case& bone, std::shared_ptr<ToolBox> tools,
-                          std::shared_ptr<const SigningKeys> keys, std::unique_ptr<RoomKeeper>& keeper) {
-  RoomKeeper::Options keeping{.name = options.journal_file.stem().string(), .limits = options.limits, .tools = std::move(tools), .journal = {}, .today = {}, .random = {}};
+                          std::shared_ptr<const SigningKeys> keys, std::unique_ptr<RoomStore>& store) {
+  RoomStore::Options keeping{.name = options.journal_file.stem().string(), .limits = options.limits, .tools = std::move(tools), .journal = {}, .today = {}, .random = {}};
   keeping.journal.keys = std::move(keys);
   keeping.retention_days = options.retention_days;
   Progress progress("journal");
-  Result<KeptRoom> kept = RoomKeeper::open(options.journal_file, bone, keeping, [&](double fraction) { progress.update(fraction); });
+  Result<PersistedRoom> kept = RoomStore::open(options.journal_file, bone, keeping, [&](double fraction) { progress.update(fraction); });
   if (!kept) return tl::unexpected(kept.error());
   log::info("journal", {{"file", options.journal_file.string()},
                         {"made", kept->made},
                         {"room_seq", kept->room.room_seq().value},
-                        {"evaluated", kept->keeper->evaluated()},
-                        {"server_epoch", kept->keeper->server_epoch()}});
-  keeper = std::move(kept->keeper);
+                        {"evaluated", kept->store->evaluated()},
+                        {"server_epoch", kept->store->server_epoch()}});
+  store = std::move(kept->store);
   return std::move(kept->room);
 }
 
@@ -267,12 +267,12 @@ Result<std::unique_ptr<Rooms>> open_rooms(const ServerConfig& options) {
     rooms->resume_all(tell);
     return rooms;
   }
-  std::unique_ptr<RoomKeeper> keeper;
+  std::unique_ptr<RoomStore> store;
   Result<Room> room = options.journal_file.empty() ? make_room(options, bone, (*tools)())
-                                                   : open_journal(options, bone, (*tools)(), *keys, keeper);
+                                                   : open_journal(options, bone, (*tools)(), *keys, store);
   if (!room) return tl::unexpected(room.error());
-  const std::string name = keeper ? keeper->genesis().room : "room";
-  if (auto added = rooms->add(name, std::move(*room), std::move(keeper), options.save_file, tell); !added)
+  const std::string name = store ? store->genesis().room : "room";
+  if (auto added = rooms->add(name, std::move(*room), std::move(store), options.save_file, tell); !added)
     return tl::unexpected(added.error());
   return rooms;
 }

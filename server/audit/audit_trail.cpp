@@ -36,7 +36,7 @@ Result<std::unique_ptr<AuditTrail>> AuditTrail::open(AuditOptions options, Disk*
   auto written = trail->log_.append(trail->batch_);
   if (!written) return tl::unexpected(written.error());
   trail->tell(*written);
-  trail->keep_up();
+  trail->maintain();
   trail->thread_ = std::thread([raw = trail.get()] { raw->run(); });
   return trail;
 }
@@ -123,7 +123,7 @@ void AuditTrail::run() {
     write(lock);
     if (end_ && (counts_.failing || (waiting_.empty() && lost_ == 0))) break;
     lock.unlock();
-    keep_up();
+    maintain();
     lock.lock();
   }
   if (const std::size_t left = batch_.size() + waiting_.size(); left > 0)
@@ -161,7 +161,7 @@ void AuditTrail::tell(const std::vector<AuditLog::Written>& written) {
   batch_.clear();
 }
 
-void AuditTrail::keep_up() {
+void AuditTrail::maintain() {
   const auto now = Clock::now();
   if (options_.retention_days == 0 || (kept_up_ != Clock::time_point{} && now - kept_up_ < kKeepUpEvery)) return;
   kept_up_ = now;

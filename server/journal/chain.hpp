@@ -22,7 +22,7 @@ struct JournalHead {
   friend bool operator==(const JournalHead&, const JournalHead&) = default;
 };
 
-// The same with a seal by which the room's keeper knows its own word again, for those who are not to be believed without.
+// The same with a seal by which the room's store knows its own word again, for those who are not to be believed without.
 struct Witness {
   JournalHead head;
   Digest seal;

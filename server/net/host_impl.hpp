@@ -36,8 +36,8 @@ inline constexpr std::uint64_t kFirstWatcherOfPlayback = 1ull << 40;
 struct RoomHost::Impl {
   using Clock = RoomHost::Clock;
 
-  Impl(Room r, HostRates rates, Detail detail, RoomKeeper* k, std::optional<Playback> p)
-      : keeper(k), room(std::move(r)),
+  Impl(Room r, HostRates rates, Detail detail, RoomStore* k, std::optional<Playback> p)
+      : store(k), room(std::move(r)),
         rates_(rates),
         room_began(Clock::now() - std::chrono::duration_cast<Clock::duration>(k ? reopened_time(room) : room.time())),
         people(room, names_of(k)),
@@ -49,7 +49,7 @@ struct RoomHost::Impl {
     if (p) player.emplace(std::move(*p), room.time());
     board.tell_hands([this](const std::vector<CuttingState>& states) { return tell_hands(states); });
   }
-  [[nodiscard]] static std::map<std::uint32_t, std::string> names_of(RoomKeeper* keeper);
+  [[nodiscard]] static std::map<std::uint32_t, std::string> names_of(RoomStore* store);
 
   [[nodiscard]] bool driven() const { return rates_.tick.count() == 0; }
   // Of a playback they are among its rows.
@@ -106,7 +106,7 @@ struct RoomHost::Impl {
   BoneCopy copy_bone(Bodies which = Bodies::that_exist);
   void ask_for_split(Separation found);
 
-  RoomKeeper* const keeper;  // null: nothing is kept
+  RoomStore* const store;  // null: nothing is kept
   std::optional<Player> player;           // of a playback, from the beginning; used by the tick thread alone
   std::atomic<std::uint64_t> next_watcher{kFirstWatcherOfPlayback};  // of a playback
   Room room;

@@ -23,10 +23,10 @@ Error only_to_be_watched() {
 }
 
 // A name that cannot be read now is shown as nobody's.
-std::map<std::uint32_t, std::string> RoomHost::Impl::names_of(RoomKeeper* keeper) {
+std::map<std::uint32_t, std::string> RoomHost::Impl::names_of(RoomStore* store) {
   std::map<std::uint32_t, std::string> names;
-  if (keeper == nullptr) return names;
-  const Result<std::vector<Person>> people = keeper->people();
+  if (store == nullptr) return names;
+  const Result<std::vector<Person>> people = store->people();
   if (!people) return names;
   for (const Person& person : *people) {
     std::uint32_t number = 0;
@@ -131,11 +131,11 @@ void RoomHost::Impl::decide(QueuedEvent& queued) {
 
 // [tick] Every second, what a client may hold the room to.
 void RoomHost::Impl::tell_kept(std::chrono::nanoseconds now) {
-  if (!keeper || now < next_kept) return;
+  if (!store || now < next_kept) return;
   next_kept = now + std::chrono::seconds(1);
   later([this](const Result<void>& durable) {
     if (!durable) return;
-    const Bytes row = kept_row(keeper->witness());
+    const Bytes row = kept_row(store->witness());
     const std::lock_guard lock(sessions_mutex);
     sessions.each([&](SessionSink& sink) { sink.answer(row); });
   });
@@ -186,7 +186,7 @@ void RoomHost::Impl::end_sessions(const std::string& why, bool to_return) {
 
 Result<void> RoomHost::check_kept(const Witness& kept) {
   if (impl_->player) return {};
-  if (impl_->keeper) return impl_->keeper->check_witness(kept);
+  if (impl_->store) return impl_->store->check_witness(kept);
   return failure(ErrorCode::unavailable,
                  "the room begins anew: it has no journal, and none of the " + std::to_string(kept.head.place.value) +
                      " events that you were told are kept; start again to join it as it is now");
@@ -200,7 +200,7 @@ Result<void> RoomHost::resume(AuthorId author, const Digest& secret, const std::
   if (!impl_->room.proves(author, secret))
     return failure(ErrorCode::invalid_input,
                    "the room does not know author " + std::to_string(author.value) + " of an earlier connection: " +
-                       (impl_->keeper ? "its journal begins anew, or ends before that join"
+                       (impl_->store ? "its journal begins anew, or ends before that join"
                                       : "without a journal it ends with its server") +
                        "; start again to join it as it is now");
   // What an author may take back goes by the role of the join.
@@ -217,14 +217,14 @@ void RoomHost::join(MemberKind kind, const std::string& name, const Digest& secr
     return answer(tl::unexpected(only_to_be_watched()));
   }
   std::uint32_t person = 0;
-  if (impl_->keeper && !name.empty()) {
-    const Result<std::uint32_t> known = impl_->keeper->person(name);
+  if (impl_->store && !name.empty()) {
+    const Result<std::uint32_t> known = impl_->store->person(name);
     if (!known) return answer(tl::unexpected(known.error()));
     person = *known;
   }
   queue_event(
       [=, this](Room& room) -> Result<RoomEvent> {
-        return room.admit(kind, impl_->keeper ? person : impl_->person_of(name), secret, role);
+        return room.admit(kind, impl_->store ? person : impl_->person_of(name), secret, role);
       },
       [this, kind, name, role, answer = std::move(answer)](const Result<RoomEvent>& event) {
         if (!event) return answer(tl::unexpected(event.error()));
@@ -291,7 +291,7 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, co
     if (impl_->ended) impl_->may_return ? sink->replaced(*impl_->ended) : sink->end(*impl_->ended);
   }
   impl_->read_leaves(leaves);
-  if (!impl_->keeper) {
+  if (!impl_->store) {
     sink->set_leaves(std::move(leaves));
     return {};
   }

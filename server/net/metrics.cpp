@@ -107,7 +107,7 @@ void tell_room(Page& page, OpenRoom& room, bool draining) {
   page.histogram("osteon_tick_work_seconds", "How long ticks took.", with(), health.tick.work);
   page.counter("osteon_ticks_missed_total", "Periods that no tick ran in.", with(), static_cast<double>(health.tick.missed));
   page.histogram("osteon_journal_commit_seconds", "Transactions of the journal.", with(), health.commit);
-  if (room.keeper()) page.gauge("osteon_journal_bytes", "The journal's file and its log.", with(), bytes_of(room.keeper_file()));
+  if (room.store()) page.gauge("osteon_journal_bytes", "The journal's file and its log.", with(), bytes_of(room.keeper_file()));
 
   const char* queue =
       "What waits: cuts for a tick, rows for the disk, blocks for the surface, the slowest reader's rows or blocks.";

@@ -95,7 +95,7 @@ Result<JournalCopy> begin_branch(Journal& from, const fs::path& to, RoomSeq plac
 }
 
 Result<JournalHead> branch_journal(const fs::path& from, const fs::path& to, RoomSeq place, const std::string& name,
-                                   const UpkeepCalls& calls, Disk* disk) {
+                                   const MaintenanceCalls& calls, Disk* disk) {
   Result<Journal> journal = Journal::open_to_read(from, disk);
   if (!journal) return tl::unexpected(journal.error());
   Result<JournalCopy> copy = begin_branch(*journal, to, place, name);

@@ -8,13 +8,13 @@
 #include <vector>
 
 #include "server/journal/journal.hpp"
-#include "server/journal/upkeep.hpp"
+#include "server/journal/maintenance.hpp"
 #include "server/net/journal_rows.hpp"
 
 namespace osteon {
 
 // For what takes long. Both are called between slices, without any lock, and may wait, so that less is asked of the disk.
-struct UpkeepCalls {
+struct MaintenanceCalls {
   std::function<void(double)> progress;  // fraction that is done
   std::function<bool()> stop;            // true: give up, with the error cancelled
 };
@@ -29,11 +29,11 @@ struct UpkeepCalls {
 [[nodiscard]] Result<RoomGenesis> peek_genesis(const std::filesystem::path& file, Disk* disk = nullptr);
 
 // A room of its own, in `to`, that begins with all that another one was up to a place, null for all of it: rows and
-// checkpoints. It knows numbers of people, not who they are. The journal must not be in use: else RoomKeeper::branch. Errors:
+// checkpoints. It knows numbers of people, not who they are. The journal must not be in use: else RoomStore::branch. Errors:
 // not_found; exists (in use, or there is something in `to`); invalid_input (no such place, damaged); unavailable (all of it,
 // and it is closed to rows); cancelled.
 [[nodiscard]] Result<JournalHead> branch_journal(const std::filesystem::path& from, const std::filesystem::path& to,
-                                                 RoomSeq place, const std::string& name, const UpkeepCalls& calls = {},
+                                                 RoomSeq place, const std::string& name, const MaintenanceCalls& calls = {},
                                                  Disk* disk = nullptr);
 
 // Whether a journal has this head in its history.
@@ -41,7 +41,7 @@ using HasHead = std::function<Result<bool>(const std::filesystem::path& file, co
 
 // The branches of a room among the files of a folder, and the branches of those, each after the one that it was made from:
 // by the name of the room and by its history, which the branch names. `has_head`: for rooms that are in use; null: has_head()
-// of server/journal/upkeep.hpp. Errors: those of it.
+// of server/journal/maintenance.hpp. Errors: those of it.
 struct RoomFile {
   std::filesystem::path file;
   RoomGenesis genesis;

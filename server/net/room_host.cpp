@@ -33,10 +33,10 @@ bool RoomHost::Impl::tick(std::chrono::nanoseconds now, bool last) {
   batch.clear();
   // A commit that fails says so itself. What else closes a journal: damage that was found when it was opened, a witness, a
   // name or a checkpoint that could not be written.
-  if (keeper && keeper->closed_to_rows() && !closing_told) {
+  if (store && store->closed_to_rows() && !closing_told) {
     closing_told = true;
     later([this](const Result<void>&) {
-      if (!committer.failure()) close_room(*keeper->closed_to_rows());
+      if (!committer.failure()) close_room(*store->closed_to_rows());
     });
   }
   committer.commit(room.take_rows(), std::exchange(tells, {}));
@@ -115,7 +115,7 @@ void RoomHost::Impl::close_room(const Error& why) {
 
 std::optional<Error> RoomHost::Impl::closed() const {
   std::optional<Error> why = committer.failure();
-  if (!why && keeper && keeper->closed_to_rows()) why = *keeper->closed_to_rows();
+  if (!why && store && store->closed_to_rows()) why = *store->closed_to_rows();
   if (why) *why = {ErrorCode::unavailable, "the room takes no more cuts: " + why->message};
   return why;
 }
@@ -124,8 +124,8 @@ std::optional<Error> RoomHost::Impl::closed() const {
 void RoomHost::Impl::show_scene() { board.show(room.items(), room.bodies()); }
 
 RoomHost::RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress, Detail detail,
-                   RoomKeeper* keeper, std::optional<Playback> playback)
-    : impl_(std::make_unique<Impl>(std::move(room), rates, detail, keeper, std::move(playback))) {
+                   RoomStore* store, std::optional<Playback> playback)
+    : impl_(std::make_unique<Impl>(std::move(room), rates, detail, store, std::move(playback))) {
   if (!impl_->driven()) impl_->mesh.make_whole_surface(progress);
   impl_->room_seq = impl_->room.room_seq().value;
   impl_->show_scene();

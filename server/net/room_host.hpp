@@ -17,7 +17,7 @@
 #include "server/net/mesh_room.hpp"
 #include "server/net/committer.hpp"
 #include "server/net/cut_figures.hpp"
-#include "server/net/room_keeper.hpp"
+#include "server/net/room_store.hpp"
 #include "server/net/outbox.hpp"
 #include "server/net/people_board.hpp"
 #include "server/net/playback.hpp"
@@ -96,10 +96,10 @@ class RoomHost {
   using Clock = std::chrono::steady_clock;
 
   // Makes the whole surface, then starts the threads. `progress` hears fractions from one thread at a time.
-  // `keeper` makes rows durable before any hand hears of them, and outlives the host; without it nothing is kept.
+  // `store` makes rows durable before any hand hears of them, and outlives the host; without it nothing is kept.
   // `playback`: rows after those of `room` happen at their times; whoever joins may watch and nothing else.
   RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress, Detail detail = Detail::automatic,
-           RoomKeeper* keeper = nullptr, std::optional<Playback> playback = {});
+           RoomStore* store = nullptr, std::optional<Playback> playback = {});
   ~RoomHost();
   RoomHost(const RoomHost&) = delete;
   RoomHost& operator=(const RoomHost&) = delete;
@@ -128,7 +128,7 @@ class RoomHost {
   [[nodiscard]] Result<AuthorId> join(MemberKind kind, const std::string& name = {}, const Digest& secret = {},
                                       Role role = Role::none);
   // What somebody who comes back was told is safe. It counts whoever says it: after a loss the author's number may be
-  // another's, or nobody's. Errors: those of RoomKeeper::check_witness; unavailable (nobody keeps the room).
+  // another's, or nobody's. Errors: those of RoomStore::check_witness; unavailable (nobody keeps the room).
   [[nodiscard]] Result<void> check_kept(const Witness& kept);
   // Whether an earlier connection may go on. `kept`: what it was told is safe, if anything. Errors: first those of
   // check_kept; invalid_input (not the secret of which the author has the digest); denied (`role` is given, and the
@@ -168,7 +168,7 @@ class RoomHost {
   // by then every session has been told. Error unavailable: the room has stopped.
   void queue_event(std::function<Result<RoomEvent>(Room&)> change, std::function<void(const Result<RoomEvent>&)> answer);
 
-  [[nodiscard]] bool stopped() const;        // takes no more, also where its keeper's journal does not
+  [[nodiscard]] bool stopped() const;        // takes no more, also where its store's journal does not
   // The process is about to stop: sessions, also those that are opened from now on, are told to come again after that time,
   // and go on until they have.
   void ask_to_redial(std::chrono::milliseconds after, const std::string& why);

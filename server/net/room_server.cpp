@@ -111,12 +111,12 @@ Result<void> RoomServer::check_listen(const std::string& listen, const Connectio
 
 Result<std::unique_ptr<RoomServer>> RoomServer::start(Room room, const RoomServerOptions& options,
                                                       const std::function<void(double)>& progress,
-                                                      std::unique_ptr<RoomKeeper> keeper) {
+                                                      std::unique_ptr<RoomStore> store) {
   if (Result<void> usable = check_listen(options.listen); !usable) return tl::unexpected(usable.error());
   RoomsOptions of_one{.cases = {{room.bone(), options.case_folder}}, .rates = options.rates, .detail = options.detail};
   auto rooms = std::make_unique<Rooms>(std::move(of_one));
-  const std::string name = keeper ? keeper->genesis().room : "room";
-  if (const auto added = rooms->add(name, std::move(room), std::move(keeper), options.save, progress); !added)
+  const std::string name = store ? store->genesis().room : "room";
+  if (const auto added = rooms->add(name, std::move(room), std::move(store), options.save, progress); !added)
     return tl::unexpected(added.error());
   return start(std::move(rooms), options.listen);
 }

@@ -13,7 +13,7 @@
 #include "server/net/link_server.hpp"
 #include "server/net/listener.hpp"
 #include "server/net/room_host.hpp"
-#include "server/net/room_keeper.hpp"
+#include "server/net/room_store.hpp"
 #include "server/net/rooms.hpp"
 
 namespace osteon {
@@ -58,11 +58,11 @@ class RoomServer {
   // unavailable (the system refuses for another reason, which the message gives).
   [[nodiscard]] static Result<std::unique_ptr<RoomServer>> start(std::unique_ptr<Rooms> rooms, const std::string& listen,
                                                                  const ConnectionOptions& connections = {});
-  // Of one room, "room" or what `keeper` calls it. `progress` hears how far the first surface is. `keeper`: of this room;
+  // Of one room, "room" or what `store` calls it. `progress` hears how far the first surface is. `store`: of this room;
   // without one it is lost when the process ends.
   [[nodiscard]] static Result<std::unique_ptr<RoomServer>> start(Room room, const RoomServerOptions& options,
                                                                  const std::function<void(double)>& progress,
-                                                                 std::unique_ptr<RoomKeeper> keeper = nullptr);
+                                                                 std::unique_ptr<RoomStore> store = nullptr);
   ~RoomServer();
   RoomServer(const RoomServer&) = delete;
   RoomServer& operator=(const RoomServer&) = delete;

@@ -91,7 +91,7 @@ class RowsAgain {
   std::optional<RoomRow> operator()() {
     if (ahead_.empty() && next_ <= to_) {
       const RoomSeq last{std::min(to_.value, next_.value + kRowsAhead - 1)};
-      const Result<void> read = room_->keeper()->read(next_, last, [&](const RoomRow& row) {
+      const Result<void> read = room_->store()->read(next_, last, [&](const RoomRow& row) {
         ahead_.push_back(row);
         return true;
       });
@@ -114,17 +114,17 @@ class RowsAgain {
 }  // namespace
 
 OpenRoom::OpenRoom(std::string n, LoadedCase loaded, Room room, const RoomsOptions& options,
-                   const std::function<void(double)>& progress, std::unique_ptr<RoomKeeper> keeper, std::optional<Playback> playback)
+                   const std::function<void(double)>& progress, std::unique_ptr<RoomStore> store, std::optional<Playback> playback)
     : name(std::move(n)),
       of(std::move(loaded)),
-      server_epoch(keeper ? keeper->server_epoch() : new_server_epoch()),
-      keeper_(std::move(keeper)) {
+      server_epoch(store ? store->server_epoch() : new_server_epoch()),
+      store_(std::move(store)) {
   // What took long to make again should not take so long the next time.
   constexpr std::uint64_t kLongReplay = 5000;
-  if (keeper_ && keeper_->evaluated() > kLongReplay)
-    if (const Result<void> kept = keeper_->checkpoint(room.room_seq(), room.all_leaves()); !kept)
+  if (store_ && store_->evaluated() > kLongReplay)
+    if (const Result<void> kept = store_->checkpoint(room.room_seq(), room.all_leaves()); !kept)
       log::warn("no checkpoint", {{"room", name}, {"reason", kept.error().message}});
-  host_ = std::make_unique<RoomHost>(std::move(room), options.rates, progress, options.detail, keeper_.get(), std::move(playback));
+  host_ = std::make_unique<RoomHost>(std::move(room), options.rates, progress, options.detail, store_.get(), std::move(playback));
 }
 
 void OpenRoom::note_version(AuthorId author, std::uint32_t version) {
@@ -154,34 +154,34 @@ void OpenRoom::send_away(const std::string& why) {
 RoomSummary OpenRoom::close() {
   demonstrations_.end_all();
   host_->stop();
-  if (keeper_) {
+  if (store_) {
     // Nothing is lost where this fails: the next opening takes longer.
-    if (const Result<void> kept = keeper_->checkpoint(host_->room_seq(), host_->all_leaves()); !kept)
+    if (const Result<void> kept = store_->checkpoint(host_->room_seq(), host_->all_leaves()); !kept)
       log::warn("no checkpoint", {{"room", name}, {"reason", kept.error().message}});
-    if (const Result<void> closed = keeper_->close(); !closed)
+    if (const Result<void> closed = store_->close(); !closed)
       log::warn("the journal was not closed cleanly", {{"room", name}, {"reason", closed.error().message}});
   }
   return {host_->bone().hash(), host_->bone_status(), host_->health(), save, save.empty() ? SavedFields{} : host_->saved_fields(),
           host_->surface_hash()};
 }
 
-void OpenRoom::keep_up(const std::function<bool()>& stop) {
-  if (!keeper_ || keeper_->closed_to_rows()) return;
+void OpenRoom::maintain(const std::function<bool()>& stop) {
+  if (!store_ || store_->closed_to_rows()) return;
   if (Clock::now() - forgotten_ > std::chrono::hours(24)) {
     forgotten_ = Clock::now();
-    if (const Result<std::size_t> gone = keeper_->forget_old(); !gone)
+    if (const Result<std::size_t> gone = store_->forget_old(); !gone)
       log::warn("nobody was forgotten", {{"room", name}, {"reason", gone.error().message}});
   }
-  if (const Result<void> tidied = keeper_->tidy_if_idle(); !tidied)
+  if (const Result<void> tidied = store_->tidy_if_idle(); !tidied)
     log::warn("the journal's log stays long", {{"room", name}, {"reason", tidied.error().message}});
-  const bool due = CheckpointPolicy{}.is_due(keeper_->changes_since_checkpoint(), Clock::now() - newest_checkpoint_);
+  const bool due = CheckpointPolicy{}.is_due(store_->changes_since_checkpoint(), Clock::now() - newest_checkpoint_);
   if (!due) return;
   newest_checkpoint_ = Clock::now();
   // Written here: whoever comes is answered by the thread that copies the leaves, and must not wait for the disk.
   std::promise<RoomHost::Leaves> copied;
   host_->run_slowly([&] { copied.set_value(host_->leaves_now()); });
   const RoomHost::Leaves now = copied.get_future().get();
-  if (const Result<void> kept = keeper_->checkpoint(now.place, now.leaves, {.progress = {}, .stop = stop}); !kept)
+  if (const Result<void> kept = store_->checkpoint(now.place, now.leaves, {.progress = {}, .stop = stop}); !kept)
     log::warn("no checkpoint", {{"room", name}, {"reason", kept.error().message}});
 }
 
@@ -205,23 +205,23 @@ void Rooms::end_calls() {
 void Rooms::run_upkeep() {
   using Clock = std::chrono::steady_clock;
   Clock::time_point forget_at = Clock::now();
-  const auto keep_up = [&] {
+  const auto maintain = [&] {
     if (options_.retention_days > 0 && Clock::now() >= forget_at) {
       forget_at += std::chrono::hours(24);
       if (const std::size_t gone = forget_owners(options_.folder, std::chrono::days(options_.retention_days)); gone > 0)
         log::info("owners forgotten", {{"count", gone}});
     }
-    for (const std::shared_ptr<OpenRoom>& room : open_rooms()) room->keep_up(until_the_end().stop);
+    for (const std::shared_ptr<OpenRoom>& room : open_rooms()) room->maintain(until_the_end().stop);
   };
   std::unique_lock lock(mutex_);
   do {
     lock.unlock();
-    keep_up();
+    maintain();
     lock.lock();
   } while (!upkeep_wake_.wait_for(lock, kUpkeepEvery, [&] { return ending_.load(); }));
 }
 
-UpkeepCalls Rooms::until_the_end() const {
+MaintenanceCalls Rooms::until_the_end() const {
   return {.progress = {}, .stop = [this] { return ending_.load(); }};
 }
 
@@ -297,10 +297,10 @@ std::vector<RoomListing> Rooms::list() const {
   for (const std::shared_ptr<OpenRoom>& room : open_rooms()) {
     RoomListing& listing = all[room->name];
     const HostHealth health = room->host().health();
-    if (room->keeper()) tell_origin(listing, room->keeper()->genesis());
+    if (room->store()) tell_origin(listing, room->store()->genesis());
     listing.name = room->name;
     listing.open = health.serving;
-    listing.kept = room->keeper() != nullptr;
+    listing.kept = room->store() != nullptr;
     listing.case_hash = room->host().bone().hash();
     listing.case_title = room->host().bone().info().title;
     listing.room_seq = health.room_seq;
@@ -328,7 +328,7 @@ std::vector<RoomListing> Rooms::list() const {
 }
 
 std::string Rooms::owner(const std::string& name) const {
-  if (const Result<std::shared_ptr<OpenRoom>> room = find(name); room && !(*room)->keeper()) return (*room)->owner;
+  if (const Result<std::shared_ptr<OpenRoom>> room = find(name); room && !(*room)->store()) return (*room)->owner;
   if (options_.folder.empty() || !(is_name(name) || is_backup_name(name))) return {};
   return owner_of(is_name(name) ? journal_of(name) : options_.folder / name);
 }
@@ -372,7 +372,7 @@ std::shared_ptr<OpenRoom> Rooms::take_in(std::shared_ptr<OpenRoom> room) {
   note_open();
   log::info("room open", {{"room", room->name},
                           {"room_seq", room->host().room_seq().value},
-                          {"kept", room->keeper() != nullptr},
+                          {"kept", room->store() != nullptr},
                           {"serving", !room->host().stopped()}});
   return room;
 }
@@ -394,20 +394,20 @@ void Rooms::note_open() const {
     all = to_open_;
   }
   for (const std::shared_ptr<OpenRoom>& room : open_rooms())
-    if (room->keeper()) all.insert(room->name);
+    if (room->store()) all.insert(room->name);
   std::string names;
   for (const std::string& name : all) names += name + "\n";
   if (const Result<void> written = write_file(options_.folder / kOpenList, names); !written)
     log::warn("which rooms are open was not noted", {{"reason", written.error().message}});
 }
 
-Result<std::shared_ptr<OpenRoom>> Rooms::add(const std::string& name, Room room, std::unique_ptr<RoomKeeper> keeper, fs::path save,
+Result<std::shared_ptr<OpenRoom>> Rooms::add(const std::string& name, Room room, std::unique_ptr<RoomStore> store, fs::path save,
                                              const std::function<void(double)>& progress) {
   const std::lock_guard changing(changing_);
   if (Result<void> may = check_free(name); !may) return tl::unexpected(may.error());
   const Result<LoadedCase> of = cases_.load(room.bone().hash());
   if (!of) return tl::unexpected(of.error());
-  auto made = std::make_shared<OpenRoom>(name, *of, std::move(room), options_, progress, std::move(keeper));
+  auto made = std::make_shared<OpenRoom>(name, *of, std::move(room), options_, progress, std::move(store));
   made->save = std::move(save);
   return take_in(std::move(made));
 }
@@ -444,8 +444,8 @@ Result<std::shared_ptr<OpenRoom>> Rooms::create(const std::string& name, const D
 Result<std::shared_ptr<OpenRoom>> Rooms::resume(const std::string& name, const std::function<void(double)>& progress) {
   const std::lock_guard changing(changing_);
   if (const Result<std::shared_ptr<OpenRoom>> already = find(name); already && !name.empty()) {
-    const RoomKeeper* keeper = (*already)->keeper();
-    if (const Error* why = keeper ? keeper->closed_to_rows() : nullptr)
+    const RoomStore* store = (*already)->store();
+    if (const Error* why = store ? store->closed_to_rows() : nullptr)
       return failure(ErrorCode::unavailable, "the room " + name + " is there and takes no more cuts: " + why->message);
     return already;
   }
@@ -464,7 +464,7 @@ Result<std::shared_ptr<OpenRoom>> Rooms::resume(const std::string& name, const s
 // [with changing_]
 Result<std::shared_ptr<OpenRoom>> Rooms::open(const std::string& name, const LoadedCase& of, bool is_new,
                                               const std::function<void(double)>& progress) {
-  RoomKeeper::Options keeping{.name = name, .limits = options_.limits, .tools = {}, .journal = {}, .today = {}, .random = {}};
+  RoomStore::Options keeping{.name = name, .limits = options_.limits, .tools = {}, .journal = {}, .today = {}, .random = {}};
   keeping.journal.keys = options_.keys;
   keeping.retention_days = options_.retention_days;
   if (is_new) keeping.tools = options_.tools();
@@ -474,14 +474,14 @@ Result<std::shared_ptr<OpenRoom>> Rooms::open(const std::string& name, const Loa
       if (progress) progress(begin + fraction / 2);
     };
   };
-  Result<KeptRoom> kept = RoomKeeper::open(journal_of(name), *of.bone, keeping, half(0));
+  Result<PersistedRoom> kept = RoomStore::open(journal_of(name), *of.bone, keeping, half(0));
   if (!kept) return tl::unexpected(kept.error());
-  return take_in(std::make_shared<OpenRoom>(name, of, std::move(kept->room), options_, half(0.5), std::move(kept->keeper)));
+  return take_in(std::make_shared<OpenRoom>(name, of, std::move(kept->room), options_, half(0.5), std::move(kept->store)));
 }
 
 Result<RoomSummary> Rooms::close(const std::string& name) {
   const std::lock_guard changing(changing_);
-  if (const auto kept = find(name); kept && (*kept)->keeper() && !kept_file((*kept)->name))
+  if (const auto kept = find(name); kept && (*kept)->store() && !kept_file((*kept)->name))
     return tl::unexpected(kept_elsewhere(**kept));
   const std::shared_ptr<OpenRoom> room = take_out(name);
   if (!room) return kept_file(name) ? tl::unexpected(not_open(name)) : tl::unexpected(no_such_room(name));
@@ -500,13 +500,13 @@ Result<std::shared_ptr<OpenRoom>> Rooms::branch(const std::string& name, const s
     const std::lock_guard changing(changing_);
     if (Result<void> may = check_new(new_name, by); !may) return tl::unexpected(may.error());
     const Result<std::shared_ptr<OpenRoom>> from = find(name);
-    if (from && !(*from)->keeper()) return tl::unexpected(not_kept(name));
+    if (from && !(*from)->store()) return tl::unexpected(not_kept(name));
     if (from && options_.folder.empty()) return tl::unexpected(kept_elsewhere(**from));
     const Result<fs::path> file = from ? Result<fs::path>(fs::path{}) : kept_file(name);
     if (!file) return tl::unexpected(file.error());
     const fs::path journal = journal_of(new_name);
     const Result<JournalHead> made = make_owned(journal, by.user, [&] {
-      return from ? (*from)->keeper()->branch(journal, to, new_name, until_the_end())
+      return from ? (*from)->store()->branch(journal, to, new_name, until_the_end())
                   : branch_journal(*file, journal, to, new_name, until_the_end());
     });
     if (!made) return tl::unexpected(made.error());
@@ -521,18 +521,18 @@ Result<std::shared_ptr<OpenRoom>> Rooms::replay(const std::string& name, const s
   if (!(speed >= 0 && speed <= 1e6)) return failure(ErrorCode::invalid_input, "the speed is not between 0 and 1000000");
   const Result<std::shared_ptr<OpenRoom>> source = find(name);
   if (!source) return tl::unexpected(source.error());
-  RoomKeeper* keeper = (*source)->keeper();
-  if (!keeper) return tl::unexpected(not_kept(name));
-  const RoomSeq head = keeper->head().place;
+  RoomStore* store = (*source)->store();
+  if (!store) return tl::unexpected(not_kept(name));
+  const RoomSeq head = store->head().place;
   const RoomSeq last = to ? to : head;
   if (last > head || from > last)
     return failure(ErrorCode::invalid_input, "events " + std::to_string(from.value) + " to " + std::to_string(last.value) +
                                                  " are not among the " + std::to_string(head.value) + " of room " + name);
   const LoadedCase& of = (*source)->of;
-  Result<Room> room = begin_room(*of.bone, keeper->genesis(), options_.limits);
+  Result<Room> room = begin_room(*of.bone, store->genesis(), options_.limits);
   if (!room) return tl::unexpected(room.error());
   Result<void> happened;
-  const Result<void> read = !from ? Result<void>{} : keeper->read(RoomSeq{1}, from, [&](const RoomRow& row) {
+  const Result<void> read = !from ? Result<void>{} : store->read(RoomSeq{1}, from, [&](const RoomRow& row) {
     happened = room->replay(row);
     return happened.has_value();
   });
@@ -549,11 +549,11 @@ Result<std::shared_ptr<OpenRoom>> Rooms::replay(const std::string& name, const s
 
 Result<RoomGenesis> Rooms::read(const std::string& name, RoomSeq to, const std::function<bool(const RoomRow&)>& take) {
   if (const Result<std::shared_ptr<OpenRoom>> room = find(name)) {
-    RoomKeeper* keeper = (*room)->keeper();
-    if (!keeper) return tl::unexpected(not_kept(name));
-    const RoomSeq head = keeper->head().place;
-    if (const Result<void> read = keeper->read(RoomSeq{1}, to ? std::min(to, head) : head, take); !read) return tl::unexpected(read.error());
-    return keeper->genesis();
+    RoomStore* store = (*room)->store();
+    if (!store) return tl::unexpected(not_kept(name));
+    const RoomSeq head = store->head().place;
+    if (const Result<void> read = store->read(RoomSeq{1}, to ? std::min(to, head) : head, take); !read) return tl::unexpected(read.error());
+    return store->genesis();
   }
   // Nobody opens it meanwhile.
   const std::lock_guard changing(changing_);
@@ -579,10 +579,10 @@ Result<std::vector<std::string>> Rooms::remove(const std::string& name, bool wit
   if (is_backup_name(name)) return remove_backup(name, may);
   std::vector<std::string> names{name};
   if (const Result<fs::path> file = kept_file(name)) {
-    // Only a room's own keeper can look into a journal that is in use.
+    // Only a room's own store can look into a journal that is in use.
     const auto has = [this](const fs::path& of, const JournalHead& head) {
       const Result<std::shared_ptr<OpenRoom>> in_use = find(of.stem().string());
-      return in_use && of == journal_of((*in_use)->name) ? (*in_use)->keeper()->has_head(head) : has_head(of, head);
+      return in_use && of == journal_of((*in_use)->name) ? (*in_use)->store()->has_head(head) : has_head(of, head);
     };
     const Result<std::vector<RoomFile>> branches = branches_of(options_.folder, *file, has);
     if (!branches) return tl::unexpected(branches.error());
@@ -597,7 +597,7 @@ Result<std::vector<std::string>> Rooms::remove(const std::string& name, bool wit
     }
   } else if (const Result<std::shared_ptr<OpenRoom>> room = find(name); !room || name.empty()) {
     return tl::unexpected(file.error());
-  } else if ((*room)->keeper()) {
+  } else if ((*room)->store()) {
     return tl::unexpected(kept_elsewhere(**room));
   }
   for (const std::string& one : names)
@@ -631,23 +631,23 @@ Result<std::vector<std::string>> Rooms::remove_backup(const std::string& name,
 Result<RoomReport> Rooms::verify(const std::string& name) {
   const Result<std::shared_ptr<OpenRoom>> room = find(name);
   if (!room) return tl::unexpected(room.error());
-  if (!(*room)->keeper()) return tl::unexpected(not_kept(name));
+  if (!(*room)->store()) return tl::unexpected(not_kept(name));
   std::promise<BoneStatus> bone;
   (*room)->host().run_slowly([&] { bone.set_value((*room)->host().bone_status()); });
   const BoneStatus status = bone.get_future().get();
   // What is decided is kept a moment later.
-  while ((*room)->keeper()->head().place < status.room_seq && !(*room)->host().stopped() && !ending_)
+  while ((*room)->store()->head().place < status.room_seq && !(*room)->host().stopped() && !ending_)
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  if ((*room)->keeper()->head().place < status.room_seq)
+  if ((*room)->store()->head().place < status.room_seq)
     return failure(ErrorCode::unavailable, "the room " + name + " has stopped; check its journal with osteon-server verify once the server has ended");
-  return (*room)->keeper()->verify((*room)->host().bone(), BoneAt{status.room_seq, status.field_hash}, until_the_end());
+  return (*room)->store()->verify((*room)->host().bone(), BoneAt{status.room_seq, status.field_hash}, until_the_end());
 }
 
 Result<JournalHead> Rooms::back_up(const std::string& name, const std::string& file_name, fs::path& file,
                                    const Requester& by) {
   const Result<std::shared_ptr<OpenRoom>> room = find(name);
   if (!room) return tl::unexpected(room.error());
-  if (!(*room)->keeper()) return tl::unexpected(not_kept(name));
+  if (!(*room)->store()) return tl::unexpected(not_kept(name));
   if (options_.folder.empty()) return tl::unexpected(kept_elsewhere(**room));
   // A client names no folder: it may not write elsewhere on the server's disk.
   if (!is_backup_name(file_name))
@@ -663,7 +663,7 @@ Result<JournalHead> Rooms::back_up(const std::string& name, const std::string& f
                    "you have made " + std::to_string(own.size()) + " backups (" + some_of(own) +
                        "), as many as one person may have on the server; delete one with osteon-server rooms delete "
                        "NAME.backup, move some elsewhere, or start the server with a larger --most-backups-per-person");
-  return make_owned(file, by.user, [&] { return (*room)->keeper()->backup(file, until_the_end()); });
+  return make_owned(file, by.user, [&] { return (*room)->store()->backup(file, until_the_end()); });
 }
 
 std::map<std::string, RoomSummary> Rooms::close_all() {

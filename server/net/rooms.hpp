@@ -26,7 +26,7 @@
 #include "server/net/refusals.hpp"
 #include "server/net/room_files.hpp"
 #include "server/net/room_host.hpp"
-#include "server/net/room_keeper.hpp"
+#include "server/net/room_store.hpp"
 
 namespace osteon {
 
@@ -74,7 +74,7 @@ struct RoomsOptions {
 class OpenRoom {
  public:
   OpenRoom(std::string name, LoadedCase of, Room room, const RoomsOptions& options,
-           const std::function<void(double)>& progress, std::unique_ptr<RoomKeeper> keeper, std::optional<Playback> playback = {});
+           const std::function<void(double)>& progress, std::unique_ptr<RoomStore> store, std::optional<Playback> playback = {});
 
   const std::string name;
   const LoadedCase of;                // in memory for as long as this is
@@ -84,8 +84,8 @@ class OpenRoom {
   std::optional<std::pair<std::string, RoomSeq>> shows;  // of a playback: which room, up to where
 
   [[nodiscard]] RoomHost& host() { return *host_; }
-  [[nodiscard]] RoomKeeper* keeper() { return keeper_.get(); }  // null: it is lost when it is closed
-  [[nodiscard]] std::filesystem::path keeper_file() const { return keeper_ ? keeper_->file() : std::filesystem::path{}; }
+  [[nodiscard]] RoomStore* store() { return store_.get(); }  // null: it is lost when it is closed
+  [[nodiscard]] std::filesystem::path keeper_file() const { return store_ ? store_->file() : std::filesystem::path{}; }
   // The version of the protocol that an author's newest join was made in; of one who never joined, this server's own.
   void note_version(AuthorId author, std::uint32_t version);
   [[nodiscard]] std::uint32_t version_of(AuthorId author) const;
@@ -96,18 +96,18 @@ class OpenRoom {
   void send_away(const std::string& why);
   // Afterwards nothing changes any more; the journal is closed cleanly, with a checkpoint.
   RoomSummary close();
-  // [upkeep] Writes a checkpoint where the next opening would take long without, forgets whom it is time to forget, and cuts the
+  // [maintenance] Writes a checkpoint where the next opening would take long without, forgets whom it is time to forget, and cuts the
   // journal's log where the room is idle. `stop` returns true: what takes long is given up.
-  void keep_up(const std::function<bool()>& stop);
+  void maintain(const std::function<bool()>& stop);
 
  private:
   using Clock = std::chrono::steady_clock;
   mutable std::mutex versions_mutex_;                     // never held with another
   std::map<AuthorId, std::uint32_t> older_versions_;      // of those that are not this server's own
-  std::unique_ptr<RoomKeeper> keeper_;  // outlives the host, which writes to it
+  std::unique_ptr<RoomStore> store_;  // outlives the host, which writes to it
   std::unique_ptr<RoomHost> host_;
   Demonstrations demonstrations_;       // in the host
-  Clock::time_point newest_checkpoint_ = Clock::now(), forgotten_ = Clock::now();  // of upkeep
+  Clock::time_point newest_checkpoint_ = Clock::now(), forgotten_ = Clock::now();  // of maintenance
 };
 
 struct RoomListing {
@@ -124,7 +124,7 @@ struct RoomListing {
 
 // Any thread. What makes, opens, closes, copies or deletes takes long and runs one at a time. Errors: not_found (no such
 // room), exists (there is one of that name), exhausted (there are as many as there may be), invalid_input (not a name; a place that
-// the room has not reached), unavailable (closed, or not kept), and those of RoomKeeper.
+// the room has not reached), unavailable (closed, or not kept), and those of RoomStore.
 class Rooms {
  public:
   explicit Rooms(RoomsOptions options);
@@ -143,8 +143,8 @@ class Rooms {
   [[nodiscard]] const std::shared_ptr<CaseStore>& store() const { return options_.store; }
   [[nodiscard]] std::vector<RoomListing> list() const;
 
-  // A room that was made elsewhere, with its keeper. `save`: see OpenRoom. `progress` hears how far its first surface is.
-  Result<std::shared_ptr<OpenRoom>> add(const std::string& name, Room room, std::unique_ptr<RoomKeeper> keeper,
+  // A room that was made elsewhere, with its store. `save`: see OpenRoom. `progress` hears how far its first surface is.
+  Result<std::shared_ptr<OpenRoom>> add(const std::string& name, Room room, std::unique_ptr<RoomStore> store,
                                         std::filesystem::path save, const std::function<void(double)>& progress);
   // All that were open when the folder was last left, however that was. Those that cannot be opened are logged.
   void resume_all(const std::function<void(double)>& progress);
@@ -177,7 +177,7 @@ class Rooms {
   // From now on nobody is let in, and demonstrations are over. `again`: when those who are asked to leave may come again.
   void begin_drain(std::chrono::milliseconds again, const std::string& why);
   [[nodiscard]] std::optional<std::string> draining() const;  // why nobody is let in
-  void begin_end();  // gives up what takes long, and does no upkeep any more
+  void begin_end();  // gives up what takes long, and does no maintenance any more
   [[nodiscard]] bool ending() const { return ending_; }
   [[nodiscard]] std::map<std::string, RoomSummary> close_all();  // those that are open stay so in the folder's list
 
@@ -206,7 +206,7 @@ class Rooms {
   [[nodiscard]] std::shared_ptr<OpenRoom> take_out(const std::string& name);
   void note_open() const;  // writes the list of those that are open
   void run_upkeep();
-  [[nodiscard]] UpkeepCalls until_the_end() const;
+  [[nodiscard]] MaintenanceCalls until_the_end() const;
 
   const RoomsOptions options_;
   CaseShelf cases_;

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "common/core/check.hpp"
-#include "server/journal/upkeep.hpp"
+#include "server/journal/maintenance.hpp"
 #include "tests/fuzz/journal_target.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 

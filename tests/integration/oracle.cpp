@@ -53,7 +53,7 @@ void Oracle::heard_join(AuthorId author) {
   joins_.insert(author.value);
 }
 
-void Oracle::heard_kept(const wire::KeptEvents& kept) {
+void Oracle::heard_kept(const wire::DurableSeq& kept) {
   heard(kept.room_seq);
   const std::lock_guard lock(mutex_);
   if (!kept_ || kept_->room_seq <= kept.room_seq) kept_ = kept;
@@ -69,7 +69,7 @@ std::uint64_t Oracle::most() const {
   return std::max(asked_, furthest_);
 }
 
-std::optional<wire::KeptEvents> Oracle::kept() const {
+std::optional<wire::DurableSeq> Oracle::kept() const {
   const std::lock_guard lock(mutex_);
   return kept_;
 }

@@ -28,11 +28,11 @@ class Oracle {
   void heard_cut(RoomSeq place, std::string bytes);  // of a v1::Cut
   void heard_mark(RoomSeq place, std::string label);
   void heard_join(AuthorId author);  // its place is not told
-  void heard_kept(const wire::KeptEvents& kept);
+  void heard_kept(const wire::DurableSeq& kept);
 
   [[nodiscard]] std::uint64_t acknowledged() const;            // the furthest place that anybody heard of
   [[nodiscard]] std::uint64_t most() const;                    // rows that there can be
-  [[nodiscard]] std::optional<wire::KeptEvents> kept() const;  // the newest witness
+  [[nodiscard]] std::optional<wire::DurableSeq> kept() const;  // the newest witness
   // What the lines of an export lack or have otherwise, up to a place. Empty: nothing.
   [[nodiscard]] std::string lacks(std::string_view lines, std::uint64_t up_to) const;
 
@@ -41,7 +41,7 @@ class Oracle {
   std::uint64_t asked_ = 0, furthest_ = 0;
   std::map<std::uint64_t, std::string> cuts_, marks_;  // by place
   std::set<std::uint64_t> joins_;                      // authors
-  std::optional<wire::KeptEvents> kept_;
+  std::optional<wire::DurableSeq> kept_;
 };
 
 // A haptic client without a bone: it cuts without end, as fast as its room takes it, and tells the oracle what it

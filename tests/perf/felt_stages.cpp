@@ -19,7 +19,7 @@
 #include "haptic_client/net/fast_path.hpp"
 #include "server/net/link_server.hpp"
 #include "server/net/room_host.hpp"
-#include "server/net/room_keeper.hpp"
+#include "server/net/room_store.hpp"
 #include "tests/perf/percentiles.hpp"
 #include "tests/perf/stroke.hpp"
 #include "tests/support/relay/impair_process.hpp"
@@ -197,9 +197,9 @@ class Line final : public SessionSink, private SessionLink::Sink, public std::en
 
 json run_stages(const Case& bone, const std::vector<Cut>& stroke, const std::vector<std::string>& impairment, double seconds) {
   const TempDir folder;
-  Result<KeptRoom> kept = RoomKeeper::open(folder / "room.journal", bone, {});
+  Result<PersistedRoom> kept = RoomStore::open(folder / "room.journal", bone, {});
   OSTEON_CHECK(kept.has_value());
-  RoomHost host(std::move(kept->room), {}, [](double) {}, Detail::automatic, kept->keeper.get());
+  RoomHost host(std::move(kept->room), {}, [](double) {}, Detail::automatic, kept->store.get());
   Result<std::unique_ptr<LinkServer>> links = LinkServer::open("127.0.0.1");
   OSTEON_CHECK(links.has_value());
   std::optional<ImpairProcess> relay;

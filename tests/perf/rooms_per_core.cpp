@@ -11,7 +11,7 @@
 
 #include "common/core/check.hpp"
 #include "server/net/room_host.hpp"
-#include "server/net/room_keeper.hpp"
+#include "server/net/room_store.hpp"
 #include "tests/perf/percentiles.hpp"
 #include "tests/perf/stroke.hpp"
 #include "tests/support/temp_dir.hpp"
@@ -59,7 +59,7 @@ class Listener final : public SessionSink {
 
 // One room, and who works in it.
 struct HeldRoom {
-  std::unique_ptr<RoomKeeper> keeper;
+  std::unique_ptr<RoomStore> store;
   std::unique_ptr<RoomHost> host;
   std::shared_ptr<Listener> listener;
   std::uint64_t sent = 0;
@@ -69,14 +69,14 @@ HeldRoom make_room(const Case& bone, const std::filesystem::path& file, bool kep
   HeldRoom held;
   std::optional<Room> room;
   if (kept) {
-    Result<KeptRoom> opened = RoomKeeper::open(file, bone, {});
+    Result<PersistedRoom> opened = RoomStore::open(file, bone, {});
     OSTEON_CHECK(opened.has_value());
-    held.keeper = std::move(opened->keeper);
+    held.store = std::move(opened->store);
     room.emplace(std::move(opened->room));
   } else {
     room.emplace(bone, CutLimits{});
   }
-  held.host = std::make_unique<RoomHost>(std::move(*room), HostRates{}, [](double) {}, Detail::automatic, held.keeper.get());
+  held.host = std::make_unique<RoomHost>(std::move(*room), HostRates{}, [](double) {}, Detail::automatic, held.store.get());
   const Result<AuthorId> author = held.host->join(MemberKind::surgeon, "tool");
   OSTEON_CHECK(author.has_value());
   held.listener = std::make_shared<Listener>(*author);

@@ -5,7 +5,7 @@
 
 #include "common/wire/convert.hpp"
 #include "osteon/v1/cutting.pb.h"
-#include "server/journal/upkeep.hpp"
+#include "server/journal/maintenance.hpp"
 #include "server/net/room_rows.hpp"
 #include "server/net/services.hpp"
 
@@ -16,8 +16,8 @@ using namespace std::chrono_literals;
 
 constexpr auto kTick = std::chrono::nanoseconds(1'000'000'000 / 120);
 
-std::unique_ptr<RoomHost> driven_host(Room room, RoomKeeper& keeper) {
-  return std::make_unique<RoomHost>(std::move(room), HostRates{.tick = 0ns}, nullptr, Detail::automatic, &keeper);
+std::unique_ptr<RoomHost> driven_host(Room room, RoomStore& store) {
+  return std::make_unique<RoomHost>(std::move(room), HostRates{.tick = 0ns}, nullptr, Detail::automatic, &store);
 }
 
 std::string joined(const MessageParts& parts) {
@@ -128,7 +128,7 @@ class SimServer::Session final : public SessionSink,
   }
 
   void open(const v1::SessionOpen& request) {
-    if (request.server_epoch() != server_.keeper_->server_epoch())
+    if (request.server_epoch() != server_.store_->server_epoch())
       return close({false, "open.server_epoch is another one; join again"});
     author_ = AuthorId{request.author()};
     if (const Result<void> opened = server_.host_->open_session(shared_from_this(), digest_of_secret(request.secret())); !opened)
@@ -251,11 +251,11 @@ SimServer::~SimServer() {
   links_.reset();
   host_.reset();
   sessions_.clear();
-  keeper_.reset();
+  store_.reset();
 }
 
-RoomKeeper::Options SimServer::options() {
-  RoomKeeper::Options options;
+RoomStore::Options SimServer::options() {
+  RoomStore::Options options;
   options.limits = condition_.limits;
   options.tools = few_tools();
   options.journal.disk = &disk_;
@@ -268,14 +268,14 @@ RoomKeeper::Options SimServer::options() {
 void SimServer::boot() {
   if (host_) return;
   ++life_;
-  Result<KeptRoom> kept = RoomKeeper::open(file_, bone_, options());
-  if (kept && kept->keeper->server_epoch() == 0) {
+  Result<PersistedRoom> kept = RoomStore::open(file_, bone_, options());
+  if (kept && kept->store->server_epoch() == 0) {
     // Closed to rows: that is for the operator.
     ledger_.check(disk_has_failed_, Invariant::served, "a journal on a sound disk takes no rows");
     kept = failure(ErrorCode::unavailable, "closed");
     disk_.mend();
     recover();
-    kept = RoomKeeper::open(file_, bone_, options());
+    kept = RoomStore::open(file_, bone_, options());
   }
   if (!kept) {
     ledger_.check(disk_.has_failed(), Invariant::served, "the journal cannot be opened: " + kept.error().message);
@@ -287,11 +287,11 @@ void SimServer::boot() {
   ledger_.check(!kept->made || !made_, Invariant::acknowledged, "the journal is gone");
   made_ = true;
   const Digest opened = kept->room.room_hash();
-  keeper_ = std::move(kept->keeper);
+  store_ = std::move(kept->store);
   began_ = reopened_time(kept->room);
   booted_ = time_.now();
   jumped_ = {};
-  host_ = driven_host(std::move(kept->room), *keeper_);
+  host_ = driven_host(std::move(kept->room), *store_);
   if (condition_.fast_path)
     links_ = std::make_unique<SimLinks>(datagrams_, random_.index(1u << 30), condition_.link, [this] { return power_is_out(); });
   disk_has_failed_ = false;
@@ -324,7 +324,7 @@ std::vector<RoomRow> SimServer::rows() {
 Digest SimServer::replayed() {
   const std::vector<RoomRow> kept = rows();
   ledger_.check_rows(kept);
-  Result<Room> room = begin_room(bone_, keeper_->genesis(), condition_.limits);
+  Result<Room> room = begin_room(bone_, store_->genesis(), condition_.limits);
   ledger_.check(room.has_value(), Invariant::replay, room ? "" : room.error().message);
   if (!room) return {};
   for (const RoomRow& row : kept)
@@ -357,18 +357,18 @@ Digest SimServer::reopened(bool with_checkpoint) {
   if (with_checkpoint) checkpoint();
   host_.reset();
   if (with_checkpoint) {
-    const Result<void> closed = keeper_->close();
+    const Result<void> closed = store_->close();
     ledger_.check(closed.has_value(), Invariant::served, closed ? "" : "the journal cannot be closed: " + closed.error().message);
   }
-  keeper_.reset();
-  Result<KeptRoom> kept = RoomKeeper::open(file_, bone_, options());
+  store_.reset();
+  Result<PersistedRoom> kept = RoomStore::open(file_, bone_, options());
   ledger_.check(kept.has_value(), Invariant::replay, kept ? "" : kept.error().message);
   if (!kept) return {};
   if (with_checkpoint)
-    ledger_.check(kept->keeper->evaluated() == 0, Invariant::replay, "a checkpoint of the end was not used");
+    ledger_.check(kept->store->evaluated() == 0, Invariant::replay, "a checkpoint of the end was not used");
   const Digest hash = kept->room.room_hash();
-  keeper_ = std::move(kept->keeper);
-  host_ = driven_host(std::move(kept->room), *keeper_);
+  store_ = std::move(kept->store);
+  host_ = driven_host(std::move(kept->room), *store_);
   return hash;
 }
 
@@ -384,7 +384,7 @@ void SimServer::down() {
   for (const auto& session : sessions_) session->die();
   links_.reset();
   host_.reset();
-  keeper_.reset();
+  store_.reset();
   sessions_.clear();
 }
 
@@ -410,7 +410,7 @@ void SimServer::restart() {
   checkpoint();
   host_.reset();
   if (!power_is_out()) {
-    const Result<void> closed = keeper_->close();
+    const Result<void> closed = store_->close();
     ledger_.check(closed || disk_.has_failed(), Invariant::served,
                   closed ? "" : "the journal cannot be closed: " + closed.error().message);
   }
@@ -421,7 +421,7 @@ void SimServer::restart() {
   boot_later();
 }
 
-void SimServer::note_kept() { ledger_.kept_up_to(keeper_->head().place); }
+void SimServer::note_kept() { ledger_.kept_up_to(store_->head().place); }
 
 void SimServer::lose_power_at(std::uint64_t nth) {
   if (!host_ || power_fails_ || disk_fails_) return;
@@ -436,7 +436,7 @@ void SimServer::fail_disk_at(std::uint64_t nth, int error, MemoryDisk::Lasting l
 }
 
 void SimServer::checkpoint() {
-  const Result<void> kept = keeper_->checkpoint(host_->room_seq(), host_->all_leaves());
+  const Result<void> kept = store_->checkpoint(host_->room_seq(), host_->all_leaves());
   ledger_.check(kept || disk_.has_failed(), Invariant::served, kept ? "" : "no checkpoint: " + kept.error().message);
   after_tick();
 }
@@ -497,7 +497,7 @@ void SimServer::join(const JoinRequest& request, std::function<void(const Result
   const auto reply = [this, secret, answer = std::move(answer)](const Result<AuthorId>& author) {
     if (power_is_out()) return;
     if (!author) return answer(tl::unexpected(author.error()));
-    answer(Joined{*author, keeper_->server_epoch(), host_->lease_epoch(*author), secret});
+    answer(Joined{*author, store_->server_epoch(), host_->lease_epoch(*author), secret});
   };
   if (!request.resume) {
     host_->join(MemberKind::surgeon, request.name, digest_of_secret(secret), Role::none, reply);

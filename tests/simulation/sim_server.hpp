@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "server/net/room_host.hpp"
-#include "server/net/room_keeper.hpp"
+#include "server/net/room_store.hpp"
 #include "tests/simulation/ledger.hpp"
 #include "tests/simulation/sim_link.hpp"
 #include "tests/simulation/sim_stream.hpp"
@@ -98,7 +98,7 @@ class SimServer {
   class Session;
   struct Wish;
   [[nodiscard]] bool power_is_out() const { return power_fails_ && disk_.has_failed(); }
-  [[nodiscard]] RoomKeeper::Options options();
+  [[nodiscard]] RoomStore::Options options();
   void tick();
   void after_tick();
   void note_kept();                                 // before anyone is told of it
@@ -118,7 +118,7 @@ class SimServer {
   std::filesystem::path file_ = "/room/journal";
   int recoveries_ = 0;
   bool made_ = false;                    // a journal was, once
-  std::unique_ptr<RoomKeeper> keeper_;
+  std::unique_ptr<RoomStore> store_;
   std::unique_ptr<RoomHost> host_;
   std::unique_ptr<SimLinks> links_;      // none: no fast path
   std::vector<std::shared_ptr<Session>> sessions_;  // with streams and queued cuts

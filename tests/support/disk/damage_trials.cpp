@@ -6,7 +6,7 @@
 #include <optional>
 #include <random>
 
-#include "server/journal/upkeep.hpp"
+#include "server/journal/maintenance.hpp"
 #include "tests/support/disk/journal_trials.hpp"
 
 namespace osteon::test {

@@ -6,7 +6,7 @@
 #include <cerrno>
 
 #include "common/core/check.hpp"
-#include "server/journal/upkeep.hpp"
+#include "server/journal/maintenance.hpp"
 
 namespace osteon::test {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <cstdio>
 
-#include "server/journal/upkeep.hpp"
+#include "server/journal/maintenance.hpp"
 #include "tests/support/disk/journal_trials.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/unit/journal/rows.hpp"

@@ -3,7 +3,7 @@
 #include <sqlite3.h>
 
 #include "server/journal/journal_file.hpp"
-#include "server/journal/upkeep.hpp"
+#include "server/journal/maintenance.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/journal/rows.hpp"
 

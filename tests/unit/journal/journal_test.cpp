@@ -9,7 +9,7 @@
 #include <numeric>
 #include <sstream>
 
-#include "server/journal/upkeep.hpp"
+#include "server/journal/maintenance.hpp"
 #include "tests/support/disk/journal_trials.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/support/privileges.hpp"

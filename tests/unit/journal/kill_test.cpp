@@ -9,7 +9,7 @@
 #include <sstream>
 #include <thread>
 
-#include "server/journal/upkeep.hpp"
+#include "server/journal/maintenance.hpp"
 #include "tests/support/disk/journal_trials.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/temp_dir.hpp"

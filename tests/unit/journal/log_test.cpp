@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "server/journal/mirrored_log.hpp"
-#include "server/journal/upkeep.hpp"
+#include "server/journal/maintenance.hpp"
 #include "tests/support/disk/journal_trials.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/support/temp_dir.hpp"

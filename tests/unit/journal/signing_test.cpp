@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "server/journal/journal_file.hpp"
-#include "server/journal/upkeep.hpp"
+#include "server/journal/maintenance.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/journal/old_journals.hpp"
 #include "tests/unit/journal/rows.hpp"

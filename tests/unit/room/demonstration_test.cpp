@@ -94,7 +94,7 @@ class DemonstrationTest : public ::testing::Test {
     for (const std::string name : {"ward", "shown", "other"}) {
       KeptCuts kept(dir_ / "rooms" / (name + ".journal"), nullptr, name);
       kept.cut(300);
-      ASSERT_TRUE(kept.keeper->close());
+      ASSERT_TRUE(kept.store->close());
     }
     // A program that takes long to look a case through, and says when it begins.
     std::ofstream(dir_ / "checker") << "#!/bin/sh\n: > '" << (dir_ / "checks").string() << "'\nexec sleep 60\n";

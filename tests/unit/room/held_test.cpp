@@ -11,7 +11,7 @@
 #include "osteon/v1/people.pb.h"
 #include "server/net/journal_rows.hpp"
 #include "server/net/room_host.hpp"
-#include "server/net/room_keeper.hpp"
+#include "server/net/room_store.hpp"
 #include "server/room/room.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/room/cuts.hpp"
@@ -336,12 +336,12 @@ TEST(CarriedOver, IsToldByAHostThatKeepsNothing) {
 
 TEST(CarriedOver, IsToldByAHostWithAJournal) {
   const test::TempDir folder;
-  KeptRoom kept = RoomKeeper::open(folder / "room.journal", test_block(), RoomKeeper::Options{}).value();
-  RoomHost host(std::move(kept.room), kDriven, {}, Detail::automatic, kept.keeper.get());
+  PersistedRoom kept = RoomStore::open(folder / "room.journal", test_block(), RoomStore::Options{}).value();
+  RoomHost host(std::move(kept.room), kDriven, {}, Detail::automatic, kept.store.get());
   HeldHost lesson(host);
   expect_held(lesson);
   host.stop();
-  ASSERT_TRUE(kept.keeper->close());
+  ASSERT_TRUE(kept.store->close());
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // What is done to the journal of a room in use: reading, checking, copying and branching it, and its checkpoints.
-#include "server/net/room_keeper.hpp"
+#include "server/net/room_store.hpp"
 
 #include <gmock/gmock.h>
 
@@ -33,7 +33,7 @@ constexpr const char *kFile = "/rooms/femur", *kTo = "/else/copy";
 class KeeperTest : public ::testing::Test {
  protected:
   // Writes a row whenever it is called: where the journal were held meanwhile, for ever.
-  UpkeepCalls writing(KeptCuts& kept, int& written) {
+  MaintenanceCalls writing(KeptCuts& kept, int& written) {
     return {[&kept, &written](double) {
               kept.cut(1);
               ++written;
@@ -50,9 +50,9 @@ class KeeperTest : public ::testing::Test {
 TEST_F(KeeperTest, OnceClosedItSaysSoAndTouchesNothing) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(3);
-  RoomKeeper& keeper = *kept.keeper;
-  const JournalHead head = keeper.head();
-  ASSERT_TRUE(keeper.close());
+  RoomStore& store = *kept.store;
+  const JournalHead head = store.head();
+  ASSERT_TRUE(store.close());
   const MemoryDisk::Image before = disk_.image();
   const MemoryDisk::Counts counts = disk_.counts();
   std::vector<Error> errors;
@@ -60,26 +60,26 @@ TEST_F(KeeperTest, OnceClosedItSaysSoAndTouchesNothing) {
     ASSERT_FALSE(result);
     errors.push_back(result.error());
   };
-  note(keeper.write(plain_rows(head.place, 1)));
-  note(keeper.person("Anna"));
-  note(keeper.people());
-  note(keeper.forget(1));
-  note(keeper.forget_old());
-  note(keeper.check_witness(keeper.witness()));
-  note(keeper.has_head(head));
-  note(keeper.read(RoomSeq{1}, head.place, [](const RoomRow&) { return true; }));
-  note(keeper.export_person(1, [](const std::string&) { return true; }));
-  note(keeper.verify(test_block(), std::nullopt));
-  note(keeper.backup(kTo));
-  note(keeper.branch(kTo, {}, "branch"));
-  note(keeper.checkpoint(head.place, kept.room->all_leaves()));
-  note(keeper.close());
+  note(store.write(plain_rows(head.place, 1)));
+  note(store.person("Anna"));
+  note(store.people());
+  note(store.forget(1));
+  note(store.forget_old());
+  note(store.check_witness(store.witness()));
+  note(store.has_head(head));
+  note(store.read(RoomSeq{1}, head.place, [](const RoomRow&) { return true; }));
+  note(store.export_person(1, [](const std::string&) { return true; }));
+  note(store.verify(test_block(), std::nullopt));
+  note(store.backup(kTo));
+  note(store.branch(kTo, {}, "branch"));
+  note(store.checkpoint(head.place, kept.room->all_leaves()));
+  note(store.close());
   for (const Error& error : errors) {
     EXPECT_EQ(error.code, ErrorCode::unavailable) << error.message;
     EXPECT_THAT(error.message, HasSubstr("the room femur is closed"));
   }
   EXPECT_THAT(errors, SizeIs(14));
-  EXPECT_EQ(keeper.head(), head);
+  EXPECT_EQ(store.head(), head);
   EXPECT_EQ(disk_.image(), before);
   EXPECT_EQ(disk_.counts().writes, counts.writes);
 }
@@ -87,67 +87,67 @@ TEST_F(KeeperTest, OnceClosedItSaysSoAndTouchesNothing) {
 TEST_F(KeeperTest, BelievesWhatItSealedAndNothingElseOfWhatItLacks) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(2);
-  const Witness early = kept.keeper->witness();
+  const Witness early = kept.store->witness();
   const MemoryDisk::Image image = disk_.image();
   kept.cut(3);
-  const Witness late = kept.keeper->witness();
+  const Witness late = kept.store->witness();
   ASSERT_GT(late.head.place, early.head.place);
-  EXPECT_TRUE(kept.keeper->check_witness(early));
-  EXPECT_TRUE(kept.keeper->check_witness({early.head, {}})) << "what it has needs no seal";
+  EXPECT_TRUE(kept.store->check_witness(early));
+  EXPECT_TRUE(kept.store->check_witness({early.head, {}})) << "what it has needs no seal";
   Witness other = early;
   other.head.chain.bytes[0] ^= 1;
-  EXPECT_EQ(kept.keeper->check_witness(other).error().code, ErrorCode::invalid_input) << "another history";
+  EXPECT_EQ(kept.store->check_witness(other).error().code, ErrorCode::invalid_input) << "another history";
 
   // The disk forgets what it said it had.
-  kept.keeper.reset();
+  kept.store.reset();
   disk_.load(image);
   kept.open(kFile);
   Witness far = late;
   far.head.place = RoomSeq{1'000'000};
   for (const Witness& lie : {Witness{late.head, {}}, Witness{late.head, early.seal}, far}) {
-    const Result<void> told = kept.keeper->check_witness(lie);
+    const Result<void> told = kept.store->check_witness(lie);
     ASSERT_FALSE(told);
     EXPECT_EQ(told.error().code, ErrorCode::invalid_input);
     EXPECT_THAT(told.error().message, HasSubstr("start again to join it as it is now"));
   }
   kept.cut(1);
-  kept.keeper.reset();
+  kept.store.reset();
   disk_.load(image);
   kept.open(kFile);
-  const Result<void> lost = kept.keeper->check_witness(late);
+  const Result<void> lost = kept.store->check_witness(late);
   EXPECT_EQ(lost.error().code, ErrorCode::unavailable);
   const std::uint64_t told = late.head.place.value, less = told - early.head.place.value;
   EXPECT_THAT(lost.error().message,
               HasSubstr("the room femur has lost " + std::to_string(less) + " of the " + std::to_string(told) +
                         " events that you were told are kept, and takes no more cuts"));
-  EXPECT_EQ(kept.keeper->check_witness(late).error().message, lost.error().message) << "so does the next";
-  EXPECT_FALSE(kept.keeper->write(plain_rows(kept.keeper->head().place, 1))) << "rows were lost: it takes no more";
-  kept.keeper.reset();
+  EXPECT_EQ(kept.store->check_witness(late).error().message, lost.error().message) << "so does the next";
+  EXPECT_FALSE(kept.store->write(plain_rows(kept.store->head().place, 1))) << "rows were lost: it takes no more";
+  kept.store.reset();
   kept.open(kFile);
-  EXPECT_FALSE(kept.keeper->write(plain_rows(kept.keeper->head().place, 1))) << "nor when it is opened again";
+  EXPECT_FALSE(kept.store->write(plain_rows(kept.store->head().place, 1))) << "nor when it is opened again";
 }
 
 // Whatever has become of the journal: the sentence names it, and what is lost.
 TEST_F(KeeperTest, SaysToWhomeverItToldMoreWhatIsLost) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(2);
-  const RoomSeq copied = kept.keeper->head().place;
+  const RoomSeq copied = kept.store->head().place;
   const MemoryDisk::Image image = disk_.image();
   kept.cut(3);
-  const Witness late = kept.keeper->witness();
+  const Witness late = kept.store->witness();
   const std::string of_all = " of the " + std::to_string(late.head.place.value) + " events that you were told are kept";
   const std::string lost = "the room femur has lost " + std::to_string(late.head.place.value - copied.value) + of_all;
   const auto told = [&](const fs::path& file, MemoryDisk& disk) {
     KeptCuts room(file, &disk, "femur", 2);  // with other cuts
     const auto say = [&] {
-      const Result<void> checked = room.keeper->check_witness(late);
+      const Result<void> checked = room.store->check_witness(late);
       return checked ? std::string("nothing") : checked.error().message;
     };
     const std::string at_once = say();
     room.cut(20);  // it goes on beyond what was told
     return std::pair(at_once, say());
   };
-  kept.keeper.reset();
+  kept.store.reset();
 
   MemoryDisk other{2};
   const auto anew = told(kFile, other);
@@ -166,9 +166,9 @@ TEST_F(KeeperTest, SaysToWhomeverItToldMoreWhatIsLost) {
   disk_.load(image);
   KeptCuts copy(kFile, &disk_, "femur");
   copy.cut(20);
-  EXPECT_THAT(copy.keeper->check_witness(late).error().message,
+  EXPECT_THAT(copy.store->check_witness(late).error().message,
               HasSubstr("the room femur has lost some" + of_all + ": an older copy of its journal has gone on"));
-  EXPECT_EQ(copy.keeper->closed_to_rows(), nullptr) << "what stands in it now may go on";
+  EXPECT_EQ(copy.store->closed_to_rows(), nullptr) << "what stands in it now may go on";
 }
 
 TEST_F(KeeperTest, TimeGoesOnByMoreThanHandsWorkInSilence) {
@@ -180,7 +180,7 @@ TEST_F(KeeperTest, TimeGoesOnByMoreThanHandsWorkInSilence) {
   EXPECT_EQ(reopened_time(Room(test_block())), 0ns) << "a new one";
   kept.cut(3);
   const auto at = kept.room->time();
-  kept.keeper.reset();
+  kept.store.reset();
   kept.open(kFile);
   EXPECT_EQ(kept.room->time(), at);
   EXPECT_EQ(reopened_time(*kept.room), at + kTimeAway);
@@ -193,7 +193,7 @@ TEST_F(KeeperTest, IsReadWhileItIsWritten) {
   const Digest hash = kept.room->room_hash();
   Room replayed(test_block());
   int written = 0;
-  const Result<void> read = kept.keeper->read(RoomSeq{1}, RoomSeq{1'000'000}, [&](const RoomRow& row) {
+  const Result<void> read = kept.store->read(RoomSeq{1}, RoomSeq{1'000'000}, [&](const RoomRow& row) {
     EXPECT_TRUE(replayed.replay(row));
     if (row.place.value % 20 == 0 && ++written) kept.cut(1);
     return true;
@@ -202,20 +202,20 @@ TEST_F(KeeperTest, IsReadWhileItIsWritten) {
   EXPECT_EQ(replayed.room_seq(), bone.place) << "the head as it was when the reading began";
   EXPECT_EQ(replayed.room_hash(), hash);
   EXPECT_GT(written, 30);
-  EXPECT_GT(kept.keeper->head().place, bone.place);
+  EXPECT_GT(kept.store->head().place, bone.place);
 
   std::vector<std::uint64_t> places;
   const auto note = [&](const RoomRow& row) {
     places.push_back(row.place.value);
     return places.size() < 4;
   };
-  ASSERT_TRUE(kept.keeper->read(RoomSeq{257}, RoomSeq{259}, note));
+  ASSERT_TRUE(kept.store->read(RoomSeq{257}, RoomSeq{259}, note));
   EXPECT_THAT(places, ::testing::ElementsAre(257, 258, 259));
   places.clear();
-  ASSERT_TRUE(kept.keeper->read(RoomSeq{}, RoomSeq{600}, note));
+  ASSERT_TRUE(kept.store->read(RoomSeq{}, RoomSeq{600}, note));
   EXPECT_THAT(places, ::testing::ElementsAre(1, 2, 3, 4)) << "until it was told to stop";
   places.clear();
-  ASSERT_TRUE(kept.keeper->read(RoomSeq{10'000}, RoomSeq{20'000}, note));
+  ASSERT_TRUE(kept.store->read(RoomSeq{10'000}, RoomSeq{20'000}, note));
   EXPECT_THAT(places, IsEmpty());
 }
 
@@ -228,9 +228,9 @@ TEST_F(KeeperTest, AVerifyConfirmsRowsCheckpointsAndBone) {
   kept.cut(30);
   const BoneAt live = kept.bone();
   kept.cut(5);
-  const JournalHead head = kept.keeper->head();
+  const JournalHead head = kept.store->head();
   int written = 0;
-  const Result<RoomReport> report = kept.keeper->verify(test_block(), live, writing(kept, written));
+  const Result<RoomReport> report = kept.store->verify(test_block(), live, writing(kept, written));
   ASSERT_TRUE(report) << report.error().message;
   EXPECT_THAT(report->faults, IsEmpty());
   EXPECT_TRUE(report->sound());
@@ -240,28 +240,28 @@ TEST_F(KeeperTest, AVerifyConfirmsRowsCheckpointsAndBone) {
   EXPECT_EQ(report->replayed.place, live.place);
   EXPECT_EQ(report->replayed.field_hash, live.field_hash);
   EXPECT_GT(written, 1);
-  EXPECT_GT(kept.keeper->head().place, head.place);
+  EXPECT_GT(kept.store->head().place, head.place);
 
-  const Result<RoomReport> rows_only = kept.keeper->verify(test_block(), std::nullopt);
+  const Result<RoomReport> rows_only = kept.store->verify(test_block(), std::nullopt);
   ASSERT_TRUE(rows_only);
   EXPECT_TRUE(rows_only->sound());
   EXPECT_EQ(rows_only->replayed.place, RoomSeq{});
-  EXPECT_EQ(rows_only->head, kept.keeper->head());
+  EXPECT_EQ(rows_only->head, kept.store->head());
 
   BoneAt other = live;
   other.field_hash.bytes[0] ^= 1;
-  const Result<RoomReport> wrong = kept.keeper->verify(test_block(), other);
+  const Result<RoomReport> wrong = kept.store->verify(test_block(), other);
   ASSERT_TRUE(wrong);
   ASSERT_THAT(wrong->faults, SizeIs(1));
   EXPECT_THAT(wrong->faults[0], HasSubstr("make another bone"));
 
-  const RoomSeq later{kept.keeper->head().place.value + 1};
-  EXPECT_EQ(kept.keeper->verify(test_block(), BoneAt{later, {}}).error().code, ErrorCode::unavailable);
+  const RoomSeq later{kept.store->head().place.value + 1};
+  EXPECT_EQ(kept.store->verify(test_block(), BoneAt{later, {}}).error().code, ErrorCode::unavailable);
   const Case another = test::plain_block(24.0, 12.0, test::kBlockPitch_mm, 1.2);
-  EXPECT_EQ(kept.keeper->verify(another, live).error().code, ErrorCode::unsupported);
+  EXPECT_EQ(kept.store->verify(another, live).error().code, ErrorCode::unsupported);
   int asked = 0;
-  const UpkeepCalls stopping{{}, [&] { return ++asked == 10; }};
-  EXPECT_EQ(kept.keeper->verify(test_block(), live, stopping).error().code, ErrorCode::cancelled);
+  const MaintenanceCalls stopping{{}, [&] { return ++asked == 10; }};
+  EXPECT_EQ(kept.store->verify(test_block(), live, stopping).error().code, ErrorCode::cancelled);
   EXPECT_EQ(asked, 10);
 }
 
@@ -273,8 +273,8 @@ TEST_F(KeeperTest, AVerifyFindsCheckpointsThatWereSpoiledOrMadeOfAnotherBone) {
   kept.checkpoint();
   const RoomSeq good = kept.room->room_seq();
   kept.cut(1);
-  ASSERT_TRUE(kept.keeper->checkpoint(kept.room->room_seq(), earlier)) << "which it cannot know to be of an earlier place";
-  Result<RoomReport> report = kept.keeper->verify(test_block(), kept.bone());
+  ASSERT_TRUE(kept.store->checkpoint(kept.room->room_seq(), earlier)) << "which it cannot know to be of an earlier place";
+  Result<RoomReport> report = kept.store->verify(test_block(), kept.bone());
   ASSERT_TRUE(report);
   ASSERT_THAT(report->faults, SizeIs(1));
   EXPECT_THAT(report->faults[0], AllOf(HasSubstr("the checkpoint at place " + std::to_string(kept.room->room_seq().value)),
@@ -283,12 +283,12 @@ TEST_F(KeeperTest, AVerifyFindsCheckpointsThatWereSpoiledOrMadeOfAnotherBone) {
 
   for (const auto& [name, bytes] : disk_.image())
     if (name.find("-" + std::to_string(good.value) + "-") != std::string::npos) disk_.flip_bit(name, 4 * bytes.size());
-  report = kept.keeper->verify(test_block(), std::nullopt);
+  report = kept.store->verify(test_block(), std::nullopt);
   ASSERT_TRUE(report);
   ASSERT_THAT(report->faults, SizeIs(1));
   EXPECT_THAT(report->faults[0], HasSubstr("is not what was written"));
   EXPECT_EQ(report->checkpoints, 1u);
-  EXPECT_EQ(kept.keeper->backup(kTo).error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(kept.store->backup(kTo).error().code, ErrorCode::invalid_input);
   EXPECT_EQ(files_of("/else/"), 0u);
 }
 
@@ -296,15 +296,15 @@ TEST_F(KeeperTest, AVerifyFindsCheckpointsThatWereSpoiledOrMadeOfAnotherBone) {
 TEST_F(KeeperTest, ServesTheBoneOfNoCheckpointThatItsKeyDidNotSign) {
   KeptCuts kept(kFile, &disk_, "femur");
   const auto reopen = [&](const std::shared_ptr<const SigningKeys>& keys) {
-    ASSERT_TRUE(kept.keeper->close());
-    kept.keeper.reset();
+    ASSERT_TRUE(kept.store->close());
+    kept.store.reset();
     kept.options.journal.keys = keys;
     kept.open(kFile);
   };
   const std::vector<FieldLeaf> uncut = kept.room->all_leaves();
   kept.cut(10);
   const Digest cut = kept.room->field_hash();
-  ASSERT_TRUE(kept.keeper->checkpoint(kept.room->room_seq(), uncut));
+  ASSERT_TRUE(kept.store->checkpoint(kept.room->room_seq(), uncut));
   reopen(nullptr);
   ASSERT_NE(kept.room->field_hash(), cut) << "without a key it is taken for the server's";
   reopen(std::make_shared<const SigningKeys>(SigningKey::make()));
@@ -315,40 +315,40 @@ TEST_F(KeeperTest, ServesTheBoneOfNoCheckpointThatItsKeyDidNotSign) {
 TEST_F(KeeperTest, DamageUnderAnOpenJournalIsFound) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.keep();
-  ASSERT_TRUE(kept.keeper->write(plain_rows(kept.keeper->head().place, 600, 20'000)));
-  const JournalHead head = kept.keeper->head();
+  ASSERT_TRUE(kept.store->write(plain_rows(kept.store->head().place, 600, 20'000)));
+  const JournalHead head = kept.store->head();
   const std::string bytes = disk_.image().at(kFile);
   const std::size_t at = bytes.find("100." + std::string(50, 'x'));
   ASSERT_NE(at, std::string::npos) << "more than the log takes is in the database";
   disk_.flip_bit(kFile, 8 * (at + 20) + 1);
-  const Result<RoomReport> report = kept.keeper->verify(test_block(), std::nullopt);
+  const Result<RoomReport> report = kept.store->verify(test_block(), std::nullopt);
   ASSERT_TRUE(report);
   EXPECT_EQ(report->first_bad, RoomSeq{100});
   EXPECT_EQ(report->head.place, RoomSeq{99});
   ASSERT_FALSE(report->sound());
   EXPECT_THAT(report->faults[0], HasSubstr("row 100 does not fit the chain of hashes"));
   std::size_t seen = 0;
-  const Result<void> read = kept.keeper->read(RoomSeq{1}, head.place, [&](const RoomRow&) { return ++seen > 0; });
+  const Result<void> read = kept.store->read(RoomSeq{1}, head.place, [&](const RoomRow&) { return ++seen > 0; });
   EXPECT_EQ(read.error().code, ErrorCode::invalid_input);
   EXPECT_EQ(seen, 99u);
-  EXPECT_EQ(kept.keeper->backup(kTo).error().code, ErrorCode::invalid_input);
-  EXPECT_EQ(kept.keeper->branch(kTo, {}, "b").error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(kept.store->backup(kTo).error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(kept.store->branch(kTo, {}, "b").error().code, ErrorCode::invalid_input);
   EXPECT_EQ(files_of("/else/"), 0u);
-  EXPECT_TRUE(kept.keeper->branch(kTo, RoomSeq{99}, "b")) << "which the damage does not reach";
+  EXPECT_TRUE(kept.store->branch(kTo, RoomSeq{99}, "b")) << "which the damage does not reach";
 }
 
 // Also where SQLite has the rows in memory, from when they were written.
 TEST_F(KeeperTest, DamageUnderRowsThatWereJustWrittenIsFound) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(3);
-  const RoomSeq before = kept.keeper->head().place;
-  ASSERT_TRUE(kept.keeper->write(plain_rows(before, 20)));
-  ASSERT_TRUE(kept.keeper->verify(test_block(), std::nullopt)->sound());
+  const RoomSeq before = kept.store->head().place;
+  ASSERT_TRUE(kept.store->write(plain_rows(before, 20)));
+  ASSERT_TRUE(kept.store->verify(test_block(), std::nullopt)->sound());
   const std::string row = std::to_string(before.value + 7) + "." + std::string(20, 'x');
   const std::size_t at = disk_.image().at(kFile).rfind(row);
   ASSERT_NE(at, std::string::npos) << "a check carries the log into the database";
   disk_.flip_bit(kFile, 8 * (at + 10) + 1);
-  const Result<RoomReport> report = kept.keeper->verify(test_block(), std::nullopt);
+  const Result<RoomReport> report = kept.store->verify(test_block(), std::nullopt);
   ASSERT_TRUE(report);
   EXPECT_EQ(report->first_bad, RoomSeq{before.value + 7});
   EXPECT_FALSE(report->sound());
@@ -358,21 +358,21 @@ TEST_F(KeeperTest, AnIdleRoomsLogGoesIntoTheDatabase) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.keep();
   const auto file_bytes = [&] { return disk_.size(kFile).value().value(); };
-  ASSERT_TRUE(kept.keeper->tidy_if_idle());
+  ASSERT_TRUE(kept.store->tidy_if_idle());
   const std::uint64_t before = file_bytes();
-  ASSERT_TRUE(kept.keeper->write(plain_rows(kept.keeper->head().place, 20, 20'000)));
-  ASSERT_TRUE(kept.keeper->tidy_if_idle());
+  ASSERT_TRUE(kept.store->write(plain_rows(kept.store->head().place, 20, 20'000)));
+  ASSERT_TRUE(kept.store->tidy_if_idle());
   EXPECT_EQ(file_bytes(), before) << "rows have come since it was asked";
-  ASSERT_TRUE(kept.keeper->tidy_if_idle());
+  ASSERT_TRUE(kept.store->tidy_if_idle());
   EXPECT_GT(file_bytes(), before + 20u * 20'000);
-  ASSERT_TRUE(kept.keeper->write(plain_rows(kept.keeper->head().place, 3)));
-  EXPECT_TRUE(kept.keeper->verify(test_block(), std::nullopt)->sound());
+  ASSERT_TRUE(kept.store->write(plain_rows(kept.store->head().place, 3)));
+  EXPECT_TRUE(kept.store->verify(test_block(), std::nullopt)->sound());
 
   // One that takes no rows is left alone, and nobody is told of that every few seconds.
   disk_.fail_write_at(1, EIO);
-  ASSERT_FALSE(kept.keeper->write(plain_rows(kept.keeper->head().place, 200, 20'000)));
+  ASSERT_FALSE(kept.store->write(plain_rows(kept.store->head().place, 200, 20'000)));
   const MemoryDisk::Image failed = disk_.image();
-  for (int i = 0; i < 3; ++i) EXPECT_TRUE(kept.keeper->tidy_if_idle());
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(kept.store->tidy_if_idle());
   EXPECT_EQ(disk_.image(), failed);
 }
 
@@ -381,32 +381,32 @@ TEST(KeeperThreads, RowsAreWrittenWhileAJournalIsCheckedAndCopied) {
   const test::TempDir folder;
   KeptCuts kept(folder.path() / "room", nullptr, "room");
   kept.keep();
-  RoomKeeper& keeper = *kept.keeper;
-  ASSERT_TRUE(keeper.write(plain_rows(keeper.head().place, 20'000)));
+  RoomStore& store = *kept.store;
+  ASSERT_TRUE(store.write(plain_rows(store.head().place, 20'000)));
   std::atomic<bool> end = false;
   std::atomic<std::uint64_t> written = 0;
   std::thread writer([&] {
-    for (RoomSeq at = keeper.head().place; !end; ++at.value, ++written) ASSERT_TRUE(keeper.write(plain_rows(at, 1)));
+    for (RoomSeq at = store.head().place; !end; ++at.value, ++written) ASSERT_TRUE(store.write(plain_rows(at, 1)));
   });
   const auto wait_for_a_row = [&](double) {
     for (const std::uint64_t before = written; written == before;) std::this_thread::yield();
   };
   for (const bool copied : {false, true}) {
     const std::uint64_t before = written;
-    const JournalHead head = keeper.head();
+    const JournalHead head = store.head();
     int waits = 0;
-    const UpkeepCalls calls{[&](double fraction) {
+    const MaintenanceCalls calls{[&](double fraction) {
                               if (++waits % 20 == 0) wait_for_a_row(fraction);
                             },
                             {}};
     if (copied) {
-      const Result<JournalHead> made = keeper.backup(folder.path() / "copy", calls);
+      const Result<JournalHead> made = store.backup(folder.path() / "copy", calls);
       ASSERT_TRUE(made) << made.error().message;
       EXPECT_GE(made->place, head.place);
-      EXPECT_TRUE(*keeper.has_head(*made));
+      EXPECT_TRUE(*store.has_head(*made));
       EXPECT_GE(waits, 20'000 / 256);
     } else {
-      const Result<RoomReport> report = keeper.verify(test_block(), std::nullopt, calls);
+      const Result<RoomReport> report = store.verify(test_block(), std::nullopt, calls);
       ASSERT_TRUE(report) << report.error().message;
       EXPECT_TRUE(report->sound()) << report->faults[0];
       EXPECT_GE(report->head.place, head.place);
@@ -417,11 +417,11 @@ TEST(KeeperThreads, RowsAreWrittenWhileAJournalIsCheckedAndCopied) {
   }
   // Without any waiting: how often is the scheduler's to say.
   const std::uint64_t before = written;
-  ASSERT_TRUE(keeper.verify(test_block(), std::nullopt));
+  ASSERT_TRUE(store.verify(test_block(), std::nullopt));
   std::printf("a check that waits for nobody: %llu rows written meanwhile\n", static_cast<unsigned long long>(written - before));
   end = true;
   writer.join();
-  ASSERT_TRUE(keeper.close());
+  ASSERT_TRUE(store.close());
   const Result<VerifyReport> copy = verify_journal(folder.path() / "copy");
   ASSERT_TRUE(copy);
   EXPECT_TRUE(copy->sound());
@@ -432,31 +432,31 @@ TEST_F(KeeperTest, ABackupIsTheRoomAsItWasWhileItGoesOn) {
   kept.cut(150);
   kept.checkpoint();
   kept.cut(100);
-  const JournalHead head = kept.keeper->head();
+  const JournalHead head = kept.store->head();
   const Digest hash = kept.room->room_hash();
-  ASSERT_EQ(kept.keeper->person("Anna").value(), 1u);
+  ASSERT_EQ(kept.store->person("Anna").value(), 1u);
   int written = 0;
-  const Result<JournalHead> made = kept.keeper->backup(kTo, writing(kept, written));
+  const Result<JournalHead> made = kept.store->backup(kTo, writing(kept, written));
   ASSERT_TRUE(made) << made.error().message;
   EXPECT_EQ(*made, head);
   EXPECT_GT(written, 2);
-  EXPECT_GT(kept.keeper->head().place, head.place);
+  EXPECT_GT(kept.store->head().place, head.place);
   const Result<VerifyReport> copy = verify_journal(kTo, &disk_);
   ASSERT_TRUE(copy);
   EXPECT_TRUE(copy->sound());
   EXPECT_EQ(copy->head, head);
   {
-    const Result<KeptRoom> again = RoomKeeper::open(kTo, test_block(), kept.options);
+    const Result<PersistedRoom> again = RoomStore::open(kTo, test_block(), kept.options);
     ASSERT_TRUE(again) << again.error().message;
     EXPECT_EQ(again->room.room_hash(), hash);
-    EXPECT_EQ(again->keeper->evaluated(), head.place.value - (1 + 150 * 2 + 30)) << "its checkpoint was copied, too";
-    EXPECT_THAT(again->keeper->people().value(), SizeIs(1));
+    EXPECT_EQ(again->store->evaluated(), head.place.value - (1 + 150 * 2 + 30)) << "its checkpoint was copied, too";
+    EXPECT_THAT(again->store->people().value(), SizeIs(1));
   }
-  EXPECT_EQ(kept.keeper->backup(kTo).error().code, ErrorCode::exists);
+  EXPECT_EQ(kept.store->backup(kTo).error().code, ErrorCode::exists);
 
   int asked = 0;
   const std::size_t before = files_of("/");
-  EXPECT_EQ(kept.keeper->backup("/else/other", {{}, [&] { return ++asked > 1; }}).error().code, ErrorCode::cancelled);
+  EXPECT_EQ(kept.store->backup("/else/other", {{}, [&] { return ++asked > 1; }}).error().code, ErrorCode::cancelled);
   EXPECT_EQ(files_of("/"), before);
 }
 
@@ -467,21 +467,21 @@ TEST_F(KeeperTest, ABackupPassesOverCheckpointsThatWereReplacedMeanwhile) {
     kept.cut(20);
     kept.checkpoint();
   }
-  const JournalHead head = kept.keeper->head();
+  const JournalHead head = kept.store->head();
   const Digest hash = kept.room->room_hash();
   int calls = 0;
-  const UpkeepCalls replacing{[&](double) {
+  const MaintenanceCalls replacing{[&](double) {
                                 if (++calls > 4) return;
                                 kept.cut(1);
                                 kept.checkpoint();
                               },
                               {}};
-  const Result<JournalHead> made = kept.keeper->backup(kTo, replacing);
+  const Result<JournalHead> made = kept.store->backup(kTo, replacing);
   ASSERT_TRUE(made) << made.error().message;
   EXPECT_EQ(*made, head);
   EXPECT_GT(calls, 2);
   EXPECT_TRUE(verify_journal(kTo, &disk_)->sound());
-  const Result<KeptRoom> again = RoomKeeper::open(kTo, test_block(), kept.options);
+  const Result<PersistedRoom> again = RoomStore::open(kTo, test_block(), kept.options);
   ASSERT_TRUE(again);
   EXPECT_EQ(again->room.room_hash(), hash);
 }
@@ -490,16 +490,16 @@ TEST_F(KeeperTest, ABackupThatWasCutShortIsNotInTheWayOfTheNext) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(150);
   std::optional<MemoryDisk::Image> half;
-  const UpkeepCalls calls{[&](double) {
+  const MaintenanceCalls calls{[&](double) {
                             if (!half) half = disk_.image();
                           },
                           {}};
-  (void)kept.keeper->backup(kTo, calls);
+  (void)kept.store->backup(kTo, calls);
   ASSERT_TRUE(half && half->contains("/else/copy.copying") && half->contains("/else/copy.copying-wal"));
-  kept.keeper.reset();
+  kept.store.reset();
   disk_.load(*half);
   kept.open(kFile);
-  const Result<JournalHead> made = kept.keeper->backup(kTo);
+  const Result<JournalHead> made = kept.store->backup(kTo);
   ASSERT_TRUE(made) << made.error().message;
   EXPECT_EQ(files_of("/else/"), 1u);
 }
@@ -509,29 +509,29 @@ TEST_F(KeeperTest, ACheckpointIsOfItsPlaceThoughRowsGoOn) {
   kept.cut(40);
   const RoomSeq place = kept.room->room_seq();
   const std::vector<FieldLeaf> leaves = kept.room->all_leaves();
-  EXPECT_EQ(kept.keeper->changes_since_checkpoint(), 48u) << "40 cuts, 8 undos";
+  EXPECT_EQ(kept.store->changes_since_checkpoint(), 48u) << "40 cuts, 8 undos";
   kept.cut(10);
   int written = 0;
-  const Result<void> done = kept.keeper->checkpoint(place, leaves, writing(kept, written));
+  const Result<void> done = kept.store->checkpoint(place, leaves, writing(kept, written));
   ASSERT_TRUE(done) << done.error().message;
   EXPECT_GT(written, 0);
-  EXPECT_EQ(kept.keeper->changes_since_checkpoint(), static_cast<std::uint64_t>(12 + written));
+  EXPECT_EQ(kept.store->changes_since_checkpoint(), static_cast<std::uint64_t>(12 + written));
   const std::size_t files = files_of(kFile);
-  ASSERT_TRUE(kept.keeper->checkpoint(place, leaves)) << "there is one";
-  ASSERT_TRUE(kept.keeper->checkpoint(RoomSeq{5}, leaves)) << "there is a newer one";
-  ASSERT_TRUE(kept.keeper->checkpoint(RoomSeq{kept.keeper->head().place.value + 1}, leaves)) << "not kept yet";
+  ASSERT_TRUE(kept.store->checkpoint(place, leaves)) << "there is one";
+  ASSERT_TRUE(kept.store->checkpoint(RoomSeq{5}, leaves)) << "there is a newer one";
+  ASSERT_TRUE(kept.store->checkpoint(RoomSeq{kept.store->head().place.value + 1}, leaves)) << "not kept yet";
   EXPECT_EQ(files_of(kFile), files);
-  EXPECT_EQ(kept.keeper->checkpoint(kept.room->room_seq(), kept.room->all_leaves(), {{}, [] { return true; }}).error().code,
+  EXPECT_EQ(kept.store->checkpoint(kept.room->room_seq(), kept.room->all_leaves(), {{}, [] { return true; }}).error().code,
             ErrorCode::cancelled);
   EXPECT_EQ(files_of(kFile), files);
 
   const Digest hash = kept.room->room_hash();
-  const RoomSeq head = kept.keeper->head().place;
-  ASSERT_TRUE(kept.keeper->verify(test_block(), kept.bone())->sound());
-  kept.keeper.reset();  // as if it had been killed
+  const RoomSeq head = kept.store->head().place;
+  ASSERT_TRUE(kept.store->verify(test_block(), kept.bone())->sound());
+  kept.store.reset();  // as if it had been killed
   kept.open(kFile);
-  EXPECT_EQ(kept.keeper->evaluated(), head.value - place.value);
-  EXPECT_EQ(kept.keeper->changes_since_checkpoint(), static_cast<std::uint64_t>(12 + written));
+  EXPECT_EQ(kept.store->evaluated(), head.value - place.value);
+  EXPECT_EQ(kept.store->changes_since_checkpoint(), static_cast<std::uint64_t>(12 + written));
   EXPECT_EQ(kept.room->room_hash(), hash);
 }
 
@@ -553,7 +553,7 @@ TEST_F(KeeperTest, ALargeCheckpointIsSyncedBitByBit) {
     all += now;
     most = std::max(most, since);
   };
-  ASSERT_TRUE(kept.keeper->checkpoint(kept.room->room_seq(), leaves, {look, {}}));
+  ASSERT_TRUE(kept.store->checkpoint(kept.room->room_seq(), leaves, {look, {}}));
   EXPECT_GT(all, 5u << 20);
   EXPECT_LE(most, 1u << 20);
   std::printf("%llu bytes, never more than %llu of them unsynced\n", static_cast<unsigned long long>(all),
@@ -571,7 +571,7 @@ TEST(KeeperThreads, ACheckpointThatIsBeingWrittenIsGivenUpByClosing) {
   std::atomic<bool> begun = false, closing = false;
   Result<void> written;
   std::thread slow([&] {
-    written = kept.keeper->checkpoint(kept.room->room_seq(), leaves, {[&](double) {
+    written = kept.store->checkpoint(kept.room->room_seq(), leaves, {[&](double) {
                                         begun = true;
                                         while (!closing) std::this_thread::yield();
                                       },
@@ -579,7 +579,7 @@ TEST(KeeperThreads, ACheckpointThatIsBeingWrittenIsGivenUpByClosing) {
   });
   while (!begun) std::this_thread::yield();
   closing = true;
-  const Result<void> closed = kept.keeper->close();
+  const Result<void> closed = kept.store->close();
   slow.join();
   EXPECT_TRUE(closed) << closed.error().message;
   EXPECT_TRUE(written || written.error().code == ErrorCode::cancelled) << written.error().message;
@@ -601,16 +601,16 @@ TEST(CheckpointPolicyTest, AsksForWorkAndForTime) {
 // Rows of the branch are those of its parent; everything else is its own.
 TEST_F(KeeperTest, ABranchIsARoomOfItsOwn) {
   KeptCuts kept(kFile, &disk_, "femur");
-  ASSERT_EQ(kept.keeper->person("Anna").value(), 1u);
-  ASSERT_EQ(kept.keeper->person("Bela").value(), 2u);
+  ASSERT_EQ(kept.store->person("Anna").value(), 1u);
+  ASSERT_EQ(kept.store->person("Bela").value(), 2u);
   kept.cut(200);
   kept.checkpoint();
   kept.cut(10);
   const RoomSeq place{1 + 440 + 5};
-  const std::vector<RoomRow> before = rows_of(*kept.keeper, place);
+  const std::vector<RoomRow> before = rows_of(*kept.store, place);
   const Room expected = replay_of(before);
   int written = 0;
-  const Result<JournalHead> live = kept.keeper->branch("/else/live", place, "second try", writing(kept, written));
+  const Result<JournalHead> live = kept.store->branch("/else/live", place, "second try", writing(kept, written));
   ASSERT_TRUE(live) << live.error().message;
   EXPECT_GT(written, 1);
   const Result<RoomGenesis> peeked = peek_genesis("/else/live", &disk_);
@@ -618,33 +618,33 @@ TEST_F(KeeperTest, ABranchIsARoomOfItsOwn) {
   EXPECT_EQ(peeked->room, "second try");
   EXPECT_EQ(peeked->parent, "femur");
   EXPECT_EQ(peeked->parent_room_seq, place);
-  EXPECT_TRUE(kept.keeper->has_head({place, peeked->parent_chain}).value());
-  EXPECT_EQ(kept.keeper->branch("/else/live", place, "second try").error().code, ErrorCode::exists);
-  const RoomSeq beyond{kept.keeper->head().place.value + 1};
-  EXPECT_EQ(kept.keeper->branch("/else/beyond", beyond, "b").error().code, ErrorCode::invalid_input);
+  EXPECT_TRUE(kept.store->has_head({place, peeked->parent_chain}).value());
+  EXPECT_EQ(kept.store->branch("/else/live", place, "second try").error().code, ErrorCode::exists);
+  const RoomSeq beyond{kept.store->head().place.value + 1};
+  EXPECT_EQ(kept.store->branch("/else/beyond", beyond, "b").error().code, ErrorCode::invalid_input);
   EXPECT_EQ(branch_journal(kFile, "/else/file", place, "b", {}, &disk_).error().code, ErrorCode::exists) << "in use";
 
-  ASSERT_TRUE(kept.keeper->close());
+  ASSERT_TRUE(kept.store->close());
   const Result<JournalHead> from_file = branch_journal(kFile, "/else/file", place, "second try", {}, &disk_);
   ASSERT_TRUE(from_file) << from_file.error().message;
   EXPECT_EQ(*from_file, *live) << "the same, by the other road";
   EXPECT_TRUE(verify_journal(kFile, &disk_)->closed_cleanly);
   for (const char* file : {"/else/live", "/else/file"}) {
     EXPECT_TRUE(verify_journal(file, &disk_)->sound());
-    RoomKeeper::Options of_branch = kept.options;
+    RoomStore::Options of_branch = kept.options;
     of_branch.name = "second try";
-    const Result<KeptRoom> branch = RoomKeeper::open(file, test_block(), of_branch);
+    const Result<PersistedRoom> branch = RoomStore::open(file, test_block(), of_branch);
     ASSERT_TRUE(branch) << branch.error().message;
     EXPECT_EQ(branch->room.room_hash(), expected.room_hash());
-    EXPECT_EQ(branch->keeper->head(), *live);
-    EXPECT_EQ(branch->keeper->evaluated(), 5u) << "its parent's checkpoint serves";
-    EXPECT_EQ(branch->keeper->server_epoch(), 1u);
-    EXPECT_THAT(branch->keeper->people().value(), IsEmpty());
-    EXPECT_EQ(branch->keeper->person("Cora").value(), 3u) << "1 and 2 are others in its rows";
+    EXPECT_EQ(branch->store->head(), *live);
+    EXPECT_EQ(branch->store->evaluated(), 5u) << "its parent's checkpoint serves";
+    EXPECT_EQ(branch->store->server_epoch(), 1u);
+    EXPECT_THAT(branch->store->people().value(), IsEmpty());
+    EXPECT_EQ(branch->store->person("Cora").value(), 3u) << "1 and 2 are others in its rows";
   }
   const Result<JournalHead> whole = branch_journal(kFile, "/else/whole", {}, "all", {}, &disk_);
   ASSERT_TRUE(whole);
-  EXPECT_EQ(whole->place, kept.keeper->head().place);
+  EXPECT_EQ(whole->place, kept.store->head().place);
   int asked = 0;
   const std::size_t files = files_of("/");
   EXPECT_EQ(branch_journal(kFile, "/else/no", {}, "no", {{}, [&] { return ++asked > 1; }}, &disk_).error().code,

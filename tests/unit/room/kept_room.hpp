@@ -1,4 +1,4 @@
-// A room that is kept in a journal, cut by one hand: for the tests of its upkeep.
+// A room that is kept in a journal, cut by one hand: for the tests of its maintenance.
 #pragma once
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/net/room_keeper.hpp"
+#include "server/net/room_store.hpp"
 #include "tests/unit/room/cuts.hpp"
 
 namespace osteon::test {
@@ -26,10 +26,10 @@ struct KeptCuts {
   }
 
   void open(const std::filesystem::path& file) {
-    Result<KeptRoom> kept = RoomKeeper::open(file, test_block(), options);
+    Result<PersistedRoom> kept = RoomStore::open(file, test_block(), options);
     ASSERT_TRUE(kept) << kept.error().message;
     room.emplace(std::move(kept->room));
-    keeper = std::move(kept->keeper);
+    store = std::move(kept->store);
   }
 
   // So many strokes, each with a mark after it; every fifth is taken back.
@@ -46,18 +46,18 @@ struct KeptCuts {
     keep();
   }
   void keep() {
-    const Result<void> kept = keeper->write(room->take_rows());
+    const Result<void> kept = store->write(room->take_rows());
     ASSERT_TRUE(kept) << kept.error().message;
   }
   void checkpoint() {
-    const Result<void> done = keeper->checkpoint(room->room_seq(), room->all_leaves());
+    const Result<void> done = store->checkpoint(room->room_seq(), room->all_leaves());
     ASSERT_TRUE(done) << done.error().message;
   }
   BoneAt bone() const { return {room->room_seq(), room->field_hash()}; }
 
-  RoomKeeper::Options options;
+  RoomStore::Options options;
   std::optional<Room> room;
-  std::unique_ptr<RoomKeeper> keeper;
+  std::unique_ptr<RoomStore> store;
   AuthorId hand;
   std::vector<Cut> cuts;
 };
@@ -83,9 +83,9 @@ inline Room replay_of(const std::vector<RoomRow>& rows) {
   return room;
 }
 
-inline std::vector<RoomRow> rows_of(RoomKeeper& keeper, RoomSeq to) {
+inline std::vector<RoomRow> rows_of(RoomStore& store, RoomSeq to) {
   std::vector<RoomRow> rows;
-  const Result<void> read = keeper.read(RoomSeq{1}, to, [&](const RoomRow& row) {
+  const Result<void> read = store.read(RoomSeq{1}, to, [&](const RoomRow& row) {
     rows.push_back(row);
     return true;
   });

@@ -108,7 +108,7 @@ TEST(HealthWatch, ARoomServesUntilItIsClosedOrKeepsNothingAnyMore) {
   kept.keep();
   disk.fail_sync_at(1, EIO, MemoryDisk::Lasting::from_then_on);  // the next thing that the room keeps
   Rooms rooms(RoomsOptions{.cases = {{test_block(), dir / "case"}}});
-  ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.keeper), {}, [](double) {}));
+  ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.store), {}, [](double) {}));
   ASSERT_TRUE(rooms.create("tibia", nullptr));
   Told told;
   {
@@ -167,15 +167,15 @@ TEST(HealthWatch, ARoomWhoseJournalIsDamagedIsOpenToNobody) {
   kept.cut(3);
   ASSERT_TRUE(kept.room->mark(kept.hand, "before the reamer"));
   kept.keep();
-  const JournalHead head = kept.keeper->head();
-  ASSERT_TRUE(kept.keeper->close());
+  const JournalHead head = kept.store->head();
+  ASSERT_TRUE(kept.store->close());
   const std::size_t at = disk.image().at(file).find("before the reamer");
   ASSERT_NE(at, std::string::npos);
   disk.flip_bit(file, 8 * at + 1);
   kept.open(file);
-  ASSERT_EQ(kept.keeper->head().place.value, head.place.value - 1) << "the rest can be looked at";
+  ASSERT_EQ(kept.store->head().place.value, head.place.value - 1) << "the rest can be looked at";
   Rooms rooms(RoomsOptions{.cases = {{test_block(), dir / "case"}}});
-  ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.keeper), {}, [](double) {}));
+  ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.store), {}, [](double) {}));
   RoomHost& host = (*rooms.find("femur"))->host();
   EXPECT_TRUE(host.stopped());
   EXPECT_FALSE(host.health().serving);
@@ -207,7 +207,7 @@ TEST(HealthWatch, ARoomStopsWhenItsJournalIsClosedBesideACommit) {
   KeptCuts kept("/rooms/femur.journal", &disk, "femur");
   kept.cut(1);
   Rooms rooms(RoomsOptions{.cases = {{test_block(), dir / "case"}}});
-  ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.keeper), {}, [](double) {}));
+  ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.store), {}, [](double) {}));
   RoomHost& host = (*rooms.find("femur"))->host();
   const auto hand = std::make_shared<Hand>(kept.hand);
   ASSERT_TRUE(host.open_session(hand));
@@ -221,7 +221,7 @@ TEST(HealthWatch, ARoomStopsWhenItsJournalIsClosedBesideACommit) {
   host.leave(*hand);
 }
 
-// As the server's upkeep asks it, every few seconds.
+// As the server's maintenance asks it, every few seconds.
 TEST(Upkeep, AnIdleRoomsLogGoesIntoTheDatabase) {
   TempDir dir;
   const std::filesystem::path file = dir / "femur.journal";
@@ -233,9 +233,9 @@ TEST(Upkeep, AnIdleRoomsLogGoesIntoTheDatabase) {
   }
   ASSERT_EQ(std::filesystem::file_size(file), before);
   Rooms rooms(RoomsOptions{.cases = {{test_block(), dir / "case"}}});
-  ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.keeper), {}, [](double) {}));
+  ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.store), {}, [](double) {}));
   const std::shared_ptr<OpenRoom> room = *rooms.find("femur");
-  for (int i = 0; i < 2; ++i) room->keep_up([] { return false; });
+  for (int i = 0; i < 2; ++i) room->maintain([] { return false; });
   EXPECT_GT(std::filesystem::file_size(file), before);
 }
 

@@ -12,7 +12,7 @@
 #include "osteon/v1/people.pb.h"
 #include "server/net/people_board.hpp"
 #include "server/net/room_host.hpp"
-#include "server/net/room_keeper.hpp"
+#include "server/net/room_store.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/room/cuts.hpp"
 
@@ -385,14 +385,14 @@ TEST(PartnerOutbox, HoldsNothingOfWhatGoesAnotherWayOrOfWhoIsGone) {
 TEST(PeopleHost, NamesAndDecisionsOutliveTheProcess) {
   const test::TempDir folder;
   const auto open = [&] {
-    return RoomKeeper::open(folder / "room.journal", test::test_block(), RoomKeeper::Options{}).value();
+    return RoomStore::open(folder / "room.journal", test::test_block(), RoomStore::Options{}).value();
   };
   AuthorId trainee;
   RoomSeq place;
   {
-    KeptRoom kept = open();
+    PersistedRoom kept = open();
     RoomHost host(std::move(kept.room), {.tick = 1ms, .mesh = 1s, .pieces = 0ns}, {}, Detail::automatic,
-                  kept.keeper.get());
+                  kept.store.get());
     const AuthorId instructor = host.join(MemberKind::watcher, "Ada", {}, Role::instructor).value();
     trainee = host.join(MemberKind::surgeon, "Ben", {}, Role::trainee).value();
     std::promise<RoomSeq> decided;
@@ -405,11 +405,11 @@ TEST(PeopleHost, NamesAndDecisionsOutliveTheProcess) {
         [&](const Result<RoomEvent>& event) { decided.set_value(event.value().room_seq); });
     place = decided.get_future().get();
     host.stop();
-    ASSERT_TRUE(kept.keeper->close());
+    ASSERT_TRUE(kept.store->close());
   }
-  KeptRoom kept = open();
+  PersistedRoom kept = open();
   RoomHost host(std::move(kept.room), {.tick = 1ms, .mesh = 1s, .pieces = 0ns}, {}, Detail::automatic,
-                kept.keeper.get());
+                kept.store.get());
   PeopleCursor cursor;
   v1::WatchPeopleResponse news;
   ASSERT_TRUE(news.ParseFromString(*host.people().news(cursor, {}, {})));

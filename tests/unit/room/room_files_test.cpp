@@ -47,7 +47,7 @@ TEST(RoomsFolder, IsOneServersAsLongAsItHoldsIt) {
   // What is done to a journal that no server has open goes on beside it, and the lock is no room.
   KeptCuts kept(dir / "femur.journal", nullptr, "femur");
   kept.cut(3);
-  ASSERT_TRUE(kept.keeper->close());
+  ASSERT_TRUE(kept.store->close());
   ASSERT_TRUE(branch_journal(dir / "femur.journal", dir / "copy.journal", RoomSeq{}, "copy"));
   EXPECT_THAT(*branches_of(dir.path(), dir / "femur.journal"), SizeIs(1));
   EXPECT_TRUE(delete_room(dir / "femur.journal", true));
@@ -61,11 +61,11 @@ TEST_F(RoomFilesTest, WhatAJournalBeganAsIsReadBesideWhoeverUsesIt) {
   const MemoryDisk::Image before = disk_.image();
   const Result<RoomGenesis> peeked = peek_genesis(kFile, &disk_);
   ASSERT_TRUE(peeked) << peeked.error().message;
-  EXPECT_EQ(to_bytes(*peeked), to_bytes(kept.keeper->genesis()));
+  EXPECT_EQ(to_bytes(*peeked), to_bytes(kept.store->genesis()));
   EXPECT_EQ(disk_.image(), before);
   kept.cut(5);
-  EXPECT_TRUE(kept.keeper->verify(test_block(), kept.bone())->sound());
-  ASSERT_TRUE(kept.keeper->close());
+  EXPECT_TRUE(kept.store->verify(test_block(), kept.bone())->sound());
+  ASSERT_TRUE(kept.store->close());
   EXPECT_EQ(peek_genesis(kFile, &disk_)->room, "femur");
 
   EXPECT_EQ(peek_genesis("/rooms/tibia", &disk_).error().code, ErrorCode::not_found);
@@ -91,8 +91,8 @@ TEST(RoomFiles, APeekOnTheComputersDiskDisturbsNobody) {
   ASSERT_TRUE(peeked) << peeked.error().message;
   EXPECT_EQ(peeked->room, "femur");
   kept.cut(5);
-  EXPECT_TRUE(kept.keeper->verify(test_block(), kept.bone())->sound());
-  ASSERT_TRUE(kept.keeper->close());
+  EXPECT_TRUE(kept.store->verify(test_block(), kept.bone())->sound());
+  ASSERT_TRUE(kept.store->close());
   EXPECT_TRUE(verify_journal(file)->sound());
 }
 
@@ -100,12 +100,12 @@ TEST_F(RoomFilesTest, ARoomIsOpenedOnlyUnderItsName) {
   {
     KeptCuts kept(kFile, &disk_, "femur");
     kept.cut(5);
-    ASSERT_TRUE(kept.keeper->close());
+    ASSERT_TRUE(kept.store->close());
   }
-  RoomKeeper::Options options;
+  RoomStore::Options options;
   options.journal.disk = &disk_;
   options.name = "tibia";
-  const auto refused = RoomKeeper::open(kFile, test_block(), options);
+  const auto refused = RoomStore::open(kFile, test_block(), options);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().message,
             std::string(kFile) + " holds the room femur, not tibia; give the file its name again, or rename the room: "
@@ -115,9 +115,9 @@ TEST_F(RoomFilesTest, ARoomIsOpenedOnlyUnderItsName) {
     ASSERT_TRUE(journal.set_register(kNameRegister, "tibia"));
     ASSERT_TRUE(journal.close());
   }
-  const auto renamed = RoomKeeper::open(kFile, test_block(), options);
+  const auto renamed = RoomStore::open(kFile, test_block(), options);
   ASSERT_TRUE(renamed) << renamed.error().message;
-  EXPECT_EQ(renamed->keeper->genesis().room, "tibia");
+  EXPECT_EQ(renamed->store->genesis().room, "tibia");
 }
 
 TEST_F(RoomFilesTest, WhoJoinedTooLongAgoIsForgotten) {
@@ -126,44 +126,44 @@ TEST_F(RoomFilesTest, WhoJoinedTooLongAgoIsForgotten) {
   kept.keep();
   kept.options.today = [&] { return today; };
   kept.options.retention_days = 30;
-  kept.keeper.reset();
+  kept.store.reset();
   kept.open(kFile);
-  ASSERT_EQ(kept.keeper->person("Anna Alt").value(), 1u);
+  ASSERT_EQ(kept.store->person("Anna Alt").value(), 1u);
   today = 120;
-  ASSERT_EQ(kept.keeper->person("Bela Neu").value(), 2u);
-  ASSERT_EQ(kept.keeper->person("Anna Alt").value(), 1u) << "she is still known";
+  ASSERT_EQ(kept.store->person("Bela Neu").value(), 2u);
+  ASSERT_EQ(kept.store->person("Anna Alt").value(), 1u) << "she is still known";
   today = 130;
-  EXPECT_EQ(kept.keeper->forget_old().value(), 0u) << "30 days are not more than 30";
+  EXPECT_EQ(kept.store->forget_old().value(), 0u) << "30 days are not more than 30";
   EXPECT_TRUE(anywhere("Anna Alt"));
   today = 131;
-  EXPECT_EQ(kept.keeper->forget_old().value(), 1u);
+  EXPECT_EQ(kept.store->forget_old().value(), 1u);
   EXPECT_FALSE(anywhere("Anna Alt"));
   EXPECT_TRUE(anywhere("Bela Neu"));
-  EXPECT_EQ(kept.keeper->person("Anna Alt").value(), 3u) << "nobody knows any more that this was 1";
+  EXPECT_EQ(kept.store->person("Anna Alt").value(), 3u) << "nobody knows any more that this was 1";
 
   // And at the opening.
   kept.cut(3);
-  kept.keeper.reset();
+  kept.store.reset();
   today = 151;
   kept.open(kFile);
   EXPECT_FALSE(anywhere("Bela Neu"));
-  EXPECT_THAT(kept.keeper->people().value(), ElementsAre(Person{"3", "Anna Alt", 131}));
-  kept.keeper.reset();
+  EXPECT_THAT(kept.store->people().value(), ElementsAre(Person{"3", "Anna Alt", 131}));
+  kept.store.reset();
   today = 100'000;
   kept.options.retention_days = 0;
   kept.open(kFile);
-  EXPECT_EQ(kept.keeper->forget_old().value(), 0u);
+  EXPECT_EQ(kept.store->forget_old().value(), 0u);
   EXPECT_TRUE(anywhere("Anna Alt")) << "for ever";
-  EXPECT_TRUE(kept.keeper->forget(3).value());
-  EXPECT_FALSE(kept.keeper->forget(3).value());
+  EXPECT_TRUE(kept.store->forget(3).value());
+  EXPECT_FALSE(kept.store->forget(3).value());
   EXPECT_FALSE(anywhere("Anna Alt"));
 }
 
 // What one person said, drew as words and called moments, and what was decided about and said to it.
 TEST_F(RoomFilesTest, WordsGoWithThePersonAndTheChainStays) {
   KeptCuts kept(kFile, &disk_, "femur");
-  ASSERT_EQ(kept.keeper->person("Anna Alt").value(), 1u);
-  ASSERT_EQ(kept.keeper->person("Bela Neu").value(), 2u);
+  ASSERT_EQ(kept.store->person("Anna Alt").value(), 1u);
+  ASSERT_EQ(kept.store->person("Bela Neu").value(), 2u);
   Room& room = *kept.room;
   const AuthorId anna = room.join(MemberKind::surgeon, 1, {}, Role::trainee);
   const AuthorId bela = room.join(MemberKind::watcher, 2, {}, Role::instructor);
@@ -181,36 +181,36 @@ TEST_F(RoomFilesTest, WordsGoWithThePersonAndTheChainStays) {
   drawn.words = "of another";
   ASSERT_TRUE(room.annotate(bela, drawn));
   kept.cut(3);
-  const JournalHead head = kept.keeper->head();
+  const JournalHead head = kept.store->head();
   const Digest bone = room.field_hash();
   ASSERT_TRUE(anywhere("Zwetschge"));
 
-  ASSERT_TRUE(kept.keeper->forget(1).value());
+  ASSERT_TRUE(kept.store->forget(1).value());
   for (const char* gone : {"Zwetschge", "Anna Alt", "as anna alt said"}) EXPECT_FALSE(anywhere(gone)) << gone;
   for (const char* stays : {"Bela Neu", "of another", "anna altmann is somebody else"})
     EXPECT_TRUE(anywhere(stays)) << stays;
-  EXPECT_EQ(kept.keeper->head(), head);
-  EXPECT_FALSE(kept.keeper->forget(1).value()) << "nothing is left to forget";
+  EXPECT_EQ(kept.store->head(), head);
+  EXPECT_FALSE(kept.store->forget(1).value()) << "nothing is left to forget";
 
   // The room goes on, and what it was is made again from its rows.
   kept.cut(2);
   const Digest later = room.field_hash();
-  ASSERT_TRUE(kept.keeper->close());
-  kept.keeper.reset();
+  ASSERT_TRUE(kept.store->close());
+  kept.store.reset();
   const auto report = verify_journal(kFile, &disk_);
   ASSERT_TRUE(report);
   EXPECT_THAT(report->faults, IsEmpty());
   EXPECT_THAT(report->notes, ElementsAre(HasSubstr("words were erased from")));
   kept.open(kFile);
   EXPECT_EQ(kept.room->field_hash(), later);
-  EXPECT_EQ(test::replay_of(test::rows_of(*kept.keeper, head.place)).field_hash(), bone);
+  EXPECT_EQ(test::replay_of(test::rows_of(*kept.store, head.place)).field_hash(), bone);
   EXPECT_FALSE(anywhere("Zwetschge"));
 }
 
 TEST_F(RoomFilesTest, APersonGetsAllThatThereIsOfIt) {
   KeptCuts kept(kFile, &disk_, "femur");
-  ASSERT_EQ(kept.keeper->person("Anna \"A\"\n").value(), 1u);
-  ASSERT_EQ(kept.keeper->person("Bela").value(), 2u);
+  ASSERT_EQ(kept.store->person("Anna \"A\"\n").value(), 1u);
+  ASSERT_EQ(kept.store->person("Bela").value(), 2u);
   kept.cut(4);  // by 1: its coming, 4 cuts, 4 marks
   const AuthorId other = kept.room->join(MemberKind::surgeon, 2), nobody = kept.room->join(MemberKind::watcher, 0);
   ASSERT_TRUE(kept.room->mark(other, "of another"));
@@ -227,7 +227,7 @@ TEST_F(RoomFilesTest, APersonGetsAllThatThereIsOfIt) {
     lines.push_back(line);
     return true;
   };
-  ASSERT_TRUE(kept.keeper->export_person(1, take));
+  ASSERT_TRUE(kept.store->export_person(1, take));
   ASSERT_THAT(lines, SizeIs(1 + 1 + 8 + 2 + 1));
   EXPECT_THAT(lines.front(), AllOf(HasSubstr("\"person\":1"), HasSubstr("\"label\":\"Anna \\\"A\\\"\\u000a\"")));
   EXPECT_THAT(lines[1], HasSubstr("\"join\""));
@@ -236,11 +236,11 @@ TEST_F(RoomFilesTest, APersonGetsAllThatThereIsOfIt) {
   EXPECT_THAT(lines[12], HasSubstr("\"rejection\""));
   for (const std::string& line : lines) EXPECT_THAT(line, ::testing::Not(HasSubstr("of another")));
 
-  ASSERT_TRUE(kept.keeper->forget(1));
+  ASSERT_TRUE(kept.store->forget(1));
   lines.clear();
-  ASSERT_TRUE(kept.keeper->export_person(1, take));
+  ASSERT_TRUE(kept.store->export_person(1, take));
   EXPECT_THAT(lines, SizeIs(12)) << "what it did stays, under its number";
-  EXPECT_EQ(kept.keeper->export_person(7, take).error().code, ErrorCode::not_found);
+  EXPECT_EQ(kept.store->export_person(7, take).error().code, ErrorCode::not_found);
 }
 
 // Of a folder with this family, among rooms of the same names that are not of it:
@@ -258,7 +258,7 @@ class FamilyTest : public RoomFilesTest {
     KeptCuts kept(file, &disk_, "femur", seed);
     kept.cut(6);
     kept.checkpoint();
-    ASSERT_TRUE(kept.keeper->close());
+    ASSERT_TRUE(kept.store->close());
     for (const std::string& name : branches)
       ASSERT_TRUE(branch_journal(file, "/rooms/" + name, RoomSeq{8}, name, {}, &disk_));
   }
@@ -285,11 +285,11 @@ TEST_F(FamilyTest, BranchesAreKnownByTheHistoryThatTheyName) {
   KeptCuts live(kFile, &disk_, "femur");
   EXPECT_THAT(branches(kFile), ElementsAre("b1", "b2", "b11")) << "of rows that are in its file";
   live.cut(2);
-  const RoomSeq newest = live.keeper->head().place;
-  ASSERT_TRUE(live.keeper->branch("/rooms/b3", newest, "b3"));
-  EXPECT_EQ(branches_of("/rooms", kFile, {}, &disk_).error().code, ErrorCode::exists) << "nobody but the keeper can know";
+  const RoomSeq newest = live.store->head().place;
+  ASSERT_TRUE(live.store->branch("/rooms/b3", newest, "b3"));
+  EXPECT_EQ(branches_of("/rooms", kFile, {}, &disk_).error().code, ErrorCode::exists) << "nobody but the store can know";
   const HasHead has = [&](const fs::path& file, const JournalHead& head) {
-    return file == kFile ? live.keeper->has_head(head) : has_head(file, head, &disk_);
+    return file == kFile ? live.store->has_head(head) : has_head(file, head, &disk_);
   };
   EXPECT_THAT(branches(kFile, has), ElementsAre("b1", "b2", "b3", "b11"));
 }
@@ -327,9 +327,9 @@ TEST_F(RoomFilesTest, ABranchOfAllIsNotMadeOfADamagedJournal) {
   {
     KeptCuts kept(kFile, &disk_, "femur");
     kept.keep();
-    ASSERT_TRUE(kept.keeper->write(test::plain_rows(kept.keeper->head().place, 40)));
-    last = kept.keeper->head().place;
-    ASSERT_TRUE(kept.keeper->close());
+    ASSERT_TRUE(kept.store->write(test::plain_rows(kept.store->head().place, 40)));
+    last = kept.store->head().place;
+    ASSERT_TRUE(kept.store->close());
   }
   const std::size_t at = disk_.image().at(kFile).find("30." + std::string(20, 'x'));
   ASSERT_NE(at, std::string::npos);
@@ -353,8 +353,8 @@ TEST_F(RoomFilesTest, CutShortADeletionLeavesAWholeRoomOrNone) {
     kept.cut(4);
     kept.checkpoint();
     kept.cut(4);
-    head = kept.keeper->head().place;
-    ASSERT_TRUE(kept.keeper->branch("/rooms/b", {}, "b"));
+    head = kept.store->head().place;
+    ASSERT_TRUE(kept.store->branch("/rooms/b", {}, "b"));
   }
   const MemoryDisk::Image before = disk_.image();
   int whole = 0, none = 0, cases = 0;

@@ -4,7 +4,7 @@
 
 #include <fstream>
 
-#include "server/journal/upkeep.hpp"
+#include "server/journal/maintenance.hpp"
 #include "server/net/room_server.hpp"
 #include "server/net/rooms_client.hpp"
 #include "tests/support/temp_dir.hpp"

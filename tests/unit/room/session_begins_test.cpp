@@ -11,7 +11,7 @@
 
 #include "osteon/v1/cutting.pb.h"
 #include "server/net/room_host.hpp"
-#include "server/net/room_keeper.hpp"
+#include "server/net/room_store.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/unit/room/cuts.hpp"
 
@@ -75,14 +75,14 @@ class BegunSession : public ::testing::Test {
   }
   void TearDown() override { kill(); }
   void open() {
-    Result<KeptRoom> kept = RoomKeeper::open("/rooms/femur", test_block(), options());
+    Result<PersistedRoom> kept = RoomStore::open("/rooms/femur", test_block(), options());
     ASSERT_TRUE(kept) << kept.error().message;
-    keeper = std::move(kept->keeper);
+    store = std::move(kept->store);
     host = std::make_unique<RoomHost>(std::move(kept->room), HostRates{.tick = 0ns, .mesh = 1s, .pieces = 0ns}, nullptr,
-                                      Detail::automatic, keeper.get());
+                                      Detail::automatic, store.get());
   }
-  RoomKeeper::Options options() {
-    RoomKeeper::Options options;
+  RoomStore::Options options() {
+    RoomStore::Options options;
     options.name = "femur";
     options.journal.disk = &disk;
     return options;
@@ -90,7 +90,7 @@ class BegunSession : public ::testing::Test {
   // What no transaction has is lost.
   void kill() {
     host.reset();
-    keeper.reset();
+    store.reset();
     sinks.clear();
   }
   void tick(bool keep) { host->tick(now += 8ms, keep); }
@@ -119,7 +119,7 @@ class BegunSession : public ::testing::Test {
   }
 
   test::MemoryDisk disk{1};
-  std::unique_ptr<RoomKeeper> keeper;
+  std::unique_ptr<RoomStore> store;
   std::unique_ptr<RoomHost> host;
   std::vector<std::shared_ptr<Told>> sinks;  // the host's until they go
   std::chrono::nanoseconds now{};
@@ -139,16 +139,16 @@ std::uint64_t furthest(const Told& sink) {
 }
 
 TEST_F(BegunSession, TellsNothingBeforeItIsKept) {
-  const RoomSeq kept = keeper->head().place;
+  const RoomSeq kept = store->head().place;
   change_all();
   ASSERT_EQ(host->room_seq().value, kept.value + 3) << "all of it is decided";
-  ASSERT_EQ(keeper->head().place, kept) << "and none of it kept";
+  ASSERT_EQ(store->head().place, kept) << "and none of it kept";
   const auto hand = session();
   tick(false);
   tick(false);
   EXPECT_TRUE(hand->told.empty()) << hand->told.front().ShortDebugString();
   tick(true);
-  ASSERT_EQ(keeper->head().place.value, kept.value + 3);
+  ASSERT_EQ(store->head().place.value, kept.value + 3);
   EXPECT_GT(count(*hand, v1::SessionResponse::kTool), 0u);
   EXPECT_GT(count(*hand, v1::SessionResponse::kLeaf), 0u);
   ASSERT_EQ(count(*hand, v1::SessionResponse::kScene), 1u);

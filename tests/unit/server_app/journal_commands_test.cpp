@@ -8,7 +8,7 @@
 
 #include "common/volume/field_file.hpp"
 #include "server/journal/signing.hpp"
-#include "server/journal/upkeep.hpp"
+#include "server/journal/maintenance.hpp"
 #include "server/net/room_owners.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/temp_dir.hpp"
@@ -33,13 +33,13 @@ class JournalCommands : public ::testing::Test {
   void SetUp() override {
     ASSERT_TRUE(test_block().save(dir_ / "case"));
     KeptCuts kept(file_, nullptr, "femur");
-    ASSERT_EQ(kept.keeper->person("Anna").value(), 1u);
+    ASSERT_EQ(kept.store->person("Anna").value(), 1u);
     kept.cut(4);
     for (int i = 0; i < 40; ++i)
       ASSERT_TRUE(kept.room->mark(kept.hand, std::to_string(kept.room->room_seq().value + 1) + "." + std::string(20, 'x')));
     kept.keep();
-    last_ = kept.keeper->head().place.value;
-    ASSERT_TRUE(kept.keeper->close());
+    last_ = kept.store->head().place.value;
+    ASSERT_TRUE(kept.store->close());
     whole_ = bytes_of(file_);
   }
   // One bit of the row 10 places before the last.

@@ -1,4 +1,4 @@
-// What a RoomKeeper does beside the commits of a room in use.
+// What a RoomStore does beside the commits of a room in use.
 #include <algorithm>
 #include <optional>
 #include <utility>
@@ -6,7 +6,7 @@
 #include "common/field/field_hash.hpp"
 #include "server/journal/journal_file.hpp"
 #include "server/net/forgetting.hpp"
-#include "server/net/room_keeper.hpp"
+#include "server/net/room_store.hpp"
 
 namespace osteon {
 namespace {
@@ -15,7 +15,7 @@ constexpr std::size_t kSliceRows = 256;  // read and hashed in a millisecond or 
 
 }  // namespace
 
-Result<void> RoomKeeper::each_row(JournalHead& at, RoomSeq last, const std::function<bool(const JournalRow&)>& take) {
+Result<void> RoomStore::each_row(JournalHead& at, RoomSeq last, const std::function<bool(const JournalRow&)>& take) {
   while (at.place < last) {
     Result<JournalSlice> slice =
         with_journal([&](Journal& journal) -> Result<JournalSlice> { return journal.read_slice(at, last, kSliceRows); });
@@ -30,7 +30,7 @@ Result<void> RoomKeeper::each_row(JournalHead& at, RoomSeq last, const std::func
   return {};
 }
 
-Result<void> RoomKeeper::read(RoomSeq from, RoomSeq to, const std::function<bool(const RoomRow&)>& take) {
+Result<void> RoomStore::read(RoomSeq from, RoomSeq to, const std::function<bool(const RoomRow&)>& take) {
   Result<JournalHead> at = with_journal([&](Journal& journal) -> Result<JournalHead> {
     to = std::min(to, journal.head().place);
     if (from > to) return JournalHead{to, {}};
@@ -46,7 +46,7 @@ Result<void> RoomKeeper::read(RoomSeq from, RoomSeq to, const std::function<bool
   return outcome ? read : outcome;
 }
 
-Result<void> RoomKeeper::run(JournalCopy& copy, const UpkeepCalls& calls) {
+Result<void> RoomStore::run(JournalCopy& copy, const MaintenanceCalls& calls) {
   for (Result<bool> done = false; !*done;) {
     if (closing_) return is_closed();
     if (calls.stop && calls.stop()) return given_up("the copy of " + file_.string());
@@ -59,22 +59,22 @@ Result<void> RoomKeeper::run(JournalCopy& copy, const UpkeepCalls& calls) {
   return {};
 }
 
-Result<JournalHead> RoomKeeper::backup(const std::filesystem::path& to, const UpkeepCalls& calls) {
+Result<JournalHead> RoomStore::backup(const std::filesystem::path& to, const MaintenanceCalls& calls) {
   Result<JournalCopy> copy = with_journal([&](Journal& journal) { return JournalCopy::begin(journal, to); });
   if (!copy) return tl::unexpected(copy.error());
   if (const Result<void> done = run(*copy, calls); !done) return tl::unexpected(done.error());
   return copy->head();
 }
 
-Result<JournalHead> RoomKeeper::branch(const std::filesystem::path& to, RoomSeq place, const std::string& name,
-                                       const UpkeepCalls& calls) {
+Result<JournalHead> RoomStore::branch(const std::filesystem::path& to, RoomSeq place, const std::string& name,
+                                       const MaintenanceCalls& calls) {
   Result<JournalCopy> copy = with_journal([&](Journal& journal) { return begin_branch(journal, to, place, name); });
   if (!copy) return tl::unexpected(copy.error());
   if (const Result<void> done = run(*copy, calls); !done) return tl::unexpected(done.error());
   return copy->head();
 }
 
-Result<RoomReport> RoomKeeper::verify(const Case& bone, const std::optional<BoneAt>& live, const UpkeepCalls& calls) {
+Result<RoomReport> RoomStore::verify(const Case& bone, const std::optional<BoneAt>& live, const MaintenanceCalls& calls) {
   std::optional<Room> room;
   if (live) {
     Result<Room> begun = begin_room(bone, genesis_, {});
@@ -138,7 +138,7 @@ Result<RoomReport> RoomKeeper::verify(const Case& bone, const std::optional<Bone
 }
 
 // Without the journal's lock: a checkpoint's file never changes.
-Result<void> RoomKeeper::check_bytes(const Checkpoint& one, RoomReport& report) {
+Result<void> RoomStore::check_bytes(const Checkpoint& one, RoomReport& report) {
   std::string bytes;
   const std::filesystem::path file = checkpoint_file(file_, one.at);
   const auto read = read_in_pieces(disk_, file, [&](std::string_view piece) {
@@ -161,11 +161,11 @@ Result<void> RoomKeeper::check_bytes(const Checkpoint& one, RoomReport& report) 
   return {};
 }
 
-Result<std::vector<Person>> RoomKeeper::people() {
+Result<std::vector<Person>> RoomStore::people() {
   return with_journal([](Journal& journal) { return journal.people(); });
 }
 
-Result<bool> RoomKeeper::forget(std::uint32_t person) {
+Result<bool> RoomStore::forget(std::uint32_t person) {
   return with_journal([&](Journal& journal) {
            return forget_people(
                journal, [](const Person&) { return false; }, person);
@@ -175,7 +175,7 @@ Result<bool> RoomKeeper::forget(std::uint32_t person) {
       });
 }
 
-Result<std::size_t> RoomKeeper::forget_old() {
+Result<std::size_t> RoomStore::forget_old() {
   return with_journal([&](Journal& journal) -> Result<std::size_t> {
     if (retention_days_ <= 0) return 0;
     const std::int32_t day = today_() - retention_days_;
@@ -186,7 +186,7 @@ Result<std::size_t> RoomKeeper::forget_old() {
   });
 }
 
-Result<void> RoomKeeper::export_person(std::uint32_t person, const std::function<bool(const std::string&)>& take) {
+Result<void> RoomStore::export_person(std::uint32_t person, const std::function<bool(const std::string&)>& take) {
   RoomSeq last;
   JournalHead at;
   const auto people = with_journal([&](Journal& journal) {
@@ -210,7 +210,7 @@ Result<void> RoomKeeper::export_person(std::uint32_t person, const std::function
   return read;
 }
 
-Result<void> RoomKeeper::tidy_if_idle() {
+Result<void> RoomStore::tidy_if_idle() {
   return with_journal([&](Journal& journal) -> Result<void> {
     const RoomSeq now = journal.head().place;
     const bool idle = idle_at_ == now;
@@ -220,7 +220,7 @@ Result<void> RoomKeeper::tidy_if_idle() {
   });
 }
 
-Result<bool> RoomKeeper::has_head(const JournalHead& head) {
+Result<bool> RoomStore::has_head(const JournalHead& head) {
   return with_journal([&](Journal& journal) -> Result<bool> {
     if (head.place > journal.head().place) return false;
     return journal.head_at(head.place).map([&](const JournalHead& here) { return here == head; });

@@ -1,5 +1,5 @@
 // Checking, backing up, recovering and migrating journals as files.
-#include "server/journal/upkeep.hpp"
+#include "server/journal/maintenance.hpp"
 
 #include <gmock/gmock.h>
 #include <sqlite3.h>

@@ -18,16 +18,16 @@
 
 #include "common/link/random_bytes.hpp"
 #include "server/journal/journal.hpp"
-#include "server/journal/upkeep.hpp"
+#include "server/journal/maintenance.hpp"
 #include "server/net/journal_rows.hpp"
 #include "server/net/room_files.hpp"
 #include "server/room/room.hpp"
 
 namespace osteon {
 
-struct KeptRoom;
+struct PersistedRoom;
 
-// A mutex that is given in the order in which it was asked for: so that upkeep, which takes it again and again, lets a commit
+// A mutex that is given in the order in which it was asked for: so that maintenance, which takes it again and again, lets a commit
 // through after every slice, and is let through itself between commits.
 class InTurn {
  public:
@@ -75,7 +75,7 @@ inline constexpr std::chrono::nanoseconds kTimeAway = std::chrono::seconds(4);
 
 // Any thread. What takes long holds the journal for a slice of rows at a time, between which rows are written. After close()
 // every function returns the error unavailable.
-class RoomKeeper {
+class RoomStore {
  public:
   struct Options {
     std::string name = "room";          // of a new one
@@ -90,7 +90,7 @@ class RoomKeeper {
   // file. `progress` hears the fraction of the rows replayed. Errors: those of Journal::open; unsupported (of another case,
   // kernel or release); invalid_input (rows that cannot be: then recover). A journal that is closed to rows still gives its
   // room, which takes none.
-  [[nodiscard]] static Result<KeptRoom> open(const std::filesystem::path& file, const Case& bone, const Options& options,
+  [[nodiscard]] static Result<PersistedRoom> open(const std::filesystem::path& file, const Case& bone, const Options& options,
                                              const std::function<void(double)>& progress = {});
 
   // Returns when the rows are safe on the disk: for a Committer. Places go on from the last one.
@@ -130,13 +130,13 @@ class RoomKeeper {
   // fields against their hash; what else vouches for places. `live`, of a place that is kept: the rows are also replayed
   // into a fresh room of this case up to there, which takes as long as all its cuts, and the bones compared. What is damaged
   // is told in the report. Errors: unavailable (`live` is beyond the head), cancelled, unsupported (of another case).
-  [[nodiscard]] Result<RoomReport> verify(const Case& bone, const std::optional<BoneAt>& live, const UpkeepCalls& calls = {});
+  [[nodiscard]] Result<RoomReport> verify(const Case& bone, const std::optional<BoneAt>& live, const MaintenanceCalls& calls = {});
   // A copy of the journal as it is now, with its people and checkpoints: there whole or not at all. Gives its head. Errors:
   // exists (something is in `to`), invalid_input (damaged: nothing is copied), cancelled.
-  [[nodiscard]] Result<JournalHead> backup(const std::filesystem::path& to, const UpkeepCalls& calls = {});
+  [[nodiscard]] Result<JournalHead> backup(const std::filesystem::path& to, const MaintenanceCalls& calls = {});
   // As branch_journal().
   [[nodiscard]] Result<JournalHead> branch(const std::filesystem::path& to, RoomSeq place, const std::string& name,
-                                           const UpkeepCalls& calls = {});
+                                           const MaintenanceCalls& calls = {});
 
   // Whether this head is of its history: for branches_of().
   [[nodiscard]] Result<bool> has_head(const JournalHead& head);
@@ -144,7 +144,7 @@ class RoomKeeper {
   // All leaves of the room as it was at `place`, while rows may have gone on, so that the next opening need not evaluate every
   // cut again: written and synced in pieces, noted in a transaction of its own. Nothing happens where the rows up to there
   // are not kept yet, or a checkpoint goes as far. Error cancelled.
-  [[nodiscard]] Result<void> checkpoint(RoomSeq place, std::span<const FieldLeaf> leaves, const UpkeepCalls& calls = {});
+  [[nodiscard]] Result<void> checkpoint(RoomSeq place, std::span<const FieldLeaf> leaves, const MaintenanceCalls& calls = {});
   // Rows since the newest checkpoint that the next opening would have to evaluate: for CheckpointPolicy.
   [[nodiscard]] std::uint64_t changes_since_checkpoint() const;
   // Carries the journal's log into its file where no row has come since this was asked the last time: for every few seconds.
@@ -153,7 +153,7 @@ class RoomKeeper {
   [[nodiscard]] Result<void> close();
 
  private:
-  RoomKeeper(std::filesystem::path file, Journal journal, RoomGenesis genesis, double pitch_mm, Disk& disk);
+  RoomStore(std::filesystem::path file, Journal journal, RoomGenesis genesis, double pitch_mm, Disk& disk);
   // Of the newest checkpoint that can be read; nothing where there is none.
   struct Fields {
     RoomSeq place;
@@ -180,7 +180,7 @@ class RoomKeeper {
   [[nodiscard]] Digest seal_of(const JournalHead& head) const;
   // Rows after `at`, which goes on with them, up to `last`. Error invalid_input: the row after `at` does not fit the chain.
   [[nodiscard]] Result<void> each_row(JournalHead& at, RoomSeq last, const std::function<bool(const JournalRow&)>& take);
-  [[nodiscard]] Result<void> run(JournalCopy& copy, const UpkeepCalls& calls);
+  [[nodiscard]] Result<void> run(JournalCopy& copy, const MaintenanceCalls& calls);
   // What is wrong with a checkpoint's bytes; nothing also where it has been replaced by a newer one meanwhile.
   [[nodiscard]] Result<void> check_bytes(const Checkpoint& one, RoomReport& report);
 
@@ -203,9 +203,9 @@ class RoomKeeper {
   std::uint64_t server_epoch_ = 0, evaluated_ = 0;
 };
 
-struct KeptRoom {
+struct PersistedRoom {
   Room room;
-  std::unique_ptr<RoomKeeper> keeper;
+  std::unique_ptr<RoomStore> store;
   bool made = false;              // there was no journal
 };
 

@@ -1,4 +1,4 @@
-#include "server/net/room_keeper.hpp"
+#include "server/net/room_store.hpp"
 
 #include <algorithm>
 #include <array>
@@ -78,21 +78,21 @@ void InTurn::unlock() {
   next_.notify_all();
 }
 
-RoomKeeper::RoomKeeper(std::filesystem::path file, Journal journal, RoomGenesis genesis, double pitch_mm, Disk& disk)
+RoomStore::RoomStore(std::filesystem::path file, Journal journal, RoomGenesis genesis, double pitch_mm, Disk& disk)
     : journal_(std::move(journal)), file_(std::move(file)), genesis_(std::move(genesis)), pitch_mm_(pitch_mm), disk_(disk) {}
 
-tl::unexpected<Error> RoomKeeper::is_closed() const {
+tl::unexpected<Error> RoomStore::is_closed() const {
   return failure(ErrorCode::unavailable, "the room " + genesis_.room + " is closed; open it again");
 }
 
-void RoomKeeper::note_closing() {
+void RoomStore::note_closing() {
   const Error* why = journal_ ? journal_->closed_because() : nullptr;
   if (why == nullptr || closed_to_rows_ != nullptr) return;
   why_closed_to_rows_ = *why;
   closed_to_rows_ = &*why_closed_to_rows_;
 }
 
-Result<KeptRoom> RoomKeeper::open(const std::filesystem::path& file, const Case& bone, const Options& options,
+Result<PersistedRoom> RoomStore::open(const std::filesystem::path& file, const Case& bone, const Options& options,
                                   const std::function<void(double)>& progress) {
   Result<Journal> journal = Journal::open(file, options.journal);
   bool made = false;
@@ -110,30 +110,30 @@ Result<KeptRoom> RoomKeeper::open(const std::filesystem::path& file, const Case&
     return tl::unexpected(named.error());
   }
   genesis->room = options.name;  // which it may have been given since
-  std::unique_ptr<RoomKeeper> keeper(new RoomKeeper(file, std::move(*journal), std::move(*genesis), bone.pitch_mm(),
+  std::unique_ptr<RoomStore> store(new RoomStore(file, std::move(*journal), std::move(*genesis), bone.pitch_mm(),
                                                     options.journal.disk != nullptr ? *options.journal.disk : system_disk()));
-  for (const std::string& note : keeper->journal_->notes())
+  for (const std::string& note : store->journal_->notes())
     log::warn("journal", {{"file", file.string()}, {"note", note}});
-  if (const Error* closed = keeper->journal_->closed_because())
+  if (const Error* closed = store->journal_->closed_because())
     log::warn("journal takes no rows", {{"file", file.string()}, {"reason", closed->message}});
-  else if (Result<std::uint64_t> epoch = keeper->journal_->next_server_epoch(); epoch)
-    keeper->server_epoch_ = *epoch;
+  else if (Result<std::uint64_t> epoch = store->journal_->next_server_epoch(); epoch)
+    store->server_epoch_ = *epoch;
   else
     return tl::unexpected(epoch.error());
-  if (Result<void> key = keeper->find_witness_key(options); !key) return tl::unexpected(key.error());
-  keeper->retention_days_ = options.retention_days;
-  keeper->today_ = options.today ? options.today : computers_day;
-  if (const auto forgotten = keeper->forget_old(); !forgotten)
+  if (Result<void> key = store->find_witness_key(options); !key) return tl::unexpected(key.error());
+  store->retention_days_ = options.retention_days;
+  store->today_ = options.today ? options.today : computers_day;
+  if (const auto forgotten = store->forget_old(); !forgotten)
     log::warn("people who should be forgotten are not", {{"file", file.string()}, {"reason", forgotten.error().message}});
-  const Fields fields = keeper->newest_fields();
-  Result<Room> room = keeper->replay(bone, options.limits, fields, progress);
+  const Fields fields = store->newest_fields();
+  Result<Room> room = store->replay(bone, options.limits, fields, progress);
   if (!room) return failure(room.error().code, file.string() + ": " + room.error().message);
-  keeper->evaluated_ = keeper->journal_->head().place.value - fields.place.value;
-  keeper->note_closing();
-  return KeptRoom{std::move(*room), std::move(keeper), made};
+  store->evaluated_ = store->journal_->head().place.value - fields.place.value;
+  store->note_closing();
+  return PersistedRoom{std::move(*room), std::move(store), made};
 }
 
-RoomKeeper::Fields RoomKeeper::newest_fields() {
+RoomStore::Fields RoomStore::newest_fields() {
   const Result<std::vector<Checkpoint>> checkpoints = journal_->checkpoints();
   if (!checkpoints) return {};
   for (const Checkpoint& one : *checkpoints) {
@@ -146,14 +146,14 @@ RoomKeeper::Fields RoomKeeper::newest_fields() {
   return {};
 }
 
-Result<std::vector<FieldLeaf>> RoomKeeper::fields_of(const Checkpoint& one, std::string_view bytes) const {
+Result<std::vector<FieldLeaf>> RoomStore::fields_of(const Checkpoint& one, std::string_view bytes) const {
   std::optional<std::vector<FieldLeaf>> leaves = leaves_of(bytes);
   if (leaves && to_hex(field_hash(*leaves, pitch_mm_)) == one.meta) return std::move(*leaves);
   return failure(ErrorCode::invalid_input, checkpoint_file(file_, one.at).string() +
                                                " does not hold the fields that it says it holds; remove it");
 }
 
-Result<Room> RoomKeeper::replay(const Case& bone, const CutLimits& limits, const Fields& fields,
+Result<Room> RoomStore::replay(const Case& bone, const CutLimits& limits, const Fields& fields,
                                 const std::function<void(double)>& progress) {
   Result<Room> room = begin_room(bone, genesis_, limits);
   if (!room) return room;
@@ -175,7 +175,7 @@ Result<Room> RoomKeeper::replay(const Case& bone, const CutLimits& limits, const
   return room;
 }
 
-Result<void> RoomKeeper::write(std::span<const RoomRow> rows) {
+Result<void> RoomStore::write(std::span<const RoomRow> rows) {
   std::vector<JournalRow> out;
   out.reserve(rows.size());
   for (const RoomRow& row : rows) out.push_back({row.place, row.at.count(), to_bytes(row)});
@@ -187,12 +187,12 @@ Result<void> RoomKeeper::write(std::span<const RoomRow> rows) {
   });
 }
 
-JournalHead RoomKeeper::head() const {
+JournalHead RoomStore::head() const {
   const std::lock_guard in_turn(turn_);
   return journal_ ? journal_->head() : last_;
 }
 
-Result<std::uint32_t> RoomKeeper::person(const std::string& label) {
+Result<std::uint32_t> RoomStore::person(const std::string& label) {
   return with_journal([&](Journal& journal) -> Result<std::uint32_t> {
     const Result<std::vector<Person>> people = journal.people();
     if (!people) return tl::unexpected(people.error());
@@ -212,7 +212,7 @@ Result<std::uint32_t> RoomKeeper::person(const std::string& label) {
   });
 }
 
-Result<void> RoomKeeper::find_witness_key(const Options& options) {
+Result<void> RoomStore::find_witness_key(const Options& options) {
   Result<std::optional<std::string>> known = journal_->find_register(kWitnessRegister);
   if (known && *known) {
     witness_key_ = std::move(**known);
@@ -224,7 +224,7 @@ Result<void> RoomKeeper::find_witness_key(const Options& options) {
   return journal_->closed_because() ? Result<void>{} : journal_->set_register(kWitnessRegister, witness_key_);
 }
 
-Digest RoomKeeper::seal_of(const JournalHead& head) const {
+Digest RoomStore::seal_of(const JournalHead& head) const {
   Hasher hasher;
   hasher.text("osteon witness");
   hasher.text(witness_key_);
@@ -233,12 +233,12 @@ Digest RoomKeeper::seal_of(const JournalHead& head) const {
   return hasher.finish();
 }
 
-Witness RoomKeeper::witness() const {
+Witness RoomStore::witness() const {
   const JournalHead at = head();
   return {at, seal_of(at)};
 }
 
-Result<void> RoomKeeper::check_witness(const Witness& witness) {
+Result<void> RoomStore::check_witness(const Witness& witness) {
   const std::string room = "the room " + genesis_.room;
   const std::string told = std::to_string(witness.head.place.value) + kToldEvents;
   const bool sealed = witness.seal == seal_of(witness.head), without_seal = witness.seal == Digest{};
@@ -287,7 +287,7 @@ std::chrono::nanoseconds reopened_time(const Room& room) {
   return room.room_seq() ? room.time() + kTimeAway : room.time();
 }
 
-Result<void> RoomKeeper::checkpoint(RoomSeq place, std::span<const FieldLeaf> leaves, const UpkeepCalls& calls) {
+Result<void> RoomStore::checkpoint(RoomSeq place, std::span<const FieldLeaf> leaves, const MaintenanceCalls& calls) {
   const std::lock_guard one_at_a_time(checkpointing_);
   const auto needed = with_journal([&](Journal& journal) -> Result<std::optional<JournalHead>> {
     if (!place || place > journal.head().place) return std::nullopt;
@@ -324,12 +324,12 @@ Result<void> RoomKeeper::checkpoint(RoomSeq place, std::span<const FieldLeaf> le
   });
 }
 
-std::uint64_t RoomKeeper::changes_since_checkpoint() const {
+std::uint64_t RoomStore::changes_since_checkpoint() const {
   const std::lock_guard in_turn(turn_);
   return changes_.size();
 }
 
-Result<void> RoomKeeper::close() {
+Result<void> RoomStore::close() {
   closing_ = true;
   const std::lock_guard no_checkpoint(checkpointing_);
   return with_journal([&](Journal& journal) {

@@ -1,4 +1,4 @@
-#include "server/journal/upkeep.hpp"
+#include "server/journal/maintenance.hpp"
 
 #include <algorithm>
 #include <utility>
