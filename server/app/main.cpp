@@ -38,7 +38,7 @@ using namespace osteon;
 constexpr const char* kProgram = "osteon-server";
 constexpr std::chrono::seconds kHealthEvery{10};
 
-void log_health(const std::string& room, const HostHealth& health) {
+void log_health(const std::string& room, const RuntimeHealth& health) {
   log::info("health", {{"room", room},
                        {"room_seq", health.room_seq.value},
                        {"committed", health.counts.committed},
@@ -75,7 +75,7 @@ nlohmann::json durations(const DurationHistogram& histogram) {
 }
 
 nlohmann::json summary_of(const RoomSummary& summary) {
-  const HostHealth& health = summary.health;
+  const RuntimeHealth& health = summary.health;
   nlohmann::json bodies = nlohmann::json::array();
   for (const BodyId body : summary.bone.bodies) bodies.push_back(body.value);
   return {{"case_hash", to_hex(summary.case_hash)},
@@ -319,7 +319,7 @@ Result<void> run(const ServerConfig& options, const StopSignal& stop) {
   if (!rooms) return tl::unexpected(rooms.error());
   Result<std::unique_ptr<RoomServer>> server = RoomServer::start(std::move(*rooms), options.listen, connections);
   if (!server) return tl::unexpected(server.error());
-  const HostHealth first = (*server)->health();
+  const RuntimeHealth first = (*server)->health();
   log::info("listening", {{"address", (*server)->address()},
                           {"udp_port", (*server)->link_port()},
                           {"surface_blocks", first.blocks},

@@ -188,7 +188,7 @@ std::shared_ptr<OpenRoom> room_of_member(const Rooms& rooms, const grpc::Callbac
                                          grpc::ServerUnaryReactor* reactor, const Request& request) {
   const AuthorId author{request.author()};
   std::shared_ptr<OpenRoom> room = room_of(rooms, context, reactor, author);
-  if (!room || room->host().knows(author)) return room;
+  if (!room || room->runtime().knows(author)) return room;
   refuse(reactor, not_joined(std::string(Request::descriptor()->name()).c_str(), author.value));
   return nullptr;
 }
@@ -197,7 +197,7 @@ std::shared_ptr<OpenRoom> room_of_member(const Rooms& rooms, const grpc::Callbac
 template <class Fill>
 grpc::ServerUnaryReactor* change_room(OpenRoom& room, grpc::ServerUnaryReactor* reactor,
                                       std::function<Result<RoomEvent>(Room&)> event, Fill fill) {
-  room.host().queue_event(std::move(event), [reactor, fill](const Result<RoomEvent>& decided) {
+  room.runtime().queue_event(std::move(event), [reactor, fill](const Result<RoomEvent>& decided) {
     if (decided) fill(*decided);
     reactor->Finish(decided ? Status::OK : status_of(decided.error()));
   });

@@ -39,8 +39,8 @@ struct Recorded {
 // One thread of its own makes the cuts; the room's threads say what became of them.
 class Demonstration final : public SessionSink, public std::enable_shared_from_this<Demonstration> {
  public:
-  Demonstration(RoomHost& host, AuthorId author, std::vector<Recorded> cuts, double speed)
-      : host_(host), author_(author), cuts_(std::move(cuts)), speed_(speed) {}
+  Demonstration(RoomRuntime& runtime, AuthorId author, std::vector<Recorded> cuts, double speed)
+      : runtime_(runtime), author_(author), cuts_(std::move(cuts)), speed_(speed) {}
 
   // Before start(). `by` may be whoever they were when they asked; a newer session of theirs leaves what they started alone.
   [[nodiscard]] Result<void> stand_under(Authorizer& authorizer, const Caller& by, const std::string& room) {
@@ -53,7 +53,7 @@ class Demonstration final : public SessionSink, public std::enable_shared_from_t
     return {};
   }
   [[nodiscard]] Result<void> start() {
-    if (Result<void> opened = host_.open_session(shared_from_this()); !opened) return opened;
+    if (Result<void> opened = runtime_.open_session(shared_from_this()); !opened) return opened;
     thread_ = std::thread([this] { run(); });
     return {};
   }
@@ -187,25 +187,25 @@ class Demonstration final : public SessionSink, public std::enable_shared_from_t
     std::optional<Clock::time_point> seen_at_work;
     for (Step step = next({}); step.what != Step::What::end; step = next(seen_at_work)) {
       if (step.what == Step::What::rest) {
-        for (CuttingState& state : tool.at_rest()) host_.offer_state(std::move(state));
+        for (CuttingState& state : tool.at_rest()) runtime_.offer_state(std::move(state));
         seen_at_work.reset();
         continue;
       }
       const Clock::time_point now = Clock::now();
-      host_.queue_cut(shared_from_this(), step.cut.cut, now);
-      if (std::optional<CuttingState> state = tool.see(step.cut.cut, host_.tools(), now.time_since_epoch())) {
-        host_.offer_state(std::move(*state));
+      runtime_.queue_cut(shared_from_this(), step.cut.cut, now);
+      if (std::optional<CuttingState> state = tool.see(step.cut.cut, runtime_.tools(), now.time_since_epoch())) {
+        runtime_.offer_state(std::move(*state));
         seen_at_work = now + Player::kSeenAfterCut;
       }
     }
-    host_.leave(*this);
+    runtime_.leave(*this);
     std::shared_ptr<OpenStream> watched;  // let go of without the lock, which its end takes
     const std::lock_guard lock(mutex_);
     over_ = true;
     watched = std::move(watched_);
   }
 
-  RoomHost& host_;
+  RoomRuntime& runtime_;
   const AuthorId author_;
   const std::vector<Recorded> cuts_;
   const double speed_;
@@ -251,7 +251,7 @@ Result<Recording> read_recording(Rooms& rooms, OpenRoom& in, const WhatToShow& w
   };
   const Result<RoomGenesis> genesis = rooms.read(what.room.empty() ? in.name : what.room, what.to, take);
   if (!genesis) return tl::unexpected(genesis.error());
-  if (genesis->case_hash != in.host().bone().hash())
+  if (genesis->case_hash != in.runtime().bone().hash())
     return failure(ErrorCode::invalid_input,
                    "room " + genesis->room + " is of another case; show one of the same bone");
   if (too_many)
@@ -272,9 +272,9 @@ Result<Recording> read_recording(Rooms& rooms, OpenRoom& in, const WhatToShow& w
 }
 
 // Waits until the room knows it.
-Result<void> add_tool(RoomHost& host, AuthorId by, const Tool& tool) {
+Result<void> add_tool(RoomRuntime& runtime, AuthorId by, const Tool& tool) {
   std::promise<Result<RoomEvent>> answer;
-  host.queue_event([by, tool](Room& room) { return room.add_tool(by, tool); },
+  runtime.queue_event([by, tool](Room& room) { return room.add_tool(by, tool); },
                    [&](const Result<RoomEvent>& added) { answer.set_value(added); });
   const Result<RoomEvent> added = answer.get_future().get();
   if (!added) return tl::unexpected(added.error());
@@ -294,10 +294,10 @@ Result<Shown> Demonstrations::begin(Rooms& rooms, OpenRoom& in, AuthorId by, con
   if (!recording) return tl::unexpected(recording.error());
   if (over_ || rooms.ending()) return failure(ErrorCode::unavailable, "the room is closed");
   if (recording->cuts.empty()) return failure(ErrorCode::not_found, "there is no cut to show");
-  RoomHost& host = in.host();
+  RoomRuntime& runtime = in.runtime();
   for (const Tool& tool : recording->tools)
-    if (!host.tools().find(tool.hash()))
-      if (const Result<void> known = add_tool(host, by, tool); !known) return tl::unexpected(known.error());
+    if (!runtime.tools().find(tool.hash()))
+      if (const Result<void> known = add_tool(runtime, by, tool); !known) return tl::unexpected(known.error());
 
   const std::lock_guard lock(mutex_);
   std::erase_if(going_on_, [](const auto& one) {
@@ -309,10 +309,10 @@ Result<Shown> Demonstrations::begin(Rooms& rooms, OpenRoom& in, AuthorId by, con
   if (going_on_.size() >= kMost)
     return failure(ErrorCode::unavailable,
                    "the room shows " + std::to_string(kMost) + " demonstrations already; end one first");
-  const Result<AuthorId> author = host.join(MemberKind::surgeon, "demonstrator", {}, Role::collaborator);
+  const Result<AuthorId> author = runtime.join(MemberKind::surgeon, "demonstrator", {}, Role::collaborator);
   if (!author) return tl::unexpected(author.error());
   const Shown shown{*author, recording->cuts.size()};
-  const auto one = std::make_shared<Demonstration>(host, *author, std::move(recording->cuts), what.speed);
+  const auto one = std::make_shared<Demonstration>(runtime, *author, std::move(recording->cuts), what.speed);
   if (rooms.authorizer)
     if (const Result<void> may = one->stand_under(*rooms.authorizer, caller, in.name); !may) return tl::unexpected(may.error());
   if (const Result<void> started = one->start(); !started) return tl::unexpected(started.error());

@@ -23,8 +23,8 @@ class PeopleStream final : public OutStream<WriteReactor>, public PeopleSink {
   PeopleStream(std::shared_ptr<OpenRoom> room, AuthorId author) : room_(std::move(room)), author_(author) {}
   void begin() {
     begun_ = true;
-    room_->host().people().came(author_);
-    room_->host().people().watch(*this);
+    room_->runtime().people().came(author_);
+    room_->runtime().people().watch(*this);
   }
 
   void changed() override {
@@ -42,14 +42,14 @@ class PeopleStream final : public OutStream<WriteReactor>, public PeopleSink {
                               .others_supervision = may_receive(StreamContent::others_supervision),
                               .own_words = may_receive(StreamContent::own_words),
                               .others_words = may_receive(StreamContent::others_words)};
-    const Bytes news = room_->host().people().news(cursor_, author_, rights);
+    const Bytes news = room_->runtime().people().news(cursor_, author_, rights);
     if (news) message = buffer_of({news});
     return news != nullptr;
   }
   void leave() override {
     if (!begun_) return;
-    room_->host().people().leave(*this);
-    room_->host().people().went(author_);
+    room_->runtime().people().leave(*this);
+    room_->runtime().people().went(author_);
   }
 
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
@@ -74,7 +74,7 @@ class PeopleServiceImpl final : public PeopleBase {
     const AuthorId author{request->author()};
     const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context, author);
     if (!room) return refused(status_of(room.error()));
-    if (!(*room)->host().knows(author)) return refused(not_joined("WatchPeopleRequest", request->author()));
+    if (!(*room)->runtime().knows(author)) return refused(not_joined("WatchPeopleRequest", request->author()));
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused(status_of(caller.error()));
     PeopleStream* stream = PeopleStream::launch(std::make_shared<PeopleStream>(*room, author), context);
@@ -93,7 +93,7 @@ class PeopleServiceImpl final : public PeopleBase {
     const AuthorId by{request->author()};
     std::vector<AuthorId> subjects{AuthorId{request->subject()}};
     if (request->subject() == 0) {
-      subjects = room->host().people().hands_overseen();
+      subjects = room->runtime().people().hands_overseen();
       std::erase(subjects, by);
       if (subjects.empty()) return refuse(reactor, {StatusCode::NOT_FOUND, "nobody else has a hand in this room"});
     }
@@ -110,7 +110,7 @@ class PeopleServiceImpl final : public PeopleBase {
     answer->left = subjects.size();
     const bool all = request->subject() == 0;
     for (const AuthorId subject : subjects)
-      room->host().queue_event([by, subject, word = *word, all, answer](Room& r) -> Result<RoomEvent> {
+      room->runtime().queue_event([by, subject, word = *word, all, answer](Room& r) -> Result<RoomEvent> {
                                  const People::Supervised& now = r.people().supervised(subject);
                                  const bool holds = all && now.supervision == word && r.people().oversees(by);
                                  if (!holds) return r.supervise(by, subject, word);
@@ -126,7 +126,7 @@ class PeopleServiceImpl final : public PeopleBase {
                                    answer->failed = decided.error();
                                  if (--answer->left > 0) return;
                                  // Of those for whom nothing was ever decided it holds from the beginning.
-                                 response->set_room_seq(answer->place ? answer->place.value : room->host().room_seq().value);
+                                 response->set_room_seq(answer->place ? answer->place.value : room->runtime().room_seq().value);
                                  lock.unlock();
                                  reactor->Finish(answer->failed ? status_of(*answer->failed) : Status::OK);
                                });
@@ -208,7 +208,7 @@ class PeopleServiceImpl final : public PeopleBase {
     const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
     // Not behind those that are about to begin.
-    room->host().run_slowly([room, reactor, which = AuthorId{request->demonstrator()}] {
+    room->runtime().run_slowly([room, reactor, which = AuthorId{request->demonstrator()}] {
       const Result<void> ended = room->demonstrations().end(which);
       reactor->Finish(ended ? Status::OK : status_of(ended.error()));
     });
@@ -219,7 +219,7 @@ class PeopleServiceImpl final : public PeopleBase {
   // Until none of the caller's is left.
   static void wipe_next(const std::shared_ptr<OpenRoom>& room, AuthorId by, grpc::ServerUnaryReactor* reactor,
                         v1::AnnotateResponse* response) {
-    room->host().queue_event(
+    room->runtime().queue_event(
         [by](Room& r) -> Result<RoomEvent> {
           for (const auto& [id, drawn] : r.people().annotations())
             if (drawn.author == by) return r.wipe_off(by, id);

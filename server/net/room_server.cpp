@@ -56,9 +56,9 @@ Result<std::unique_ptr<LinkServer>> hear_datagrams(const ConnectionOptions& conn
     return failure(ErrorCode::invalid_input, "--udp-listen " + connections.udp_listen +
                                                  " is reachable from other machines, but this server speaks plain "
                                                  "text; use 127.0.0.1 or [::1], or give --certificates DIR");
-  std::string host = at->host;
-  if (host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
-  return LinkServer::open(host, static_cast<std::uint16_t>(at->port)).map_error([&](const Error& error) {
+  std::string runtime = at->host;
+  if (runtime.front() == '[' && runtime.back() == ']') runtime = runtime.substr(1, runtime.size() - 2);
+  return LinkServer::open(runtime, static_cast<std::uint16_t>(at->port)).map_error([&](const Error& error) {
     return Error{error.code, "--udp-listen " + connections.udp_listen + ": " + error.message};
   });
 }
@@ -235,9 +235,9 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
 
 const std::string& RoomServer::address() const { return impl_->address; }
 Rooms& RoomServer::rooms() { return *impl_->rooms; }
-HostHealth RoomServer::health() const {
+RuntimeHealth RoomServer::health() const {
   const Result<std::shared_ptr<OpenRoom>> room = impl_->rooms->find("");
-  return room ? (*room)->host().health() : HostHealth{};
+  return room ? (*room)->runtime().health() : RuntimeHealth{};
 }
 std::uint16_t RoomServer::link_port() const { return impl_->links ? impl_->links->port() : 0; }
 ConnectionHealth RoomServer::connection_health() const {
@@ -248,7 +248,7 @@ LinkServerHealth RoomServer::link_health() const { return impl_->links ? impl_->
 void RoomServer::drain(std::chrono::milliseconds most, const std::function<bool(std::chrono::milliseconds)>& give_up) {
   const auto sessions = [&] {
     std::size_t open = 0;
-    for (const std::shared_ptr<OpenRoom>& room : impl_->rooms->open_rooms()) open += room->host().health().sessions;
+    for (const std::shared_ptr<OpenRoom>& room : impl_->rooms->open_rooms()) open += room->runtime().health().sessions;
     return open;
   };
   const auto until = std::chrono::steady_clock::now() + most;

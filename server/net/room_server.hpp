@@ -12,7 +12,7 @@
 #include "server/net/authorizer.hpp"
 #include "server/net/link_server.hpp"
 #include "server/net/listener.hpp"
-#include "server/net/room_host.hpp"
+#include "server/net/room_runtime.hpp"
 #include "server/net/room_store.hpp"
 #include "server/net/rooms.hpp"
 
@@ -46,7 +46,7 @@ struct RoomServerOptions {
   std::string listen = "127.0.0.1:0";   // HOST:PORT on this machine; port 0 lets the system choose
   std::filesystem::path case_folder;    // what clients are sent; holds the room's case
   std::filesystem::path save{};         // where the cut fields are written on request; empty: nowhere
-  HostRates rates{};
+  RuntimeRates rates{};
   Detail detail = Detail::automatic;
 };
 
@@ -69,7 +69,7 @@ class RoomServer {
 
   [[nodiscard]] const std::string& address() const;  // HOST:PORT with the real port
   [[nodiscard]] Rooms& rooms();
-  [[nodiscard]] HostHealth health() const;           // of the only room
+  [[nodiscard]] RuntimeHealth health() const;           // of the only room
   [[nodiscard]] std::uint16_t link_port() const;     // UDP; 0: there is no fast path
   [[nodiscard]] LinkServerHealth link_health() const;
   [[nodiscard]] ConnectionHealth connection_health() const;

@@ -124,7 +124,7 @@ OpenRoom::OpenRoom(std::string n, LoadedCase loaded, Room room, const RoomsOptio
   if (store_ && store_->evaluated() > kLongReplay)
     if (const Result<void> kept = store_->checkpoint(room.room_seq(), room.all_leaves()); !kept)
       log::warn("no checkpoint", {{"room", name}, {"reason", kept.error().message}});
-  host_ = std::make_unique<RoomHost>(std::move(room), options.rates, progress, options.detail, store_.get(), std::move(playback));
+  runtime_ = std::make_unique<RoomRuntime>(std::move(room), options.rates, progress, options.detail, store_.get(), std::move(playback));
 }
 
 void OpenRoom::note_version(AuthorId author, std::uint32_t version) {
@@ -142,27 +142,27 @@ std::uint32_t OpenRoom::version_of(AuthorId author) const {
 }
 
 void OpenRoom::end_streams(const std::string& why) {
-  host_->find_pieces();
-  host_->end_streams(why);
+  runtime_->find_pieces();
+  runtime_->end_streams(why);
 }
 
 void OpenRoom::send_away(const std::string& why) {
-  host_->find_pieces();
-  host_->send_away(why);
+  runtime_->find_pieces();
+  runtime_->send_away(why);
 }
 
 RoomSummary OpenRoom::close() {
   demonstrations_.end_all();
-  host_->stop();
+  runtime_->stop();
   if (store_) {
     // Nothing is lost where this fails: the next opening takes longer.
-    if (const Result<void> kept = store_->checkpoint(host_->room_seq(), host_->all_leaves()); !kept)
+    if (const Result<void> kept = store_->checkpoint(runtime_->room_seq(), runtime_->all_leaves()); !kept)
       log::warn("no checkpoint", {{"room", name}, {"reason", kept.error().message}});
     if (const Result<void> closed = store_->close(); !closed)
       log::warn("the journal was not closed cleanly", {{"room", name}, {"reason", closed.error().message}});
   }
-  return {host_->bone().hash(), host_->bone_status(), host_->health(), save, save.empty() ? SavedFields{} : host_->saved_fields(),
-          host_->surface_hash()};
+  return {runtime_->bone().hash(), runtime_->bone_status(), runtime_->health(), save, save.empty() ? SavedFields{} : runtime_->saved_fields(),
+          runtime_->surface_hash()};
 }
 
 void OpenRoom::maintain(const std::function<bool()>& stop) {
@@ -178,9 +178,9 @@ void OpenRoom::maintain(const std::function<bool()>& stop) {
   if (!due) return;
   newest_checkpoint_ = Clock::now();
   // Written here: whoever comes is answered by the thread that copies the leaves, and must not wait for the disk.
-  std::promise<RoomHost::Leaves> copied;
-  host_->run_slowly([&] { copied.set_value(host_->leaves_now()); });
-  const RoomHost::Leaves now = copied.get_future().get();
+  std::promise<RoomRuntime::Leaves> copied;
+  runtime_->run_slowly([&] { copied.set_value(runtime_->leaves_now()); });
+  const RoomRuntime::Leaves now = copied.get_future().get();
   if (const Result<void> kept = store_->checkpoint(now.place, now.leaves, {.progress = {}, .stop = stop}); !kept)
     log::warn("no checkpoint", {{"room", name}, {"reason", kept.error().message}});
 }
@@ -231,7 +231,7 @@ void Rooms::begin_drain(std::chrono::milliseconds again, const std::string& why)
     draining_ = why;
   }
   const std::vector<std::shared_ptr<OpenRoom>> rooms = open_rooms();
-  for (const std::shared_ptr<OpenRoom>& room : rooms) room->host().ask_to_redial(again, why);
+  for (const std::shared_ptr<OpenRoom>& room : rooms) room->runtime().ask_to_redial(again, why);
   // A demonstration is a session that nobody could ask.
   for (const std::shared_ptr<OpenRoom>& room : rooms) room->demonstrations().end_all();
 }
@@ -296,13 +296,13 @@ std::vector<RoomListing> Rooms::list() const {
   };
   for (const std::shared_ptr<OpenRoom>& room : open_rooms()) {
     RoomListing& listing = all[room->name];
-    const HostHealth health = room->host().health();
+    const RuntimeHealth health = room->runtime().health();
     if (room->store()) tell_origin(listing, room->store()->genesis());
     listing.name = room->name;
     listing.open = health.serving;
     listing.kept = room->store() != nullptr;
-    listing.case_hash = room->host().bone().hash();
-    listing.case_title = room->host().bone().info().title;
+    listing.case_hash = room->runtime().bone().hash();
+    listing.case_title = room->runtime().bone().info().title;
     listing.room_seq = health.room_seq;
     listing.sessions = health.sessions;
     listing.watchers = health.mesh_streams + health.cutting_streams;
@@ -371,9 +371,9 @@ std::shared_ptr<OpenRoom> Rooms::take_in(std::shared_ptr<OpenRoom> room) {
   }
   note_open();
   log::info("room open", {{"room", room->name},
-                          {"room_seq", room->host().room_seq().value},
+                          {"room_seq", room->runtime().room_seq().value},
                           {"kept", room->store() != nullptr},
-                          {"serving", !room->host().stopped()}});
+                          {"serving", !room->runtime().stopped()}});
   return room;
 }
 
@@ -633,14 +633,14 @@ Result<RoomReport> Rooms::verify(const std::string& name) {
   if (!room) return tl::unexpected(room.error());
   if (!(*room)->store()) return tl::unexpected(not_kept(name));
   std::promise<BoneStatus> bone;
-  (*room)->host().run_slowly([&] { bone.set_value((*room)->host().bone_status()); });
+  (*room)->runtime().run_slowly([&] { bone.set_value((*room)->runtime().bone_status()); });
   const BoneStatus status = bone.get_future().get();
   // What is decided is kept a moment later.
-  while ((*room)->store()->head().place < status.room_seq && !(*room)->host().stopped() && !ending_)
+  while ((*room)->store()->head().place < status.room_seq && !(*room)->runtime().stopped() && !ending_)
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   if ((*room)->store()->head().place < status.room_seq)
     return failure(ErrorCode::unavailable, "the room " + name + " has stopped; check its journal with osteon-server verify once the server has ended");
-  return (*room)->store()->verify((*room)->host().bone(), BoneAt{status.room_seq, status.field_hash}, until_the_end());
+  return (*room)->store()->verify((*room)->runtime().bone(), BoneAt{status.room_seq, status.field_hash}, until_the_end());
 }
 
 Result<JournalHead> Rooms::back_up(const std::string& name, const std::string& file_name, fs::path& file,

@@ -25,7 +25,7 @@
 #include "server/net/job_thread.hpp"
 #include "server/net/refusals.hpp"
 #include "server/net/room_files.hpp"
-#include "server/net/room_host.hpp"
+#include "server/net/room_runtime.hpp"
 #include "server/net/room_store.hpp"
 
 namespace osteon {
@@ -37,7 +37,7 @@ class Authorizer;
 struct RoomSummary {
   Digest case_hash;
   BoneStatus bone;
-  HostHealth health;
+  RuntimeHealth health;
   std::filesystem::path save;  // where its owner is to write `fields`; empty: nowhere, and they are
   SavedFields fields;
   Digest surface_hash;         // equal to every viewer's that has shown room_seq
@@ -58,7 +58,7 @@ struct RoomsOptions {
   std::filesystem::path folder{};     // of the journals NAME.journal; empty: rooms made here end with the process
   CutLimits limits{};
   std::function<std::shared_ptr<ToolBox>()> tools = builtin_tool_box;  // that a new room begins with: a box of its own
-  HostRates rates{};
+  RuntimeRates rates{};
   Detail detail = Detail::automatic;
   std::shared_ptr<const SigningKeys> keys = nullptr;  // sign the journals; null: nobody does
   int retention_days = 0;             // after which it is forgotten who somebody was; 0: never
@@ -83,7 +83,7 @@ class OpenRoom {
   const std::uint64_t server_epoch;   // rises with every opening
   std::optional<std::pair<std::string, RoomSeq>> shows;  // of a playback: which room, up to where
 
-  [[nodiscard]] RoomHost& host() { return *host_; }
+  [[nodiscard]] RoomRuntime& runtime() { return *runtime_; }
   [[nodiscard]] RoomStore* store() { return store_.get(); }  // null: it is lost when it is closed
   [[nodiscard]] std::filesystem::path keeper_file() const { return store_ ? store_->file() : std::filesystem::path{}; }
   // The version of the protocol that an author's newest join was made in; of one who never joined, this server's own.
@@ -104,9 +104,9 @@ class OpenRoom {
   using Clock = std::chrono::steady_clock;
   mutable std::mutex versions_mutex_;                     // never held with another
   std::map<AuthorId, std::uint32_t> older_versions_;      // of those that are not this server's own
-  std::unique_ptr<RoomStore> store_;  // outlives the host, which writes to it
-  std::unique_ptr<RoomHost> host_;
-  Demonstrations demonstrations_;       // in the host
+  std::unique_ptr<RoomStore> store_;  // outlives the runtime, which writes to it
+  std::unique_ptr<RoomRuntime> runtime_;
+  Demonstrations demonstrations_;       // in the runtime
   Clock::time_point newest_checkpoint_ = Clock::now(), forgotten_ = Clock::now();  // of maintenance
 };
 

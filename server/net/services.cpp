@@ -135,13 +135,13 @@ class RoomServiceImpl final : public RoomBase {
       rooms_.refusals.note("role", address_of(context->peer()), may.error().message);
       return refuse(reactor, status_of(may.error()));
     }
-    room->host().run_slowly([this, room, reactor, context, request, response, caller = *caller] {
-      RoomHost& host = room->host();
-      const Case& bone = host.bone();
+    room->runtime().run_slowly([this, room, reactor, context, request, response, caller = *caller] {
+      RoomRuntime& runtime = room->runtime();
+      const Case& bone = runtime.bone();
       const bool again = request->resume_author() != 0;
       const Authorizer::Coming coming = again ? Authorizer::Coming::again : Authorizer::Coming::anew;
       // First what the caller was told is kept: after a loss the caller's number may be another's.
-      if (const Result<void> kept = again ? check_kept(host, *request) : Result<void>(); !kept) {
+      if (const Result<void> kept = again ? check_kept(runtime, *request) : Result<void>(); !kept) {
         rooms_.refusals.note("loss", address_of(context->peer()), kept.error().message);
         return reactor->Finish(status_of(kept.error()));
       }
@@ -152,7 +152,7 @@ class RoomServiceImpl final : public RoomBase {
       }
       const std::optional<Role> role = rooms_.authorizer ? std::optional(caller.role) : std::nullopt;
       const Result<AuthorId> author =
-          again ? come_back(host, *request, role) : come(host, *request, *response, caller);
+          again ? come_back(runtime, *request, role) : come(runtime, *request, *response, caller);
       if (!author) {
         rooms_.refusals.note("room", address_of(context->peer()), author.error().message);
         return reactor->Finish(status_of(author.error()));
@@ -169,14 +169,14 @@ class RoomServiceImpl final : public RoomBase {
       response->set_author(author->value);
       response->set_room(room->name);
       response->set_server_epoch(room->server_epoch);
-      response->set_lease_epoch(host.lease_epoch(*author));
+      response->set_lease_epoch(runtime.lease_epoch(*author));
       response->set_case_hash(wire::to_wire(bone.hash()));
       response->set_case_title(bone.info().title);
       response->set_pitch_mm(bone.pitch_mm());
       const Box bounds = bone.bounds();
       *response->mutable_bounds_min_mm() = wire::to_wire(bounds.min_mm);
       *response->mutable_bounds_max_mm() = wire::to_wire(bounds.max_mm);
-      response->set_room_seq(host.room_seq().value);
+      response->set_room_seq(runtime.room_seq().value);
       response->set_role(static_cast<v1::Role>(caller.role));
       reactor->Finish(Status::OK);
     });
@@ -189,17 +189,17 @@ class RoomServiceImpl final : public RoomBase {
     if (!admitted<v1::GetStatusRequest>(rooms_, *context, reactor)) return reactor;
     const std::shared_ptr<OpenRoom> room = room_of(rooms_, *context, reactor);
     if (!room) return reactor;
-    room->host().run_slowly([room, reactor, response] {
-      const BoneStatus status = room->host().bone_status();
-      const HostHealth health = room->host().health();
+    room->runtime().run_slowly([room, reactor, response] {
+      const BoneStatus status = room->runtime().bone_status();
+      const RuntimeHealth health = room->runtime().health();
       response->set_room_seq(status.room_seq.value);
       response->set_field_hash(wire::to_wire(status.field_hash));
       response->set_removed_mm3(status.removed_mm3);
       response->set_rejected(status.counts.rejected);
       response->set_subscribers(static_cast<std::uint32_t>(health.mesh_streams + health.cutting_streams));
       for (const BodyId body : status.bodies) response->add_bodies(body.value);
-      for (const SceneItem& item : room->host().items()) *response->add_items() = wire::to_wire(item);
-      for (const auto& [place, label] : room->host().marks()) {
+      for (const SceneItem& item : room->runtime().items()) *response->add_items() = wire::to_wire(item);
+      for (const auto& [place, label] : room->runtime().marks()) {
         v1::RoomMark& mark = *response->add_marks();
         mark.set_room_seq(place.value);
         mark.set_label(label);
@@ -232,7 +232,7 @@ class RoomServiceImpl final : public RoomBase {
       // A ticket for a room opens no other room's case.
       const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context);
       if (!room) return refused(status_of(room.error()));
-      if ((*room)->host().bone().hash() != *hash)
+      if ((*room)->runtime().bone().hash() != *hash)
         return refused({StatusCode::PERMISSION_DENIED, "case " + to_hex(*hash) + " is not that of room " + (*room)->name});
       of_room = (*room)->name;
     }
@@ -247,7 +247,7 @@ class RoomServiceImpl final : public RoomBase {
     if (!admitted<v1::ListToolsRequest>(rooms_, *context, reactor)) return reactor;
     const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
-    for (const ToolBox::Entry* entry : room->host().tools().entries()) {
+    for (const ToolBox::Entry* entry : room->runtime().tools().entries()) {
       v1::KnownTool& tool = *response->add_tools();
       tool.set_tool_hash(wire::to_wire(entry->hash));
       tool.set_name(entry->tool.name);
@@ -266,7 +266,7 @@ class RoomServiceImpl final : public RoomBase {
     if (!room) return reactor;
     const Result<Digest> hash = wire::digest_from_wire(request->tool_hash());
     if (!hash) return refuse(reactor, invalid("tool_hash is not a digest of 32 bytes"));
-    const ToolBox::Entry* entry = room->host().tools().find(*hash);
+    const ToolBox::Entry* entry = room->runtime().tools().find(*hash);
     if (!entry) return refuse(reactor, {StatusCode::NOT_FOUND, "the room knows no tool " + to_hex(*hash)});
     *response->mutable_tool() = wire::to_wire(entry->tool);
     reactor->Finish(Status::OK);
@@ -389,13 +389,13 @@ class RoomServiceImpl final : public RoomBase {
     if (!name.empty() && (name != name.filename() || name.extension() != ".vdb" || request->file_name().front() == '.'))
       return refuse(reactor, invalid("file_name is not a plain name that ends in .vdb"));
     const std::filesystem::path file = name.empty() ? room->save : room->save.parent_path() / name;
-    room->host().run_slowly([room, reactor, response, file] {
-      room->host().find_pieces();
-      const SavedFields saved = room->host().saved_fields();
+    room->runtime().run_slowly([room, reactor, response, file] {
+      room->runtime().find_pieces();
+      const SavedFields saved = room->runtime().saved_fields();
       if (const Result<void> written = save_fields(file, saved); !written)
         return reactor->Finish(status_of(written.error()));
       response->set_room_seq(saved.room_seq.value);
-      response->set_field_hash(wire::to_wire(field_hash(saved.leaves, room->host().bone().pitch_mm())));
+      response->set_field_hash(wire::to_wire(field_hash(saved.leaves, room->runtime().bone().pitch_mm())));
       response->set_file(file.string());
       reactor->Finish(Status::OK);
     });
@@ -404,26 +404,26 @@ class RoomServiceImpl final : public RoomBase {
 
  private:
   // A new identity, and the secret that proves it.
-  static Result<AuthorId> come(RoomHost& host, const v1::JoinRequest& request, v1::JoinResponse& response, const Caller& caller) {
+  static Result<AuthorId> come(RoomRuntime& runtime, const v1::JoinRequest& request, v1::JoinResponse& response, const Caller& caller) {
     const MemberKind kind = request.kind() == v1::CLIENT_KIND_HAPTIC ? MemberKind::surgeon : MemberKind::watcher;
     std::array<std::uint8_t, 32> secret{};
     system_random()(secret);
     response.set_secret(secret.data(), secret.size());
     // Others see who it is by the certificate, where there is one.
-    return host.join(kind, caller.user.empty() ? request.name() : caller.user, digest_of_secret(response.secret()), caller.role);
+    return runtime.join(kind, caller.user.empty() ? request.name() : caller.user, digest_of_secret(response.secret()), caller.role);
   }
-  static Result<void> check_kept(RoomHost& host, const v1::JoinRequest& request) {
+  static Result<void> check_kept(RoomRuntime& runtime, const v1::JoinRequest& request) {
     if (request.kept_room_seq() == 0) return {};
     const Result<Digest> chain = wire::digest_from_wire(request.kept_chain());
     if (!chain) return failure(ErrorCode::invalid_input, "kept_chain is not a digest of 32 bytes");
     // Programs of before there were seals send none.
     const Result<Digest> seal = wire::digest_from_wire(request.kept_seal());
-    return host.check_kept({{RoomSeq{request.kept_room_seq()}, *chain}, seal ? *seal : Digest{}});
+    return runtime.check_kept({{RoomSeq{request.kept_room_seq()}, *chain}, seal ? *seal : Digest{}});
   }
   // After check_kept(). `role`: what the caller may be now; nothing: whatever it was.
-  static Result<AuthorId> come_back(RoomHost& host, const v1::JoinRequest& request, std::optional<Role> role) {
+  static Result<AuthorId> come_back(RoomRuntime& runtime, const v1::JoinRequest& request, std::optional<Role> role) {
     const AuthorId author{request.resume_author()};
-    const Result<void> may = host.resume(author, digest_of_secret(request.secret()), {}, role);
+    const Result<void> may = runtime.resume(author, digest_of_secret(request.secret()), {}, role);
     if (!may) return tl::unexpected(may.error());
     return author;
   }

@@ -32,7 +32,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   static constexpr std::string_view kMethod = "/osteon.v1.CuttingService/Session";
 
   SessionStream(std::shared_ptr<OpenRoom> room, LinkServer* links, Authorizer* authorizer, Caller caller)
-      : room_(std::move(room)), host_(room_->host()), links_(links), authorizer_(authorizer), caller_(std::move(caller)) {}
+      : room_(std::move(room)), runtime_(room_->runtime()), links_(links), authorizer_(authorizer), caller_(std::move(caller)) {}
   void start() {
     if (stand_under(authorizer_, caller_, room_->name, {}, kMethod)) StartRead(&request_);
   }
@@ -170,10 +170,10 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     version_ = room_->version_of(author_);
     const Digest secret = digest_of_secret(request.secret());
     // Reading goes on after the leaves were taken, so that no cut of this author is among them.
-    host_.run_slowly([this, keep = self(), secret] {
+    runtime_.run_slowly([this, keep = self(), secret] {
       const std::shared_ptr<SessionSink> sink(keep, this);
-      if (const Result<void> opened = host_.open_session(sink, secret); !opened) return close(invalid(opened.error().message));
-      // A reader that went away meanwhile has left the host's list before it was on it.
+      if (const Result<void> opened = runtime_.open_session(sink, secret); !opened) return close(invalid(opened.error().message));
+      // A reader that went away meanwhile has left the runtime's list before it was on it.
       if (!read_on()) leave();
     });
   }
@@ -206,25 +206,25 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
       ++queued_;
       taken_ = std::max(taken_, cut.author_seq);
     }
-    host_.queue_cut(std::shared_ptr<SessionSink>(self(), this), std::move(cut), RoomHost::Clock::now());
+    runtime_.queue_cut(std::shared_ptr<SessionSink>(self(), this), std::move(cut), RoomRuntime::Clock::now());
   }
   void take(CuttingState state) override {
-    if (may_carry(DatagramContent::tool_state)) host_.offer_state(std::move(state));
+    if (may_carry(DatagramContent::tool_state)) runtime_.offer_state(std::move(state));
   }
   void pushed(const BonePush& push) override {
-    if (may_carry(DatagramContent::bone_push)) host_.push_bone(author_, push);
+    if (may_carry(DatagramContent::bone_push)) runtime_.push_bone(author_, push);
   }
   void arrived(std::uint64_t index) override {
     const RoomSeq newest = [&] {
       const std::lock_guard lock(mutex_);
       return outbox_.arrived(index);
     }();
-    if (newest) host_.people().heard(author_, newest);
+    if (newest) runtime_.people().heard(author_, newest);
   }
   // Whoever was told of more than there is, by a server whose journal has lost its end, has heard all that is left: what was
   // lost is for the witness that it comes back with to show, and no reason to turn it away here.
   void hear(RoomSeq newest) {
-    host_.people().heard(author_, std::min(newest, host_.room_seq()));
+    runtime_.people().heard(author_, std::min(newest, runtime_.room_seq()));
     read_on();
   }
 
@@ -233,7 +233,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     if (!state) return close(invalid(state.error().message));
     if (state->author != author_) return close(invalid("state.author is not the author who opened the session"));
     if (!may_carry(DatagramContent::tool_state)) return close(not_allowed());
-    host_.offer_state(std::move(*state));
+    runtime_.offer_state(std::move(*state));
     read_on();
   }
 
@@ -241,7 +241,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     const Result<BonePush> push = wire::from_wire(message);
     if (!push) return close(invalid(push.error().message));
     if (!may_carry(DatagramContent::bone_push)) return close(not_allowed());
-    host_.push_bone(author_, *push);
+    runtime_.push_bone(author_, *push);
     read_on();
   }
 
@@ -333,7 +333,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     return !parts.empty();
   }
   void leave() override {
-    host_.leave(*this);
+    runtime_.leave(*this);
     if (opened_) log::info("session over", {{"room", room_->name}, {"author", author_.value}});
     // The reader may go while the session is being opened.
     const auto link = [&] {
@@ -344,13 +344,13 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   }
 
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
-  RoomHost& host_;                        // of room_
+  RoomRuntime& runtime_;                        // of room_
   LinkServer* const links_;
   Authorizer* const authorizer_;  // null: plain text
   const Caller caller_;
-  std::shared_ptr<SessionLink> link_;  // with the link server; set before the host tells of rows
+  std::shared_ptr<SessionLink> link_;  // with the link server; set before the runtime tells of rows
   ByteBuffer request_;
-  AuthorId author_;           // set before the host knows the stream, as the next
+  AuthorId author_;           // set before the runtime knows the stream, as the next
   std::uint32_t version_ = wire::kProtocolVersion;
   bool opened_ = false;       // only reactions to reads use it, and these come one by one
   SessionOutbox outbox_;

@@ -49,7 +49,7 @@ class MeshStream final : public OutStream<WriteReactor>, public MeshSink {
     return !parts.empty();
   }
   void drop_waiting() override { outbox_.reset(); }
-  void leave() override { room_->host().leave(*this); }
+  void leave() override { room_->runtime().leave(*this); }
 
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
   const AuthorId author_;
@@ -86,7 +86,7 @@ class CuttingStream final : public OutStream<WriteReactor>, public CuttingSink {
     if (!parts.empty()) message = buffer_of(parts);
     return !parts.empty();
   }
-  void leave() override { room_->host().leave(*this); }
+  void leave() override { room_->runtime().leave(*this); }
 
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
   const AuthorId author_;
@@ -107,7 +107,7 @@ class WatchServiceImpl final : public WatchBase {
     if (!request) return refused(invalid("the WatchMeshRequest could not be parsed"));
     const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context, AuthorId{request->author()});
     if (!room) return refused(status_of(room.error()));
-    if (!(*room)->host().knows(AuthorId{request->author()})) return refused(not_joined("WatchMeshRequest", request->author()));
+    if (!(*room)->runtime().knows(AuthorId{request->author()})) return refused(not_joined("WatchMeshRequest", request->author()));
     std::optional<Look> look;
     if (request->has_look()) {
       const Result<Look> stated = wire::from_wire(request->look());
@@ -118,7 +118,7 @@ class WatchServiceImpl final : public WatchBase {
     if (!caller) return refused(status_of(caller.error()));
     MeshStream* stream = MeshStream::launch(std::make_shared<MeshStream>(*room, AuthorId{request->author()}), context);
     if (stream->stand_under(rooms_.authorizer, *caller, (*room)->name, AuthorId{request->author()}, "/osteon.v1.WatchService/WatchMesh"))
-      (*room)->host().watch_mesh(*stream, look);
+      (*room)->runtime().watch_mesh(*stream, look);
     return stream;
   }
 
@@ -130,12 +130,12 @@ class WatchServiceImpl final : public WatchBase {
     const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context, AuthorId{request->author()});
     if (!room) {
       reactor->Finish(status_of(room.error()));
-    } else if (!(*room)->host().knows(AuthorId{request->author()})) {
+    } else if (!(*room)->runtime().knows(AuthorId{request->author()})) {
       reactor->Finish(not_joined("LookFromRequest", request->author()));
     } else if (!look) {
       reactor->Finish(invalid(look.error().message));
     } else {
-      (*room)->host().look(AuthorId{request->author()}, *look);
+      (*room)->runtime().look(AuthorId{request->author()}, *look);
       reactor->Finish(Status::OK);
     }
     return reactor;
@@ -147,13 +147,13 @@ class WatchServiceImpl final : public WatchBase {
     if (!request) return refused(invalid("the WatchCuttingRequest could not be parsed"));
     const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context, AuthorId{request->author()});
     if (!room) return refused(status_of(room.error()));
-    if (!(*room)->host().knows(AuthorId{request->author()})) return refused(not_joined("WatchCuttingRequest", request->author()));
+    if (!(*room)->runtime().knows(AuthorId{request->author()})) return refused(not_joined("WatchCuttingRequest", request->author()));
     const std::chrono::nanoseconds apart{request->most_hz() == 0 ? 0 : 1'000'000'000 / request->most_hz()};
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused(status_of(caller.error()));
     CuttingStream* stream = CuttingStream::launch(std::make_shared<CuttingStream>(*room, AuthorId{request->author()}, apart), context);
     if (stream->stand_under(rooms_.authorizer, *caller, (*room)->name, AuthorId{request->author()}, "/osteon.v1.WatchService/WatchCutting"))
-      (*room)->host().watch_cutting(*stream);
+      (*room)->runtime().watch_cutting(*stream);
     return stream;
   }
 

@@ -18,7 +18,7 @@
 #include "haptic_client/control/replica.hpp"
 #include "haptic_client/net/fast_path.hpp"
 #include "server/net/link_server.hpp"
-#include "server/net/room_host.hpp"
+#include "server/net/room_runtime.hpp"
 #include "server/net/room_store.hpp"
 #include "tests/perf/percentiles.hpp"
 #include "tests/perf/stroke.hpp"
@@ -51,9 +51,9 @@ struct Times {
 class Line final : public SessionSink, private SessionLink::Sink, public std::enable_shared_from_this<Line> {
  public:
   // `port`: at which the client's datagrams reach the links, 0 for their own.
-  Line(RoomHost& host, LinkServer& links, AuthorId author, std::uint16_t port, std::size_t cuts)
-      : host_(host), links_(links), author_(author), port_(port != 0 ? port : links.port()), replica_(host.bone(), BodyId{}),
-        model_(*find_tool("burr-round-5"), host.bone().pitch_mm()), times(cuts) {}
+  Line(RoomRuntime& runtime, LinkServer& links, AuthorId author, std::uint16_t port, std::size_t cuts)
+      : runtime_(runtime), links_(links), author_(author), port_(port != 0 ? port : links.port()), replica_(runtime.bone(), BodyId{}),
+        model_(*find_tool("burr-round-5"), runtime.bone().pitch_mm()), times(cuts) {}
   ~Line() override {
     if (path_) path_->stop();
     {
@@ -62,7 +62,7 @@ class Line final : public SessionSink, private SessionLink::Sink, public std::en
       wake_.notify_all();
     }
     if (thread_.joinable()) thread_.join();
-    host_.leave(*this);
+    runtime_.leave(*this);
     if (link_) links_.remove(link_);
   }
   // Before any cut; `other` is the line whose cuts are felt here.
@@ -125,7 +125,7 @@ class Line final : public SessionSink, private SessionLink::Sink, public std::en
     times.note(at_server, number);
     // Events beside the cut in the room's queue see when its tick comes to it.
     const auto note = [this, number](Moment what) {
-      host_.queue_event(
+      runtime_.queue_event(
           [this, number, what](Room&) {
             times.note(what, number);
             return RoomEvent{};
@@ -133,10 +133,10 @@ class Line final : public SessionSink, private SessionLink::Sink, public std::en
           [](const Result<RoomEvent>&) {});
     };
     note(tick_began);
-    host_.queue_cut(shared_from_this(), std::move(cut), Clock::now());
+    runtime_.queue_cut(shared_from_this(), std::move(cut), Clock::now());
     note(test::decided);
   }
-  void take(CuttingState state) override { host_.offer_state(std::move(state)); }
+  void take(CuttingState state) override { runtime_.offer_state(std::move(state)); }
   void arrived(std::uint64_t) override {}
 
   // --- the client's side
@@ -162,7 +162,7 @@ class Line final : public SessionSink, private SessionLink::Sink, public std::en
       for (const wire::SessionRow& row : rows) replica_.commit(row.room_seq, row.cut, row.cut.author == author_);
       replica_.settle();
       for (const haptic::ChangedLeaves& change : replica_.take_changes())
-        builder_.changed(host_.bone().pitch_mm(), change.level, change.origins);
+        builder_.changed(runtime_.bone().pitch_mm(), change.level, change.origins);
       builder_.build(replica_.bodies(), model_, tip, patch_);
       for (const wire::SessionRow& row : rows)
         if (row.cut.author == other_->author_) other_->times.note(felt, row.cut.author_seq);
@@ -170,7 +170,7 @@ class Line final : public SessionSink, private SessionLink::Sink, public std::en
     }
   }
 
-  RoomHost& host_;
+  RoomRuntime& runtime_;
   LinkServer& links_;
   const AuthorId author_;
   const std::uint16_t port_;
@@ -199,7 +199,7 @@ json run_stages(const Case& bone, const std::vector<Cut>& stroke, const std::vec
   const TempDir folder;
   Result<PersistedRoom> kept = RoomStore::open(folder / "room.journal", bone, {});
   OSTEON_CHECK(kept.has_value());
-  RoomHost host(std::move(kept->room), {}, [](double) {}, Detail::automatic, kept->store.get());
+  RoomRuntime runtime(std::move(kept->room), {}, [](double) {}, Detail::automatic, kept->store.get());
   Result<std::unique_ptr<LinkServer>> links = LinkServer::open("127.0.0.1");
   OSTEON_CHECK(links.has_value());
   std::optional<ImpairProcess> relay;
@@ -211,16 +211,16 @@ json run_stages(const Case& bone, const std::vector<Cut>& stroke, const std::vec
   }
   const auto cuts = static_cast<std::size_t>(seconds / std::chrono::duration<double>(kCutsApart).count());
   std::array<std::shared_ptr<Line>, 2> lines;
-  for (auto& line : lines) line = std::make_shared<Line>(host, **links, host.join(MemberKind::surgeon).value(), port, cuts);
+  for (auto& line : lines) line = std::make_shared<Line>(runtime, **links, runtime.join(MemberKind::surgeon).value(), port, cuts);
   lines[0]->feel(*lines[1]);
   lines[1]->feel(*lines[0]);
-  for (const auto& line : lines) OSTEON_CHECK(host.open_session(line).has_value());
+  for (const auto& line : lines) OSTEON_CHECK(runtime.open_session(line).has_value());
   OSTEON_CHECK(wait_until([&] { return lines[0]->health().alive && lines[1]->health().alive; }, 20s));
   if (relay)
     for (const std::string& command : impairment) OSTEON_CHECK(relay->command(command) == "ok");
   std::this_thread::sleep_for(500ms);
 
-  const HostHealth before = host.health();
+  const RuntimeHealth before = runtime.health();
   const FastPathHealth path_before = lines[0]->health();
   std::vector<std::thread> hands;
   for (std::size_t hand = 0; hand < 2; ++hand)
@@ -232,14 +232,14 @@ json run_stages(const Case& bone, const std::vector<Cut>& stroke, const std::vec
         Cut cut = stroke[(i + hand * stroke.size() / 2) % stroke.size()];
         cut.author = line.author();
         cut.author_seq = i + 1;
-        cut.lease_epoch = host.lease_epoch(cut.author);
+        cut.lease_epoch = runtime.lease_epoch(cut.author);
         line.send(cut);
       }
     });
   for (std::thread& hand : hands) hand.join();
   const auto all_felt = [&](const Line& line) { return line.times.of.back()[felt].load() != 0; };
   const bool there = wait_until([&] { return all_felt(*lines[0]) && all_felt(*lines[1]); }, 20s);
-  const HostHealth after = host.health();
+  const RuntimeHealth after = runtime.health();
   const FastPathHealth path = lines[0]->health();
 
   std::array<std::vector<double>, kMoments> took;
@@ -269,7 +269,7 @@ json run_stages(const Case& bone, const std::vector<Cut>& stroke, const std::vec
   out["tick_late_ms"] = in_ms(tick.lateness);
   out["transaction_ms"] = in_ms(commit);
   out["cut_closes_after_ms"] = {{"most", kCutsApart.count()}};
-  host.stop();  // it holds no line any more
+  runtime.stop();  // it holds no line any more
   return out;
 }
 

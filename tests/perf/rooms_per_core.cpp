@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "common/core/check.hpp"
-#include "server/net/room_host.hpp"
+#include "server/net/room_runtime.hpp"
 #include "server/net/room_store.hpp"
 #include "tests/perf/percentiles.hpp"
 #include "tests/perf/stroke.hpp"
@@ -60,7 +60,7 @@ class Listener final : public SessionSink {
 // One room, and who works in it.
 struct HeldRoom {
   std::unique_ptr<RoomStore> store;
-  std::unique_ptr<RoomHost> host;
+  std::unique_ptr<RoomRuntime> runtime;
   std::shared_ptr<Listener> listener;
   std::uint64_t sent = 0;
 };
@@ -76,7 +76,7 @@ HeldRoom make_room(const Case& bone, const std::filesystem::path& file, bool kep
   } else {
     room.emplace(bone, CutLimits{});
   }
-  held.host = std::make_unique<RoomHost>(std::move(*room), HostRates{}, [](double) {}, Detail::automatic, held.store.get());
+  held.runtime = std::make_unique<RoomRuntime>(std::move(*room), RuntimeRates{}, [](double) {}, Detail::automatic, held.store.get());
   const Result<AuthorId> author = held.host->join(MemberKind::surgeon, "tool");
   OSTEON_CHECK(author.has_value());
   held.listener = std::make_shared<Listener>(*author);
@@ -92,7 +92,7 @@ json run_rooms(const Case& bone, const std::vector<Cut>& stroke, std::size_t cou
   for (std::size_t i = 0; i < count; ++i)
     rooms.push_back(make_room(bone, folder / ("room" + std::to_string(i) + ".journal"), kept));
   std::this_thread::sleep_for(300ms);
-  std::vector<HostHealth> before;
+  std::vector<RuntimeHealth> before;
   for (const HeldRoom& room : rooms) before.push_back(room.host->health());
 
   // Each room's cuts come at their own times within the time between two.
@@ -117,7 +117,7 @@ json run_rooms(const Case& bone, const std::vector<Cut>& stroke, std::size_t cou
 
   double late_p99 = 0, work_p99 = 0, commit_p99 = 0, committed = 0, missed = 0, ticks = 0, rejected = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    const HostHealth health = rooms[i].host->health();
+    const RuntimeHealth health = rooms[i].host->health();
     const TickStats tick = health.tick.since(before[i].tick);
     late_p99 = std::max(late_p99, 1e-3 * tick.lateness.percentile_us(99));
     work_p99 = std::max(work_p99, 1e-3 * tick.work.percentile_us(99));

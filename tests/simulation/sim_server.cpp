@@ -16,8 +16,8 @@ using namespace std::chrono_literals;
 
 constexpr auto kTick = std::chrono::nanoseconds(1'000'000'000 / 120);
 
-std::unique_ptr<RoomHost> driven_host(Room room, RoomStore& store) {
-  return std::make_unique<RoomHost>(std::move(room), HostRates{.tick = 0ns}, nullptr, Detail::automatic, &store);
+std::unique_ptr<RoomRuntime> driven_host(Room room, RoomStore& store) {
+  return std::make_unique<RoomRuntime>(std::move(room), RuntimeRates{.tick = 0ns}, nullptr, Detail::automatic, &store);
 }
 
 std::string joined(const MessageParts& parts) {
@@ -35,7 +35,7 @@ std::shared_ptr<ToolBox> few_tools() {
   return box;
 }
 
-// What SessionStream of server/net/session_service.cpp does between gRPC and the host.
+// What SessionStream of server/net/session_service.cpp does between gRPC and the runtime.
 class SimServer::Session final : public SessionSink,
                                  public std::enable_shared_from_this<Session>,
                                  private SessionLink::Sink {
@@ -131,7 +131,7 @@ class SimServer::Session final : public SessionSink,
     if (request.server_epoch() != server_.store_->server_epoch())
       return close({false, "open.server_epoch is another one; join again"});
     author_ = AuthorId{request.author()};
-    if (const Result<void> opened = server_.host_->open_session(shared_from_this(), digest_of_secret(request.secret())); !opened)
+    if (const Result<void> opened = server_.runtime_->open_session(shared_from_this(), digest_of_secret(request.secret())); !opened)
       close({true, opened.error().message});
   }
 
@@ -161,15 +161,15 @@ class SimServer::Session final : public SessionSink,
         }
         return failure(ErrorCode::cancelled, "nobody hears of it");
       };
-      server_.host_->queue_event(taken_again, [](const Result<RoomEvent>&) {});
+      server_.runtime_->queue_event(taken_again, [](const Result<RoomEvent>&) {});
     }
     ++queued_;
     server_.ledger_.check(queued_ <= (link_ ? kMostUndecided : kMaxQueuedCuts), Invariant::bounds,
                           "a session has more cuts queued than it may");
-    server_.host_->queue_cut(shared_from_this(), std::move(cut), {});
+    server_.runtime_->queue_cut(shared_from_this(), std::move(cut), {});
   }
   void take(CuttingState state) override {
-    if (!closing_ && !done_) server_.host_->offer_state(std::move(state));
+    if (!closing_ && !done_) server_.runtime_->offer_state(std::move(state));
   }
   void arrived(std::uint64_t index) override { outbox_.arrived(index); }
 
@@ -215,12 +215,12 @@ class SimServer::Session final : public SessionSink,
     stream_->finish(*closing_);
     gone();
   }
-  // The host is told from outside of its calls, as gRPC does.
+  // The runtime is told from outside of its calls, as gRPC does.
   void gone() {
     if (std::exchange(done_, true)) return;
     server_.time_.post_in(0ns, [self = shared_from_this(), life = server_.life_] {
       if (self->server_.life_ != life) return;
-      self->server_.host_->leave(*self);
+      self->server_.runtime_->leave(*self);
       self->unlink();
     });
   }
@@ -249,7 +249,7 @@ SimServer::SimServer(VirtualTime& time, Ledger& ledger, Datagrams& datagrams, st
 
 SimServer::~SimServer() {
   links_.reset();
-  host_.reset();
+  runtime_.reset();
   sessions_.clear();
   store_.reset();
 }
@@ -266,7 +266,7 @@ RoomStore::Options SimServer::options() {
 }
 
 void SimServer::boot() {
-  if (host_) return;
+  if (runtime_) return;
   ++life_;
   Result<PersistedRoom> kept = RoomStore::open(file_, bone_, options());
   if (kept && kept->store->server_epoch() == 0) {
@@ -291,7 +291,7 @@ void SimServer::boot() {
   began_ = reopened_time(kept->room);
   booted_ = time_.now();
   jumped_ = {};
-  host_ = driven_host(std::move(kept->room), *store_);
+  runtime_ = driven_host(std::move(kept->room), *store_);
   if (condition_.fast_path)
     links_ = std::make_unique<SimLinks>(datagrams_, random_.index(1u << 30), condition_.link, [this] { return power_is_out(); });
   disk_has_failed_ = false;
@@ -337,25 +337,25 @@ Digest SimServer::replayed() {
 
 Digest SimServer::live() {
   Digest hash;
-  host_->queue_event(
+  runtime_->queue_event(
       [&](Room& room) -> Result<RoomEvent> {
         hash = room.room_hash();
         return RoomEvent{};
       },
       [](const Result<RoomEvent>&) {});
-  host_->tick(now());
+  runtime_->tick(now());
   return hash;
 }
 
 Digest SimServer::reopened(bool with_checkpoint) {
-  if (!host_) return {};
+  if (!runtime_) return {};
   for (const auto& session : sessions_) session->die();
   links_.reset();
   ++life_;
-  host_->stop();
-  sessions_.clear();  // which the host's thread that shows tools has told of until now
+  runtime_->stop();
+  sessions_.clear();  // which the runtime's thread that shows tools has told of until now
   if (with_checkpoint) checkpoint();
-  host_.reset();
+  runtime_.reset();
   if (with_checkpoint) {
     const Result<void> closed = store_->close();
     ledger_.check(closed.has_value(), Invariant::served, closed ? "" : "the journal cannot be closed: " + closed.error().message);
@@ -368,7 +368,7 @@ Digest SimServer::reopened(bool with_checkpoint) {
     ledger_.check(kept->store->evaluated() == 0, Invariant::replay, "a checkpoint of the end was not used");
   const Digest hash = kept->room.room_hash();
   store_ = std::move(kept->store);
-  host_ = driven_host(std::move(kept->room), *store_);
+  runtime_ = driven_host(std::move(kept->room), *store_);
   return hash;
 }
 
@@ -383,13 +383,13 @@ void SimServer::down() {
   disk_has_failed_ = disk_has_failed_ || (disk_fails_ && disk_.has_failed());
   for (const auto& session : sessions_) session->die();
   links_.reset();
-  host_.reset();
+  runtime_.reset();
   store_.reset();
   sessions_.clear();
 }
 
 void SimServer::crash(bool power) {
-  if (!host_) return;
+  if (!runtime_) return;
   if (!power_fails_ && !disk_fails_ && random_.unit() < 0.3) {
     const Digest alive = live();
     ledger_.check(replayed() == alive, Invariant::replay, "the journal's rows make another room than the one that crashes");
@@ -403,12 +403,12 @@ void SimServer::crash(bool power) {
 }
 
 void SimServer::restart() {
-  if (!host_ || disk_.has_failed()) return;
-  host_->end_streams("the server stops");
-  host_->tick(now());
-  host_->stop();
+  if (!runtime_ || disk_.has_failed()) return;
+  runtime_->end_streams("the server stops");
+  runtime_->tick(now());
+  runtime_->stop();
   checkpoint();
-  host_.reset();
+  runtime_.reset();
   if (!power_is_out()) {
     const Result<void> closed = store_->close();
     ledger_.check(closed || disk_.has_failed(), Invariant::served,
@@ -424,19 +424,19 @@ void SimServer::restart() {
 void SimServer::note_kept() { ledger_.kept_up_to(store_->head().place); }
 
 void SimServer::lose_power_at(std::uint64_t nth) {
-  if (!host_ || power_fails_ || disk_fails_) return;
+  if (!runtime_ || power_fails_ || disk_fails_) return;
   power_fails_ = true;
   disk_.fail_power_at(nth);
 }
 
 void SimServer::fail_disk_at(std::uint64_t nth, int error, MemoryDisk::Lasting lasting) {
-  if (!host_ || power_fails_ || disk_fails_) return;
+  if (!runtime_ || power_fails_ || disk_fails_) return;
   disk_fails_ = true;
   disk_.fail_at(nth, error, lasting);
 }
 
 void SimServer::checkpoint() {
-  const Result<void> kept = store_->checkpoint(host_->room_seq(), host_->all_leaves());
+  const Result<void> kept = store_->checkpoint(runtime_->room_seq(), runtime_->all_leaves());
   ledger_.check(kept || disk_.has_failed(), Invariant::served, kept ? "" : "no checkpoint: " + kept.error().message);
   after_tick();
 }
@@ -445,7 +445,7 @@ void SimServer::rest() {
   resting_ = true;
   writes_until_ = {};
   if (power_fails_ || disk_fails_) crash(power_fails_);
-  if (host_) plan_tick();
+  if (runtime_) plan_tick();
 }
 
 void SimServer::recover() {
@@ -459,13 +459,13 @@ void SimServer::plan_tick() {
   const bool paused = !resting_ && random_.unit() < condition_.pauses;
   const Time late = paused ? drawn(random_, 100ms, 3s) : drawn(random_, 0ns, condition_.late_most);
   time_.post_in(kTick + late, [this, life = life_, planned = ++planned_tick_] {
-    if (life == life_ && planned == planned_tick_ && host_) tick();
+    if (life == life_ && planned == planned_tick_ && runtime_) tick();
   });
 }
 
 void SimServer::tick() {
   if (!resting_ && random_.unit() < condition_.slow_writes) writes_until_ = time_.now() + drawn(random_, 5ms, 400ms);
-  host_->tick(now(), time_.now() >= writes_until_);
+  runtime_->tick(now(), time_.now() >= writes_until_);
   std::erase_if(sessions_, [](const auto& session) { return session->done(); });
   plan_tick();
   after_tick();
@@ -488,7 +488,7 @@ void SimServer::after_tick() {
 }
 
 void SimServer::join(const JoinRequest& request, std::function<void(const Result<Joined>&)> answer) {
-  if (!host_ || power_is_out()) return;
+  if (!runtime_ || power_is_out()) return;
   std::string secret = request.secret;
   if (!request.resume) {
     secret.resize(32);
@@ -497,11 +497,11 @@ void SimServer::join(const JoinRequest& request, std::function<void(const Result
   const auto reply = [this, secret, answer = std::move(answer)](const Result<AuthorId>& author) {
     if (power_is_out()) return;
     if (!author) return answer(tl::unexpected(author.error()));
-    answer(Joined{*author, store_->server_epoch(), host_->lease_epoch(*author), secret});
+    answer(Joined{*author, store_->server_epoch(), runtime_->lease_epoch(*author), secret});
   };
   if (!request.resume) {
-    host_->join(MemberKind::surgeon, request.name, digest_of_secret(secret), Role::none, reply);
-  } else if (const Result<void> may = host_->resume(request.resume, digest_of_secret(secret), request.kept); !may) {
+    runtime_->join(MemberKind::surgeon, request.name, digest_of_secret(secret), Role::none, reply);
+  } else if (const Result<void> may = runtime_->resume(request.resume, digest_of_secret(secret), request.kept); !may) {
     reply(tl::unexpected(may.error()));
   } else {
     reply(request.resume);
@@ -510,8 +510,8 @@ void SimServer::join(const JoinRequest& request, std::function<void(const Result
 }
 
 void SimServer::change(std::function<Result<RoomEvent>(Room&)> change, std::function<void(const Result<RoomEvent>&)> answer) {
-  if (!host_ || power_is_out()) return;
-  host_->queue_event(std::move(change), [this, answer = std::move(answer)](const Result<RoomEvent>& event) {
+  if (!runtime_ || power_is_out()) return;
+  runtime_->queue_event(std::move(change), [this, answer = std::move(answer)](const Result<RoomEvent>& event) {
     if (power_is_out()) return;
     note_kept();
     answer(event);
@@ -519,7 +519,7 @@ void SimServer::change(std::function<Result<RoomEvent>(Room&)> change, std::func
 }
 
 void SimServer::accept(const std::shared_ptr<SimStream>& stream) {
-  if (!host_ || power_is_out()) return stream->leave(SimStream::server);
+  if (!runtime_ || power_is_out()) return stream->leave(SimStream::server);
   sessions_.push_back(std::make_shared<Session>(*this, stream));
   sessions_.back()->start();
 }

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "server/net/room_host.hpp"
+#include "server/net/room_runtime.hpp"
 #include "server/net/room_store.hpp"
 #include "tests/simulation/ledger.hpp"
 #include "tests/simulation/sim_link.hpp"
@@ -65,7 +65,7 @@ class SimServer {
   void jump_clock(Time by) { jumped_ += by; }
   void checkpoint();
   void rest();                                      // from now on nothing of that happens
-  [[nodiscard]] bool up() const { return host_ != nullptr; }
+  [[nodiscard]] bool up() const { return runtime_ != nullptr; }
 
   // Requests as they arrive. Nobody answers while it is down; what is not answered before a crash never is.
   struct JoinRequest {
@@ -84,7 +84,7 @@ class SimServer {
   void accept(const std::shared_ptr<SimStream>& stream);
 
   // For checks.
-  [[nodiscard]] RoomHost& host() { return *host_; }
+  [[nodiscard]] RoomRuntime& runtime() { return *runtime_; }
   [[nodiscard]] std::vector<RoomRow> rows();        // as they are on the disk
   [[nodiscard]] Digest replayed();                  // room_hash of a new room with these
   [[nodiscard]] Digest live();                      // room_hash; runs a tick
@@ -119,7 +119,7 @@ class SimServer {
   int recoveries_ = 0;
   bool made_ = false;                    // a journal was, once
   std::unique_ptr<RoomStore> store_;
-  std::unique_ptr<RoomHost> host_;
+  std::unique_ptr<RoomRuntime> runtime_;
   std::unique_ptr<SimLinks> links_;      // none: no fast path
   std::vector<std::shared_ptr<Session>> sessions_;  // with streams and queued cuts
   std::uint64_t life_ = 0;               // rises with every boot and crash

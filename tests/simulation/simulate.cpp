@@ -273,7 +273,7 @@ class Simulation {
 
   // After quiet.
   void check() {
-    const BoneStatus status = server_.host().bone_status();
+    const BoneStatus status = server_.runtime().bone_status();
     for (const auto& client : clients_) {
       if (!client->here() || !client->settled()) continue;
       const std::string place = std::to_string(status.room_seq.value);

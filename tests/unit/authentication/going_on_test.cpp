@@ -49,7 +49,7 @@ class GoingOn : public ::testing::Test {
     ASSERT_TRUE(started.has_value()) << started.error().message;
     server_ = std::move(*started);
   }
-  RoomHost& host() { return (*server_->rooms().find("ward"))->host(); }
+  RoomRuntime& host() { return (*server_->rooms().find("ward"))->host(); }
   wire::JoinedRoom join(const wire::ClientCredentials& credentials) {
     auto joined = wire::join_room(server_->address(), wire::ClientKind::viewer, "whatever", 5s, {}, "ward", credentials);
     EXPECT_TRUE(joined.has_value()) << joined.error().message;

@@ -260,7 +260,7 @@ class Matrices : public ::testing::Test {
     EXPECT_TRUE(joined.has_value()) << joined.error().message;
     return joined.value_or(wire::JoinedRoom{});
   }
-  RoomHost& host() { return server_->rooms().find("ward").value()->host(); }
+  RoomRuntime& host() { return server_->rooms().find("ward").value()->host(); }
   void happen(std::function<Result<RoomEvent>(Room&)> event) {
     std::promise<std::string> done;
     host().queue_event(std::move(event), [&](const Result<RoomEvent>& decided) {

@@ -109,11 +109,11 @@ class DemonstrationTest : public ::testing::Test {
     ASSERT_TRUE(started.has_value()) << started.error().message;
     server_ = std::move(*started);
     room_ = *server_->rooms().find("ward");
-    instructor_ = room_->host().join(MemberKind::watcher, "Ada", {}, Role::instructor).value();
-    room_->host().watch_cutting(seen_);
+    instructor_ = room_->runtime().join(MemberKind::watcher, "Ada", {}, Role::instructor).value();
+    room_->runtime().watch_cutting(seen_);
   }
   void TearDown() override {
-    if (room_) room_->host().leave(seen_);
+    if (room_) room_->runtime().leave(seen_);
     room_.reset();
     server_.reset();
   }
@@ -123,12 +123,12 @@ class DemonstrationTest : public ::testing::Test {
   }
   void decide(AuthorId about, const Supervision& word) {
     std::promise<Result<RoomEvent>> answer;
-    room_->host().queue_event([&](Room& room) { return room.supervise(instructor_, about, word); },
+    room_->runtime().queue_event([&](Room& room) { return room.supervise(instructor_, about, word); },
                               [&](const Result<RoomEvent>& decided) { answer.set_value(decided); });
     const Result<RoomEvent> decided = answer.get_future().get();
     ASSERT_TRUE(decided) << decided.error().message;
   }
-  std::uint64_t committed() { return room_->host().bone_status().counts.committed; }
+  std::uint64_t committed() { return room_->runtime().bone_status().counts.committed; }
 
   TempDir dir_;
   std::unique_ptr<RoomServer> server_;
@@ -182,8 +182,8 @@ TEST_F(DemonstrationTest, EndsWhenTheServerIsToStop) {
     return ++waits > 100;
   });
   EXPECT_EQ(waits, 0) << "nobody was there who would have had to leave";
-  EXPECT_EQ(room_->host().health().sessions, 0u);
-  const auto newest = [&] { return room_->host().room_seq(); };
+  EXPECT_EQ(room_->runtime().health().sessions, 0u);
+  const auto newest = [&] { return room_->runtime().room_seq(); };
   EXPECT_TRUE(wait_until([&] { return seen_.at_rest(shown->demonstrator); }, kPatience));
   const RoomSeq then = newest();
   std::this_thread::sleep_for(500ms);
@@ -199,8 +199,8 @@ TEST_F(DemonstrationTest, EndsWhenTheServerIsToStop) {
 // What one hand puts into the bone is for the others who are pushed by it, and a demonstrator's tool is where it was on the bone.
 TEST_F(DemonstrationTest, NeitherMovesTheBoneOnItsMountNorTakesOfItsEnergy) {
   const auto open = [&] {
-    auto hand = std::make_shared<MountedHand>(room_->host().join(MemberKind::surgeon).value());
-    EXPECT_TRUE(room_->host().open_session(hand));
+    auto hand = std::make_shared<MountedHand>(room_->runtime().join(MemberKind::surgeon).value());
+    EXPECT_TRUE(room_->runtime().open_session(hand));
     return hand;
   };
   const auto one = open(), other = open();
@@ -208,15 +208,15 @@ TEST_F(DemonstrationTest, NeitherMovesTheBoneOnItsMountNorTakesOfItsEnergy) {
   ASSERT_TRUE(shown) << shown.error().message;
   ASSERT_TRUE(wait_until([&] { return seen_.at_work(shown->demonstrator); }, kPatience));
   for (const std::uint64_t number : {1u, 2u}) {
-    room_->host().push_bone(one->author(), {.push_seq = number, .load = {}, .energy_mj = number == 1 ? 5.0 : 8.0});
+    room_->runtime().push_bone(one->author(), {.push_seq = number, .load = {}, .energy_mj = number == 1 ? 5.0 : 8.0});
     ASSERT_TRUE(wait_until([&] { return one->seen().push_seq == number; }, kPatience));
   }
   EXPECT_TRUE(wait_until([&] { return other->seen().energy_mj > 0; }, kPatience));
   EXPECT_DOUBLE_EQ(other->seen().energy_mj, 3.0);
   EXPECT_EQ(other->seen().shift.place_mm, Vec3(Vec3::Zero()));
   EXPECT_TRUE(seen_.at_work(shown->demonstrator));
-  room_->host().leave(*one);
-  room_->host().leave(*other);
+  room_->runtime().leave(*one);
+  room_->runtime().leave(*other);
 }
 
 // Calls that everybody makes who comes.

@@ -45,11 +45,11 @@ class FloodTest : public ::testing::Test {
     context_.TryCancel();
     if (reader_.joinable()) reader_.join();
     tick();  // what waits holds the room
-    (*server_->rooms().find(""))->host().stop();
+    (*server_->rooms().find(""))->runtime().stop();
     server_.reset();
   }
 
-  void tick() { (*server_->rooms().find(""))->host().tick(now_ += 8ms); }
+  void tick() { (*server_->rooms().find(""))->runtime().tick(now_ += 8ms); }
   std::size_t queued() { return server_->health().queued_cuts; }
 
   // Says `cuts` in datagrams, as fast as they go, and goes on with the path until it holds.

@@ -10,7 +10,7 @@
 
 #include "osteon/v1/people.pb.h"
 #include "server/net/journal_rows.hpp"
-#include "server/net/room_host.hpp"
+#include "server/net/room_runtime.hpp"
 #include "server/net/room_store.hpp"
 #include "server/room/room.hpp"
 #include "tests/support/temp_dir.hpp"
@@ -271,33 +271,33 @@ class Placed final : public SessionSink {
   const AuthorId author_;
 };
 
-struct HeldHost {
-  explicit HeldHost(RoomHost& of) : host(of) {}
+struct HeldRuntime {
+  explicit HeldRuntime(RoomRuntime& of) : runtime(of) {}
   AuthorId join(MemberKind kind, const std::string& name, Role role) {
     std::optional<AuthorId> author;
-    host.join(kind, name, kSecret, role, [&](const Result<AuthorId>& given) { author = given.value(); });
-    host.tick(now += 8ms);
+    runtime.join(kind, name, kSecret, role, [&](const Result<AuthorId>& given) { author = given.value(); });
+    runtime.tick(now += 8ms);
     return author.value();
   }
   void supervise(AuthorId by, AuthorId subject, const Supervision& word) {
-    host.queue_event([=](Room& room) { return room.supervise(by, subject, word); },
+    runtime.queue_event([=](Room& room) { return room.supervise(by, subject, word); },
                      [](const Result<RoomEvent>& decided) { EXPECT_TRUE(decided); });
-    host.tick(now += 8ms);
+    runtime.tick(now += 8ms);
   }
   std::shared_ptr<Placed> session(AuthorId author) {
     auto sink = std::make_shared<Placed>(author);
-    EXPECT_TRUE(host.open_session(sink, kSecret));
-    sinks.push_back(sink);  // the host's until it goes
+    EXPECT_TRUE(runtime.open_session(sink, kSecret));
+    sinks.push_back(sink);  // the runtime's until it goes
     return sink;
   }
-  RoomHost& host;
+  RoomRuntime& runtime;
   std::chrono::nanoseconds now{};
   std::vector<std::shared_ptr<Placed>> sinks;
 };
 
-constexpr HostRates kDriven{.tick = 0ns, .mesh = 1s, .pieces = 0ns};
+constexpr RuntimeRates kDriven{.tick = 0ns, .mesh = 1s, .pieces = 0ns};
 
-void expect_held(HeldHost& lesson) {
+void expect_held(HeldRuntime& lesson) {
   const AuthorId ada = lesson.join(MemberKind::watcher, "Ada", Role::instructor);
   const AuthorId ben = lesson.join(MemberKind::surgeon, "Ben", Role::trainee);
   const AuthorId cy = lesson.join(MemberKind::surgeon, "Cy", Role::trainee);
@@ -309,12 +309,12 @@ void expect_held(HeldHost& lesson) {
   EXPECT_EQ(lesson.session(lesson.join(MemberKind::surgeon, "Dora", Role::trainee))->held, std::nullopt);
   // Who is there misses no place of the order.
   ASSERT_FALSE(session->places.empty());
-  EXPECT_EQ(session->places.back(), lesson.host.room_seq().value);
+  EXPECT_EQ(session->places.back(), lesson.runtime.room_seq().value);
   for (std::size_t i = 1; i < session->places.size(); ++i) EXPECT_EQ(session->places[i], session->places[i - 1] + 1);
   // And the board of people shows it.
   PeopleCursor cursor;
   v1::WatchPeopleResponse news;
-  ASSERT_TRUE(news.ParseFromString(*lesson.host.people().news(cursor, ada, {})));
+  ASSERT_TRUE(news.ParseFromString(*lesson.runtime.people().news(cursor, ada, {})));
   const auto person = std::ranges::find(news.people(), again.value, &v1::Person::author);
   ASSERT_NE(person, news.people().end());
   EXPECT_TRUE(person->supervision().stopped());
@@ -324,23 +324,23 @@ void expect_held(HeldHost& lesson) {
   lesson.supervise(ada, again, {});
   ASSERT_EQ(own->told.size(), 1u);
   EXPECT_EQ(own->told.front(), Supervision{});
-  EXPECT_EQ(session->places.back(), lesson.host.room_seq().value);
+  EXPECT_EQ(session->places.back(), lesson.runtime.room_seq().value);
 }
 
 TEST(CarriedOver, IsToldByAHostThatKeepsNothing) {
-  RoomHost host(Room(test_block()), kDriven, {});
-  HeldHost lesson(host);
+  RoomRuntime runtime(Room(test_block()), kDriven, {});
+  HeldRuntime lesson(runtime);
   expect_held(lesson);
-  host.stop();
+  runtime.stop();
 }
 
 TEST(CarriedOver, IsToldByAHostWithAJournal) {
   const test::TempDir folder;
   PersistedRoom kept = RoomStore::open(folder / "room.journal", test_block(), RoomStore::Options{}).value();
-  RoomHost host(std::move(kept.room), kDriven, {}, Detail::automatic, kept.store.get());
-  HeldHost lesson(host);
+  RoomRuntime runtime(std::move(kept.room), kDriven, {}, Detail::automatic, kept.store.get());
+  HeldRuntime lesson(runtime);
   expect_held(lesson);
-  host.stop();
+  runtime.stop();
   ASSERT_TRUE(kept.store->close());
 }
 

@@ -1,5 +1,5 @@
-// The host's threads with sinks in place of streams: free of gRPC, so that the thread sanitizer can look at them.
-#include "server/net/room_host.hpp"
+// The runtime's threads with sinks in place of streams: free of gRPC, so that the thread sanitizer can look at them.
+#include "server/net/room_runtime.hpp"
 
 #include <gtest/gtest.h>
 
@@ -112,20 +112,20 @@ class FakeMesh final : public MeshSink {
   std::map<BlockKey, std::string> hashes_;
 };
 
-TEST(RoomHost, EverySinkEndsWithTheRoomsBoneAndSurface) {
+TEST(RoomRuntime, EverySinkEndsWithTheRoomsBoneAndSurface) {
   const Case bone = test::test_block();
   // Every event is a cut: random strokes now and then leave a crumb, which would be an event too.
-  RoomHost host(Room(bone), {.tick = 1ms, .mesh = 3ms, .pieces = 0ns}, {});
+  RoomRuntime runtime(Room(bone), {.tick = 1ms, .mesh = 3ms, .pieces = 0ns}, {});
   std::vector<std::shared_ptr<FakeSession>> sessions;
   for (int i = 0; i < 3; ++i) {
-    sessions.push_back(std::make_shared<FakeSession>(host.join(MemberKind::surgeon).value(), bone));
-    ASSERT_TRUE(host.open_session(sessions.back()));
+    sessions.push_back(std::make_shared<FakeSession>(runtime.join(MemberKind::surgeon).value(), bone));
+    ASSERT_TRUE(runtime.open_session(sessions.back()));
   }
-  EXPECT_FALSE(host.open_session(sessions.front())) << "one session for each author";
+  EXPECT_FALSE(runtime.open_session(sessions.front())) << "one session for each author";
   const auto stranger = std::make_shared<FakeSession>(AuthorId{99}, bone);
-  EXPECT_FALSE(host.open_session(stranger));
+  EXPECT_FALSE(runtime.open_session(stranger));
   FakeMesh early;
-  host.watch_mesh(early);
+  runtime.watch_mesh(early);
 
   // Two hands cut at once while others come and go.
   constexpr int kCuts = 60;
@@ -133,28 +133,28 @@ TEST(RoomHost, EverySinkEndsWithTheRoomsBoneAndSurface) {
   for (unsigned who = 0; who < 2; ++who)
     hands.emplace_back([&, who] {
       for (const Cut& cut : strokes(sessions[who]->author(), kCuts, who)) {
-        host.queue_cut(sessions[who], cut, RoomHost::Clock::now());
+        runtime.queue_cut(sessions[who], cut, RoomRuntime::Clock::now());
         std::this_thread::sleep_for(500us);
       }
     });
   std::vector<std::shared_ptr<FakeSession>> late;
   for (int i = 0; i < 5; ++i) {
-    late.push_back(std::make_shared<FakeSession>(host.join(MemberKind::surgeon).value(), bone));
-    ASSERT_TRUE(host.open_session(late.back()));
+    late.push_back(std::make_shared<FakeSession>(runtime.join(MemberKind::surgeon).value(), bone));
+    ASSERT_TRUE(runtime.open_session(late.back()));
     FakeMesh visitor;
-    host.watch_mesh(visitor);
+    runtime.watch_mesh(visitor);
     std::this_thread::sleep_for(5ms);
-    (void)host.health();
-    host.leave(visitor);
+    (void)runtime.health();
+    runtime.leave(visitor);
   }
   for (std::thread& hand : hands) hand.join();
-  host.end_streams("over");
-  host.stop();
+  runtime.end_streams("over");
+  runtime.stop();
 
   FakeMesh after;
-  host.watch_mesh(after);
+  runtime.watch_mesh(after);
   EXPECT_EQ(early.hashes(), after.hashes());
-  const BoneStatus status = host.bone_status();
+  const BoneStatus status = runtime.bone_status();
   EXPECT_EQ(status.counts.committed, 2u * kCuts);
   EXPECT_EQ(status.room_seq.value, 2u * kCuts + 3 + 5) << "each who came has a place too";
   for (unsigned who = 0; who < 2; ++who) EXPECT_EQ(sessions[who]->decided_cuts(), kCuts);
@@ -162,45 +162,45 @@ TEST(RoomHost, EverySinkEndsWithTheRoomsBoneAndSurface) {
     for (const auto& session : list) {
       EXPECT_EQ(session->hash(), status.field_hash);
       EXPECT_TRUE(session->ended());
-      host.leave(*session);
+      runtime.leave(*session);
     }
-  const HostHealth health = host.health();
+  const RuntimeHealth health = runtime.health();
   EXPECT_EQ(health.sessions, 0u);
   EXPECT_EQ(health.counts.committed, 2u * kCuts);
   EXPECT_GT(health.tick.work.count(), 0u);
   EXPECT_GT(health.mesh_update.count(), 0u);
   EXPECT_EQ(health.queued_cuts, 0u);
-  host.leave(early);
-  host.leave(after);
+  runtime.leave(early);
+  runtime.leave(after);
 }
 
 // Leaves are copied while the room goes on cutting, so some are newer than others. What is said of a place of the order
 // must be true of it all the same.
-TEST(RoomHost, CopiesOfTheBoneAreRightWhileItIsCut) {
+TEST(RoomRuntime, CopiesOfTheBoneAreRightWhileItIsCut) {
   const Case bone = test::test_block();
-  RoomHost host(Room(bone), {.tick = 200us, .mesh = 50ms, .pieces = 0ns}, {});
-  const auto hand = std::make_shared<FakeSession>(host.join(MemberKind::surgeon).value(), bone);
-  ASSERT_TRUE(host.open_session(hand));
+  RoomRuntime runtime(Room(bone), {.tick = 200us, .mesh = 50ms, .pieces = 0ns}, {});
+  const auto hand = std::make_shared<FakeSession>(runtime.join(MemberKind::surgeon).value(), bone);
+  ASSERT_TRUE(runtime.open_session(hand));
   constexpr std::uint64_t kCuts = 60;
   std::vector<Cut> cuts = strokes(hand->author(), static_cast<int>(kCuts), 21);
   for (Cut& cut : cuts) cut.level = 1;  // cheaper, and several batches of leaves all the same
   std::thread cutting([&] {
     for (const Cut& cut : cuts) {
-      host.queue_cut(hand, cut, RoomHost::Clock::now());
+      runtime.queue_cut(hand, cut, RoomRuntime::Clock::now());
       std::this_thread::sleep_for(300us);
     }
   });
   std::vector<BoneStatus> said;
   std::vector<std::shared_ptr<FakeSession>> late;
-  while (host.health().counts.committed < kCuts) {
-    if (BoneStatus status = host.bone_status(); said.empty() || said.back().room_seq < status.room_seq) said.push_back(status);
+  while (runtime.health().counts.committed < kCuts) {
+    if (BoneStatus status = runtime.bone_status(); said.empty() || said.back().room_seq < status.room_seq) said.push_back(status);
     if (late.size() >= 4) continue;
-    late.push_back(std::make_shared<FakeSession>(host.join(MemberKind::surgeon).value(), bone));
-    ASSERT_TRUE(host.open_session(late.back()));
+    late.push_back(std::make_shared<FakeSession>(runtime.join(MemberKind::surgeon).value(), bone));
+    ASSERT_TRUE(runtime.open_session(late.back()));
   }
   cutting.join();
-  host.stop();
-  said.push_back(host.bone_status());
+  runtime.stop();
+  said.push_back(runtime.bone_status());
 
   CutField alone(bone, BodyId{0});
   std::uint64_t applied = 0;
@@ -210,8 +210,8 @@ TEST(RoomHost, CopiesOfTheBoneAreRightWhileItIsCut) {
   }
   EXPECT_EQ(applied, kCuts);
   for (const auto& session : late) EXPECT_EQ(session->hash(), alone.hash());
-  for (const auto& session : late) host.leave(*session);
-  host.leave(*hand);
+  for (const auto& session : late) runtime.leave(*session);
+  runtime.leave(*hand);
 }
 
 }  // namespace

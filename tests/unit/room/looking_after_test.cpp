@@ -176,7 +176,7 @@ TEST(HealthWatch, ARoomWhoseJournalIsDamagedIsOpenToNobody) {
   ASSERT_EQ(kept.store->head().place.value, head.place.value - 1) << "the rest can be looked at";
   Rooms rooms(RoomsOptions{.cases = {{test_block(), dir / "case"}}});
   ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.store), {}, [](double) {}));
-  RoomHost& host = (*rooms.find("femur"))->host();
+  RoomRuntime& host = (*rooms.find("femur"))->host();
   EXPECT_TRUE(host.stopped());
   EXPECT_FALSE(host.health().serving);
   Told told;
@@ -208,7 +208,7 @@ TEST(HealthWatch, ARoomStopsWhenItsJournalIsClosedBesideACommit) {
   kept.cut(1);
   Rooms rooms(RoomsOptions{.cases = {{test_block(), dir / "case"}}});
   ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.store), {}, [](double) {}));
-  RoomHost& host = (*rooms.find("femur"))->host();
+  RoomRuntime& host = (*rooms.find("femur"))->host();
   const auto hand = std::make_shared<Hand>(kept.hand);
   ASSERT_TRUE(host.open_session(hand));
   EXPECT_TRUE(host.health().serving);

@@ -19,7 +19,7 @@
 #include "osteon/v1/cutting.grpc.pb.h"
 #include "osteon/v1/room.grpc.pb.h"
 #include "osteon/v1/watch.grpc.pb.h"
-#include "server/net/room_host.hpp"
+#include "server/net/room_runtime.hpp"
 #include "tests/support/wait.hpp"
 
 namespace osteon::test {
@@ -151,7 +151,7 @@ class Surgeon {
 };
 
 // Whether the room has come to rest, with all pieces found that came off, and every one of them is there.
-inline bool settled(RoomHost& room, const std::vector<Surgeon*>& holders) {
+inline bool settled(RoomRuntime& room, const std::vector<Surgeon*>& holders) {
   const RoomSeq before = room.room_seq();
   room.find_pieces();
   return room.room_seq() == before &&

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "server/net/room_host.hpp"
+#include "server/net/room_runtime.hpp"
 #include "tests/unit/room/cuts.hpp"
 
 namespace osteon {
@@ -33,32 +33,32 @@ class HeardBone final : public SessionSink {
   const AuthorId author_;
 };
 
-// A driven host with two hands.
+// A driven runtime with two hands.
 struct Pair {
-  explicit Pair(bool mount) : host(Room(test::test_block()), {.tick = 0ns, .mesh = 1s, .pieces = 0ns, .mount = mount}, {}) {
+  explicit Pair(bool mount) : runtime(Room(test::test_block()), {.tick = 0ns, .mesh = 1s, .pieces = 0ns, .mount = mount}, {}) {
     for (auto& session : sessions) session = open(join());
   }
   AuthorId join() {
     AuthorId author;
-    host.join(MemberKind::surgeon, "", {}, Role::none, [&](const Result<AuthorId>& given) { author = given.value(); });
+    runtime.join(MemberKind::surgeon, "", {}, Role::none, [&](const Result<AuthorId>& given) { author = given.value(); });
     tick();
     return author;
   }
   std::shared_ptr<HeardBone> open(AuthorId author) {
     auto session = std::make_shared<HeardBone>(author);
-    EXPECT_TRUE(host.open_session(session));
+    EXPECT_TRUE(runtime.open_session(session));
     return session;
   }
   void tick(int times = 1) {
-    for (int i = 0; i < times; ++i) host.tick(now += 8ms);
+    for (int i = 0; i < times; ++i) runtime.tick(now += 8ms);
   }
   void push(const std::shared_ptr<HeardBone>& session, const Load& load, double energy_mj = 0.0) {
-    host.push_bone(session->author(), {++pushes, load, energy_mj, session->seen_.empty() ? 0 : session->seen_.back().seen_seq});
+    runtime.push_bone(session->author(), {++pushes, load, energy_mj, session->seen_.empty() ? 0 : session->seen_.back().seen_seq});
   }
 
   std::chrono::nanoseconds now{};
   std::uint64_t pushes = 0;
-  RoomHost host;
+  RoomRuntime runtime;
   std::shared_ptr<HeardBone> sessions[2];
 };
 
@@ -104,7 +104,7 @@ TEST(MountInARoom, WhoLeavesPushesNoMore) {
     room.tick();
   }
   EXPECT_GT(room.sessions[1]->seen_.back().shift.place_mm.y(), 3.0);
-  room.host.leave(*room.sessions[0]);
+  room.runtime.leave(*room.sessions[0]);
   // Of whoever has no session a push is nothing; and it is told nothing more.
   const std::size_t told = room.sessions[0]->seen_.size();
   for (int i = 0; i < 200; ++i) {
@@ -129,8 +129,8 @@ TEST(MountInARoom, IsNoEvent) {
     other.push(other.sessions[0], {{0, 20.0, 0}, {100, 0, 0}});
     other.tick();
   }
-  EXPECT_EQ(room.host.room_seq(), other.host.room_seq());
-  EXPECT_EQ(room.host.bone_status().field_hash, other.host.bone_status().field_hash);
+  EXPECT_EQ(room.runtime.room_seq(), other.runtime.room_seq());
+  EXPECT_EQ(room.runtime.bone_status().field_hash, other.runtime.bone_status().field_hash);
   EXPECT_TRUE(other.sessions[0]->seen_.empty()) << "where there is no mount, nothing is told of one";
   EXPECT_TRUE(other.sessions[1]->seen_.empty());
 }

@@ -7,7 +7,7 @@
 
 #include "common/surface/weld.hpp"
 #include "common/wire/convert.hpp"
-#include "server/net/room_host.hpp"
+#include "server/net/room_runtime.hpp"
 #include "tests/support/scenes/bones.hpp"
 #include "tests/support/wait.hpp"
 #include "tests/unit/room/parts.hpp"
@@ -114,11 +114,11 @@ class Reader final : public MeshSink {
   std::set<int> first_;
 };
 
-HostRates fast() { return {.tick = 1ms, .mesh = 3ms, .looks = 5ms}; }
+RuntimeRates fast() { return {.tick = 1ms, .mesh = 3ms, .looks = 5ms}; }
 
 TEST(NearDetail, FollowsTheLooksOfAllViewers) {
-  RoomHost host(Room(ball()), fast(), {}, Detail::near);
-  RoomHost in_full(Room(ball()), fast(), {}, Detail::full);
+  RoomRuntime runtime(Room(ball()), fast(), {}, Detail::near);
+  RoomRuntime in_full(Room(ball()), fast(), {}, Detail::full);
   Reader full(in_full.join(MemberKind::watcher).value());
   in_full.watch_mesh(full);
   EXPECT_EQ(full.levels(), std::set<int>{0});
@@ -126,48 +126,48 @@ TEST(NearDetail, FollowsTheLooksOfAllViewers) {
 
   // Nobody has looked yet: the one who joins is sent the coarse bone at once and then what it looks at.
   const Vec3 north(0, 0, kRadius_mm), east(kRadius_mm, 0, 0), south(0, 0, -kRadius_mm);
-  Reader one(host.join(MemberKind::watcher).value());
-  host.watch_mesh(one, close_to(north, 8));
+  Reader one(runtime.join(MemberKind::watcher).value());
+  runtime.watch_mesh(one, close_to(north, 8));
   EXPECT_EQ(one.first_levels(), std::set<int>{kCoarsestLevel});
   ASSERT_TRUE(test::wait_until([&] { return one.level_at(north) == 0; }, 20s));
   EXPECT_LT(one.level_at(south), 0);
   EXPECT_EQ(one.open_edges(), 0);
-  EXPECT_EQ(one.hash(), host.surface_hash());
+  EXPECT_EQ(one.hash(), runtime.surface_hash());
   EXPECT_LT(one.triangles(), 2 * full.triangles() / 3);
 
   // Its look moves, and another one joins elsewhere: each has what it needs, both hold the same.
-  host.look(one.author(), close_to(east, 8));
+  runtime.look(one.author(), close_to(east, 8));
   ASSERT_TRUE(test::wait_until([&] { return one.level_at(east) == 0 && one.level_at(north) < 0; }, 20s));
   EXPECT_EQ(one.open_edges(), 0);
-  Reader two(host.join(MemberKind::watcher).value());
-  host.watch_mesh(two, close_to(south, 8));
-  EXPECT_EQ(two.hash(), host.surface_hash()) << "as it is at the moment";
+  Reader two(runtime.join(MemberKind::watcher).value());
+  runtime.watch_mesh(two, close_to(south, 8));
+  EXPECT_EQ(two.hash(), runtime.surface_hash()) << "as it is at the moment";
   EXPECT_EQ(two.first_levels(), one.levels());
   ASSERT_TRUE(test::wait_until([&] { return two.level_at(south) == 0; }, 20s));
   EXPECT_EQ(two.level_at(east), 0);
   EXPECT_EQ(one.open_edges(), 0);
   EXPECT_EQ(one.hash(), two.hash());
-  EXPECT_EQ(one.hash(), host.surface_hash());
+  EXPECT_EQ(one.hash(), runtime.surface_hash());
 
   // A tool is seen in full wherever it works.
   CuttingState state;
-  state.author = host.join(MemberKind::surgeon).value();
+  state.author = runtime.join(MemberKind::surgeon).value();
   state.pose_bone_tool = pose_along(north, {0, 0, -1});
-  host.offer_state(state);
+  runtime.offer_state(state);
   ASSERT_TRUE(test::wait_until([&] { return one.level_at(north) == 0; }, 20s));
   EXPECT_EQ(one.open_edges(), 0);
 
   // One that never says where it looks is sent all, to the bytes of a room that draws everything in full.
-  Reader all(host.join(MemberKind::watcher).value());
-  host.watch_mesh(all);
+  Reader all(runtime.join(MemberKind::watcher).value());
+  runtime.watch_mesh(all);
   ASSERT_TRUE(test::wait_until([&] { return all.hash() == full.hash(); }, 20s));
   EXPECT_EQ(one.hash(), full.hash());
-  host.leave(all);
-  host.look(two.author(), close_to(east, 9));
+  runtime.leave(all);
+  runtime.look(two.author(), close_to(east, 9));
   ASSERT_TRUE(test::wait_until([&] { return one.level_at(south) < 0; }, 20s));
   EXPECT_EQ(one.open_edges(), 0);
-  EXPECT_EQ(one.hash(), host.surface_hash());
-  for (Reader* reader : {&one, &two}) host.leave(*reader);
+  EXPECT_EQ(one.hash(), runtime.surface_hash());
+  for (Reader* reader : {&one, &two}) runtime.leave(*reader);
   in_full.leave(full);
 }
 
@@ -181,14 +181,14 @@ TEST(NearDetail, ABodyTakesAllItsBlocksAndNoOthers) {
   const AuthorId surgeon = room.join(MemberKind::surgeon);
   ASSERT_TRUE(room.split(BodyId{0}, {cap(room.bone(), 15, 99)}, room.bone_epoch()));
   ASSERT_TRUE(room.split(BodyId{0}, {cap(room.bone(), -99, -15)}, room.bone_epoch()));
-  HostRates rates = fast();
+  RuntimeRates rates = fast();
   rates.pieces = 0ms;
-  RoomHost host(std::move(room), rates, {}, Detail::near);
-  Reader one(host.join(MemberKind::watcher).value());
-  host.watch_mesh(one, close_to({0, 0, kRadius_mm}, 8));  // so that both pieces are far
+  RoomRuntime runtime(std::move(room), rates, {}, Detail::near);
+  Reader one(runtime.join(MemberKind::watcher).value());
+  runtime.watch_mesh(one, close_to({0, 0, kRadius_mm}, 8));  // so that both pieces are far
   ASSERT_TRUE(test::wait_until([&] { return one.level_at({0, 0, kRadius_mm}) == 0; }, 20s));
   const auto remove = [&](BodyId body) {
-    host.queue_event([=](Room& r) { return r.remove_body(surgeon, body); }, [](const Result<RoomEvent>& event) { EXPECT_TRUE(event); });
+    runtime.queue_event([=](Room& r) { return r.remove_body(surgeon, body); }, [](const Result<RoomEvent>& event) { EXPECT_TRUE(event); });
   };
   using Bodies = std::set<BodyId>;
   ASSERT_EQ(one.bodies(), (Bodies{BodyId{0}, BodyId{1}, BodyId{2}}));
@@ -198,13 +198,13 @@ TEST(NearDetail, ABodyTakesAllItsBlocksAndNoOthers) {
   remove(BodyId{0});
   EXPECT_TRUE(test::wait_until([&] { return one.bodies() == Bodies{BodyId{2}}; }, 20s));
   EXPECT_EQ(one.open_edges(), 0);
-  EXPECT_EQ(one.hash(), host.surface_hash());
-  host.leave(one);
+  EXPECT_EQ(one.hash(), runtime.surface_hash());
+  runtime.leave(one);
 }
 
 TEST(NearDetail, IsForLargeBonesUnlessAskedFor) {
-  EXPECT_FALSE(RoomHost(Room(ball()), fast(), {}).draws_near());
-  EXPECT_TRUE(RoomHost(Room(ball()), fast(), {}, Detail::near).draws_near());
+  EXPECT_FALSE(RoomRuntime(Room(ball()), fast(), {}).draws_near());
+  EXPECT_TRUE(RoomRuntime(Room(ball()), fast(), {}, Detail::near).draws_near());
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// What a host tells of its people: to whom a word goes, what holds for a hand that comes, how far it has heard, and
+// What a runtime tells of its people: to whom a word goes, what holds for a hand that comes, how far it has heard, and
 // what readers are told who may not hear everything.
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include "common/wire/convert.hpp"
 #include "osteon/v1/people.pb.h"
 #include "server/net/people_board.hpp"
-#include "server/net/room_host.hpp"
+#include "server/net/room_runtime.hpp"
 #include "server/net/room_store.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/room/cuts.hpp"
@@ -90,27 +90,27 @@ class HeardSession final : public SessionSink {
   std::vector<CuttingState> partners_;
 };
 
-// A driven host: what is asked of it is decided at once.
+// A driven runtime: what is asked of it is decided at once.
 struct Lesson {
-  Lesson() : host(Room(test::test_block()), {.tick = 0ns, .mesh = 1s, .pieces = 0ns}, {}) {
+  Lesson() : runtime(Room(test::test_block()), {.tick = 0ns, .mesh = 1s, .pieces = 0ns}, {}) {
     instructor = join("Ada", Role::instructor);
     trainee = join("Ben", Role::trainee);
     other = join("Cy", Role::trainee);
     for (const AuthorId author : {trainee, other}) {
       sessions[author] = std::make_shared<HeardSession>(author);
-      EXPECT_TRUE(host.open_session(sessions[author]));
+      EXPECT_TRUE(runtime.open_session(sessions[author]));
     }
   }
   AuthorId join(const std::string& name, Role role) {
     AuthorId author;
-    host.join(MemberKind::surgeon, name, {}, role, [&](const Result<AuthorId>& given) { author = given.value(); });
+    runtime.join(MemberKind::surgeon, name, {}, role, [&](const Result<AuthorId>& given) { author = given.value(); });
     tick();
     return author;
   }
-  void tick() { host.tick(now += 8ms); }
+  void tick() { runtime.tick(now += 8ms); }
   Result<RoomEvent> ask(std::function<Result<RoomEvent>(Room&)> what) {
     std::optional<Result<RoomEvent>> answer;
-    host.queue_event(std::move(what), [&](const Result<RoomEvent>& decided) { answer = decided; });
+    runtime.queue_event(std::move(what), [&](const Result<RoomEvent>& decided) { answer = decided; });
     tick();
     return answer.value();
   }
@@ -119,7 +119,7 @@ struct Lesson {
   }
   v1::WatchPeopleResponse news(PeopleCursor& cursor, AuthorId reader, const PeopleRights& rights = {}) {
     v1::WatchPeopleResponse response;
-    const Bytes bytes = host.people().news(cursor, reader, rights);
+    const Bytes bytes = runtime.people().news(cursor, reader, rights);
     EXPECT_TRUE(!bytes || response.ParseFromString(*bytes));
     return response;
   }
@@ -129,7 +129,7 @@ struct Lesson {
   }
 
   std::chrono::nanoseconds now{};
-  RoomHost host;
+  RoomRuntime runtime;
   AuthorId instructor, trainee, other;
   std::map<AuthorId, std::shared_ptr<HeardSession>> sessions;
 };
@@ -139,11 +139,11 @@ TEST(PeopleHost, AnAuthorOfAnotherRoleDoesNotComeBack) {
   Lesson lesson;
   const Digest secret{{7}};
   AuthorId author;
-  lesson.host.join(MemberKind::surgeon, "Eve", secret, Role::instructor, [&](const Result<AuthorId>& given) { author = given.value(); });
+  lesson.runtime.join(MemberKind::surgeon, "Eve", secret, Role::instructor, [&](const Result<AuthorId>& given) { author = given.value(); });
   lesson.tick();
-  EXPECT_TRUE(lesson.host.resume(author, secret, {}, Role::instructor));
-  EXPECT_TRUE(lesson.host.resume(author, secret, {}));  // over plain text nobody has a role
-  const Result<void> demoted = lesson.host.resume(author, secret, {}, Role::trainee);
+  EXPECT_TRUE(lesson.runtime.resume(author, secret, {}, Role::instructor));
+  EXPECT_TRUE(lesson.runtime.resume(author, secret, {}));  // over plain text nobody has a role
+  const Result<void> demoted = lesson.runtime.resume(author, secret, {}, Role::trainee);
   ASSERT_FALSE(demoted);
   EXPECT_EQ(demoted.error().code, ErrorCode::denied);
 }
@@ -158,13 +158,13 @@ TEST(PeopleHost, AWordGoesToItsHandAndLeavesNoGapForOthers) {
   ASSERT_TRUE(own.back().has_supervised());
   EXPECT_EQ(own.back().supervised().room_seq(), frozen->room_seq.value);
   EXPECT_TRUE(own.back().supervised().supervision().stopped());
-  EXPECT_EQ(own.back().supervised().lease_epoch(), lesson.host.lease_epoch(lesson.trainee));
+  EXPECT_EQ(own.back().supervised().lease_epoch(), lesson.runtime.lease_epoch(lesson.trainee));
   EXPECT_EQ(own.back().supervised().decided_by(), lesson.instructor.value);
   EXPECT_EQ(own.back().supervised().decided_by_name(), "Ada");
   const wire::SessionRow fast = lesson.sessions[lesson.trainee]->fast().back();
   EXPECT_EQ(fast.kind, wire::SessionRowKind::supervised);
   EXPECT_TRUE(fast.supervision.stopped);
-  EXPECT_EQ(fast.lease_epoch, lesson.host.lease_epoch(lesson.trainee));
+  EXPECT_EQ(fast.lease_epoch, lesson.runtime.lease_epoch(lesson.trainee));
   EXPECT_EQ(fast.by, (Decider{lesson.instructor, "Ada"})) << "as the stream says it";
   ASSERT_TRUE(others.back().has_noted());
   EXPECT_EQ(others.back().noted().room_seq(), frozen->room_seq.value);
@@ -190,7 +190,7 @@ TEST(PeopleHost, WhoComesIsToldFirstWhatHolds) {
   ASSERT_TRUE(lesson.supervise(away, {.taken_by = lesson.instructor}));
   const auto comes = [&] {
     const auto session = std::make_shared<HeardSession>(away);
-    EXPECT_TRUE(lesson.host.open_session(session));
+    EXPECT_TRUE(lesson.runtime.open_session(session));
     return session;
   };
   const auto first = comes();
@@ -203,7 +203,7 @@ TEST(PeopleHost, WhoComesIsToldFirstWhatHolds) {
   EXPECT_EQ(told->supervised().decided_by_name(), "Ada");
   ASSERT_TRUE(first->held_) << "and its link, for the flag";
   EXPECT_FALSE(first->held_->supervision.may_cut());
-  lesson.host.leave(*first);
+  lesson.runtime.leave(*first);
 
   // Freed while it was away: it must not go on believing otherwise.
   ASSERT_TRUE(lesson.supervise(away, {}));
@@ -237,15 +237,15 @@ TEST(PeopleHost, WhatIsDecidedIsPendingUntilItIsHeard) {
   EXPECT_EQ(next.people(0).decided_by(), lesson.instructor.value);
   EXPECT_LT(next.people(0).heard_room_seq(), place.value);
   EXPECT_TRUE(next.people(0).supervision().stopped());
-  EXPECT_EQ(lesson.host.people().news(cursor, lesson.instructor, {}), nullptr) << "all is told";
+  EXPECT_EQ(lesson.runtime.people().news(cursor, lesson.instructor, {}), nullptr) << "all is told";
 
-  lesson.host.people().heard(lesson.trainee, place);
-  lesson.host.people().heard(lesson.trainee, RoomSeq{1});
+  lesson.runtime.people().heard(lesson.trainee, place);
+  lesson.runtime.people().heard(lesson.trainee, RoomSeq{1});
   next = lesson.news(cursor, lesson.instructor);
   ASSERT_EQ(next.people_size(), 1);
   EXPECT_EQ(next.people(0).heard_room_seq(), place.value) << "what was heard later was said earlier";
 
-  lesson.host.leave(*lesson.sessions[lesson.trainee]);
+  lesson.runtime.leave(*lesson.sessions[lesson.trainee]);
   next = lesson.news(cursor, lesson.instructor);
   ASSERT_EQ(next.people_size(), 1);
   EXPECT_FALSE(next.people(0).here());
@@ -270,7 +270,7 @@ TEST(PeopleHost, AReaderIsToldWhatConcernsThem) {
   // A window beside a hand is of the same person, whoever else may look.
   const auto window = [&](const std::string& name) {
     AuthorId author;
-    lesson.host.join(MemberKind::watcher, name, {}, Role::trainee,
+    lesson.runtime.join(MemberKind::watcher, name, {}, Role::trainee,
                      [&](const Result<AuthorId>& given) { author = given.value(); });
     lesson.tick();
     return author;
@@ -391,28 +391,28 @@ TEST(PeopleHost, NamesAndDecisionsOutliveTheProcess) {
   RoomSeq place;
   {
     PersistedRoom kept = open();
-    RoomHost host(std::move(kept.room), {.tick = 1ms, .mesh = 1s, .pieces = 0ns}, {}, Detail::automatic,
+    RoomRuntime runtime(std::move(kept.room), {.tick = 1ms, .mesh = 1s, .pieces = 0ns}, {}, Detail::automatic,
                   kept.store.get());
-    const AuthorId instructor = host.join(MemberKind::watcher, "Ada", {}, Role::instructor).value();
-    trainee = host.join(MemberKind::surgeon, "Ben", {}, Role::trainee).value();
+    const AuthorId instructor = runtime.join(MemberKind::watcher, "Ada", {}, Role::instructor).value();
+    trainee = runtime.join(MemberKind::surgeon, "Ben", {}, Role::trainee).value();
     std::promise<RoomSeq> decided;
-    host.queue_event([&](Room& room) { return room.supervise(instructor, trainee, {.stopped = true}); },
+    runtime.queue_event([&](Room& room) { return room.supervise(instructor, trainee, {.stopped = true}); },
                      [](const Result<RoomEvent>&) {});
-    host.queue_event(
+    runtime.queue_event(
         [&](Room& room) {
           return room.annotate(instructor, {.points = {{1, 2, 3}}, .words = "here"});
         },
         [&](const Result<RoomEvent>& event) { decided.set_value(event.value().room_seq); });
     place = decided.get_future().get();
-    host.stop();
+    runtime.stop();
     ASSERT_TRUE(kept.store->close());
   }
   PersistedRoom kept = open();
-  RoomHost host(std::move(kept.room), {.tick = 1ms, .mesh = 1s, .pieces = 0ns}, {}, Detail::automatic,
+  RoomRuntime runtime(std::move(kept.room), {.tick = 1ms, .mesh = 1s, .pieces = 0ns}, {}, Detail::automatic,
                 kept.store.get());
   PeopleCursor cursor;
   v1::WatchPeopleResponse news;
-  ASSERT_TRUE(news.ParseFromString(*host.people().news(cursor, {}, {})));
+  ASSERT_TRUE(news.ParseFromString(*runtime.people().news(cursor, {}, {})));
   const v1::Person* ben = Lesson::person(news, trainee);
   ASSERT_NE(ben, nullptr);
   EXPECT_EQ(ben->name(), "Ben");
@@ -422,20 +422,20 @@ TEST(PeopleHost, NamesAndDecisionsOutliveTheProcess) {
   EXPECT_EQ(ben->decided_room_seq(), place.value - 1);
   ASSERT_EQ(news.annotations_size(), 1);
   EXPECT_EQ(news.annotations(0).words(), "here");
-  host.stop();
+  runtime.stop();
 }
 
 TEST(PeopleHost, HandsAreToldOfOthersTools) {
-  RoomHost host(Room(test::test_block()), {.tick = 2ms, .mesh = 50ms, .pieces = 0ns}, {});
-  const auto one = std::make_shared<HeardSession>(host.join(MemberKind::surgeon).value());
-  ASSERT_TRUE(host.open_session(one));
-  host.offer_state(state(77, 5));
+  RoomRuntime runtime(Room(test::test_block()), {.tick = 2ms, .mesh = 50ms, .pieces = 0ns}, {});
+  const auto one = std::make_shared<HeardSession>(runtime.join(MemberKind::surgeon).value());
+  ASSERT_TRUE(runtime.open_session(one));
+  runtime.offer_state(state(77, 5));
   const auto told = [&] {
     return std::ranges::any_of(one->partners(), [](const CuttingState& s) { return s.state_seq == 5; });
   };
   for (int i = 0; i < 2000 && !told(); ++i) std::this_thread::sleep_for(5ms);
   EXPECT_TRUE(told());
-  host.stop();
+  runtime.stop();
 }
 
 }  // namespace

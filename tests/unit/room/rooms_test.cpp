@@ -51,7 +51,7 @@ class RoomsTest : public ::testing::Test {
       cuts[i].lease_epoch = by.lease();
       ASSERT_TRUE(wait_until([&] { return by.session().send(cuts[i]); }, kPatience));
     }
-    ASSERT_TRUE(wait_until([&] { return by.own() == from + cuts.size() - 1 && settled((*server_->rooms().find(by.session().room().name))->host(), {&by}); }, kPatience)) << by.rejected();
+    ASSERT_TRUE(wait_until([&] { return by.own() == from + cuts.size() - 1 && settled((*server_->rooms().find(by.session().room().name))->runtime(), {&by}); }, kPatience)) << by.rejected();
   }
   std::string hash_of(const std::string& room) {
     return status_of(join(server_->address(), wire::ClientKind::viewer, room)).field_hash();

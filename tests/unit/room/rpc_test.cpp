@@ -68,7 +68,7 @@ TEST_F(RoomRpc, AWordAboutAllIsARowForThoseAloneWhomItChanges) {
     EXPECT_TRUE(status.ok()) << status.error_message();
     return response.room_seq();
   };
-  const auto head = [&] { return host().room_seq().value; };
+  const auto head = [&] { return runtime().room_seq().value; };
   const std::uint64_t before = head();
   EXPECT_EQ(tell(0, false), before) << "nobody was ever stopped";
   EXPECT_EQ(head(), before);

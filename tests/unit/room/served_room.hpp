@@ -17,7 +17,7 @@ class ServedRoom : public ::testing::Test {
     server_ = std::move(*started);
   }
   const std::string& address() { return server_->address(); }
-  RoomHost& host() { return (*server_->rooms().find(""))->host(); }
+  RoomRuntime& runtime() { return (*server_->rooms().find(""))->runtime(); }
   std::unique_ptr<Surgeon> surgeon() { return std::make_unique<Surgeon>(address(), dir_ / "cache"); }
   void send(Surgeon& from, const std::vector<Cut>& cuts) {
     for (const Cut& cut : cuts) ASSERT_TRUE(wait_until([&] { return from.session().send(cut); }, kPatience));

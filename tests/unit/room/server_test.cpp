@@ -37,7 +37,7 @@ TEST_F(RoomServerTest, EveryHolderHasTheServersHashHoweverLateItJoins) {
   const auto later = surgeon();
   // Crumbs that came off are events of their own, in their own time.
   const std::vector<Surgeon*> holders{first.get(), second.get(), late.get(), later.get()};
-  ASSERT_TRUE(wait_until([&] { return settled(host(), holders); }, kPatience));
+  ASSERT_TRUE(wait_until([&] { return settled(runtime(), holders); }, kPatience));
   const auto status = status_of(later->session().room());
   EXPECT_GE(status.room_seq(), 60u);
   for (std::size_t i = 0; i < holders.size(); ++i) EXPECT_EQ(wire::to_wire(holders[i]->hash()), status.field_hash()) << "holder " << i;
@@ -48,7 +48,7 @@ TEST_F(RoomServerTest, EveryHolderHasTheServersHashHoweverLateItJoins) {
 // Nobody who has come back stays pending until the next event.
 TEST_F(RoomServerTest, AHandSaysThatTheLeavesHaveCome) {
   const auto hand = surgeon();
-  EXPECT_TRUE(wait_until([&] { return host().people().heard_of(AuthorId{1}) == host().room_seq(); }, kPatience));
+  EXPECT_TRUE(wait_until([&] { return runtime().people().heard_of(AuthorId{1}) == runtime().room_seq(); }, kPatience));
 }
 
 // As one would that was told of more, by a server whose journal has lost its end.
@@ -62,7 +62,7 @@ TEST_F(RoomServerTest, AHandThatHasHeardMoreThanThereIsIsNotTurnedAway) {
   request.mutable_open()->set_server_epoch(room.server_epoch);
   request.mutable_open()->set_secret(room.secret);
   ASSERT_TRUE(stream->Write(request));
-  request.mutable_heard()->set_room_seq(host().room_seq().value + 1000);
+  request.mutable_heard()->set_room_seq(runtime().room_seq().value + 1000);
   ASSERT_TRUE(stream->Write(request));
   Cut cut = strokes(room.author, 1, 3)[0];
   cut.lease_epoch = room.lease_epoch;
@@ -72,9 +72,9 @@ TEST_F(RoomServerTest, AHandThatHasHeardMoreThanThereIsIsNotTurnedAway) {
   while (stream->Read(&response) && !response.has_committed()) {
   }
   EXPECT_TRUE(response.has_committed()) << "its session goes on";
-  const RoomSeq heard = host().people().heard_of(room.author);
+  const RoomSeq heard = runtime().people().heard_of(room.author);
   EXPECT_GT(heard, RoomSeq{});
-  EXPECT_LE(heard, host().room_seq()) << "as far as there is anything";
+  EXPECT_LE(heard, runtime().room_seq()) << "as far as there is anything";
   context.TryCancel();
   const grpc::Status status = stream->Finish();
   EXPECT_EQ(status.error_code(), grpc::StatusCode::CANCELLED) << status.error_message();
@@ -130,7 +130,7 @@ TEST_F(RoomServerTest, ALateViewerSeesTheBlocksOfAnEarlyOne) {
   const auto hand = surgeon();
   send(*hand, strokes(hand->author(), 40, 4));
   // Joins have places in the order too, and so has the crumb that is found a moment after the last stroke.
-  ASSERT_TRUE(wait_until([&] { return hand->own() == 40 && settled(host(), {hand.get()}); }, kPatience));
+  ASSERT_TRUE(wait_until([&] { return hand->own() == 40 && settled(runtime(), {hand.get()}); }, kPatience));
   const RoomSeq last = hand->seq();
   ASSERT_TRUE(early.read_to(last));
   MeshReader late(address());
@@ -149,7 +149,7 @@ TEST_F(RoomServerTest, ASlowReaderIsBoundedAndCatchesUp) {
     furthest = std::max(furthest, server_->health().furthest_behind);
   }
   ASSERT_TRUE(prompt.read_to(RoomSeq{400}));
-  const HostHealth health = server_->health();
+  const RuntimeHealth health = server_->health();
   // A waiting set holds each block once: those with a surface and those that lost it.
   EXPECT_LE(furthest, 2 * health.blocks);
   EXPECT_EQ(health.mesh_streams, 2u);
@@ -169,7 +169,7 @@ TEST_F(RoomServerTest, AKilledClientDisturbsNobody) {
   }
   send(*survivor, strokes(survivor->author(), 20, 7));
   // The strokes leave a crumb, which is found a moment after the last of them.
-  ASSERT_TRUE(wait_until([&] { return survivor->own() == 20 && settled(host(), {survivor.get()}); }, kPatience));
+  ASSERT_TRUE(wait_until([&] { return survivor->own() == 20 && settled(runtime(), {survivor.get()}); }, kPatience));
   EXPECT_TRUE(watcher.read_to(survivor->seq()));
   EXPECT_EQ(wire::to_wire(survivor->hash()), status_of(survivor->session().room()).field_hash());
   EXPECT_TRUE(wait_until([&] { return server_->health().mesh_streams == 1 && server_->health().sessions == 1; }, kPatience));

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "osteon/v1/cutting.pb.h"
-#include "server/net/room_host.hpp"
+#include "server/net/room_runtime.hpp"
 #include "server/net/room_store.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/unit/room/cuts.hpp"
@@ -65,7 +65,7 @@ class Told final : public SessionSink {
   SessionOutbox outbox_;
 };
 
-// A driven host over a disk in memory, with an instructor and a hand.
+// A driven runtime over a disk in memory, with an instructor and a hand.
 class BegunSession : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -78,7 +78,7 @@ class BegunSession : public ::testing::Test {
     Result<PersistedRoom> kept = RoomStore::open("/rooms/femur", test_block(), options());
     ASSERT_TRUE(kept) << kept.error().message;
     store = std::move(kept->store);
-    host = std::make_unique<RoomHost>(std::move(kept->room), HostRates{.tick = 0ns, .mesh = 1s, .pieces = 0ns}, nullptr,
+    runtime = std::make_unique<RoomRuntime>(std::move(kept->room), RuntimeRates{.tick = 0ns, .mesh = 1s, .pieces = 0ns}, nullptr,
                                       Detail::automatic, store.get());
   }
   RoomStore::Options options() {
@@ -89,7 +89,7 @@ class BegunSession : public ::testing::Test {
   }
   // What no transaction has is lost.
   void kill() {
-    host.reset();
+    runtime.reset();
     store.reset();
     sinks.clear();
   }
@@ -120,8 +120,8 @@ class BegunSession : public ::testing::Test {
 
   test::MemoryDisk disk{1};
   std::unique_ptr<RoomStore> store;
-  std::unique_ptr<RoomHost> host;
-  std::vector<std::shared_ptr<Told>> sinks;  // the host's until they go
+  std::unique_ptr<RoomRuntime> runtime;
+  std::vector<std::shared_ptr<Told>> sinks;  // the runtime's until they go
   std::chrono::nanoseconds now{};
   AuthorId ada, ben;
 };

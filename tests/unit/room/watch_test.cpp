@@ -51,7 +51,7 @@ TEST_F(Watching, WhoeverComesGoesStallsOrComesBackEndsWithTheRoomsSurface) {
   send(*hand, {cuts.end() - kLast, cuts.end()});
   ASSERT_TRUE(wait_until([&] { return hand->own() == kCuts; }, kPatience));
   // Crumbs may still come off, each an event of its own.
-  ASSERT_TRUE(wait_until([&] { return settled(host(), {hand.get()}); }, kPatience));
+  ASSERT_TRUE(wait_until([&] { return settled(runtime(), {hand.get()}); }, kPatience));
   const RoomSeq last = server_->health().room_seq;
   for (const auto& reader : readers) EXPECT_TRUE(reader->read_to(last));
   const std::size_t blocks = server_->health().blocks;

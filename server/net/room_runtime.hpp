@@ -56,8 +56,8 @@ class SessionSink : public StreamSink {
   virtual void decided() = 0;                               // one queued cut has left the queue
 };
 
-struct HostRates {
-  // Zero: driven. The host has no thread and no surface; its owner calls tick(), and slow requests are answered at once.
+struct RuntimeRates {
+  // Zero: driven. The runtime has no thread and no surface; its owner calls tick(), and slow requests are answered at once.
   std::chrono::nanoseconds tick{1'000'000'000 / 120};
   std::chrono::nanoseconds mesh{1'000'000'000 / 30};
   std::chrono::nanoseconds looks{250'000'000};   // at most so often the surface follows the looks of viewers and the tools
@@ -65,7 +65,7 @@ struct HostRates {
   bool mount = false;  // the bone stands on one, about its middle, and whoever has a session pushes it; not in a playback
 };
 
-struct HostHealth {
+struct RuntimeHealth {
   TickStats tick;
   StageTimes stages;              // of cuts
   DurationHistogram mesh_update;  // from a cut's arrival until its blocks' payloads were ready
@@ -91,18 +91,18 @@ struct BoneStatus {
   RoomCounts counts;
 };
 
-class RoomHost {
+class RoomRuntime {
  public:
   using Clock = std::chrono::steady_clock;
 
   // Makes the whole surface, then starts the threads. `progress` hears fractions from one thread at a time.
-  // `store` makes rows durable before any hand hears of them, and outlives the host; without it nothing is kept.
+  // `store` makes rows durable before any hand hears of them, and outlives the runtime; without it nothing is kept.
   // `playback`: rows after those of `room` happen at their times; whoever joins may watch and nothing else.
-  RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress, Detail detail = Detail::automatic,
+  RoomRuntime(Room room, RuntimeRates rates, const std::function<void(double)>& progress, Detail detail = Detail::automatic,
            RoomStore* store = nullptr, std::optional<Playback> playback = {});
-  ~RoomHost();
-  RoomHost(const RoomHost&) = delete;
-  RoomHost& operator=(const RoomHost&) = delete;
+  ~RoomRuntime();
+  RoomRuntime(const RoomRuntime&) = delete;
+  RoomRuntime& operator=(const RoomRuntime&) = delete;
 
   [[nodiscard]] const Case& bone() const;
   [[nodiscard]] RoomSeq room_seq() const;
@@ -111,20 +111,20 @@ class RoomHost {
   [[nodiscard]] const ToolBox& tools() const;
   [[nodiscard]] std::vector<SceneItem> items() const;
   [[nodiscard]] std::vector<std::pair<RoomSeq, std::string>> marks() const;
-  [[nodiscard]] HostHealth health() const;
+  [[nodiscard]] RuntimeHealth health() const;
   [[nodiscard]] Digest surface_hash() const;  // of the newest blocks
 
-  // [owner of a driven host] Decides what is queued, keeps it, and tells of it. `now`: since any start, never falls. `keep`
+  // [owner of a driven runtime] Decides what is queued, keeps it, and tells of it. `now`: since any start, never falls. `keep`
   // false: that is left to a later tick, as by a slow disk.
   void tick(std::chrono::nanoseconds now, bool keep = true);
 
-  // Runs `job` on the thread for slow requests, in order; it may call the functions below. Of a stopped host: at once.
+  // Runs `job` on the thread for slow requests, in order; it may call the functions below. Of a stopped runtime: at once.
   void run_slowly(std::function<void()> job);
   // `answer` is called when it is durable, on the committing thread. Error unavailable: the room has stopped or keeps nothing
   // any more.
   void join(MemberKind kind, const std::string& name, const Digest& secret, Role role,
             std::function<void(const Result<AuthorId>&)> answer);
-  // The same; waits, so not on the tick or the committing thread, nor of a driven host.
+  // The same; waits, so not on the tick or the committing thread, nor of a driven runtime.
   [[nodiscard]] Result<AuthorId> join(MemberKind kind, const std::string& name = {}, const Digest& secret = {},
                                       Role role = Role::none);
   // What somebody who comes back was told is safe. It counts whoever says it: after a loss the author's number may be

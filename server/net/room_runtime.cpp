@@ -1,4 +1,4 @@
-#include "server/net/room_host.hpp"
+#include "server/net/room_runtime.hpp"
 
 #include <thread>
 #include <utility>
@@ -8,19 +8,19 @@
 #include "common/runtime/log.hpp"
 #include "common/runtime/memory_reserve.hpp"
 #include "common/runtime/periodic.hpp"
-#include "server/net/host_impl.hpp"
+#include "server/net/runtime_impl.hpp"
 
 namespace osteon {
 namespace {
 
-using Clock = RoomHost::Clock;
+using Clock = RoomRuntime::Clock;
 
 // Rows that happen again in one tick at most: so the surface and the health of a fast playback are told as they go.
 constexpr int kRowsPlayedPerTick = 256;
 
 }  // namespace
 
-bool RoomHost::Impl::tick(std::chrono::nanoseconds now, bool last) {
+bool RoomRuntime::Impl::tick(std::chrono::nanoseconds now, bool last) {
   {
     const std::lock_guard lock(queue_mutex);
     std::swap(batch, queue);
@@ -45,7 +45,7 @@ bool RoomHost::Impl::tick(std::chrono::nanoseconds now, bool last) {
   return decided;
 }
 
-void RoomHost::Impl::move_bone(std::chrono::nanoseconds now) {
+void RoomRuntime::Impl::move_bone(std::chrono::nanoseconds now) {
   if (!mount->step(now)) return;
   // A tick does not wait for those who come, go or are told of rows: the next place is as good.
   const std::unique_lock lock(sessions_mutex, std::try_to_lock);
@@ -53,7 +53,7 @@ void RoomHost::Impl::move_bone(std::chrono::nanoseconds now) {
 }
 
 // Whether anything happened.
-bool RoomHost::Impl::play(std::chrono::nanoseconds now) {
+bool RoomRuntime::Impl::play(std::chrono::nanoseconds now) {
   int played = 0;
   for (; played < kRowsPlayedPerTick; ++played) {
     const std::optional<RoomRow> row = player->take(now);
@@ -79,7 +79,7 @@ bool RoomHost::Impl::play(std::chrono::nanoseconds now) {
   return played > 0;
 }
 
-void RoomHost::Impl::run_ticks() {
+void RoomRuntime::Impl::run_ticks() {
   PeriodicTimer timer(rates_.tick);
   TickStats own;
   MemoryReserve reserve(kCutReserve);
@@ -107,13 +107,13 @@ void RoomHost::Impl::run_ticks() {
 }
 
 // [committing thread] What was decided since the last transaction will not survive: nobody may build on it.
-void RoomHost::Impl::close_room(const Error& why) {
+void RoomRuntime::Impl::close_room(const Error& why) {
   const std::string sentence = "the room takes no more cuts: " + why.message;
   log::error("journal failed", {{"reason", why.message}});
   end_sessions(sentence);
 }
 
-std::optional<Error> RoomHost::Impl::closed() const {
+std::optional<Error> RoomRuntime::Impl::closed() const {
   std::optional<Error> why = committer.failure();
   if (!why && store && store->closed_to_rows()) why = *store->closed_to_rows();
   if (why) *why = {ErrorCode::unavailable, "the room takes no more cuts: " + why->message};
@@ -121,9 +121,9 @@ std::optional<Error> RoomHost::Impl::closed() const {
 }
 
 // What viewers draw beside the surface.
-void RoomHost::Impl::show_scene() { board.show(room.items(), room.bodies()); }
+void RoomRuntime::Impl::show_scene() { board.show(room.items(), room.bodies()); }
 
-RoomHost::RoomHost(Room room, HostRates rates, const std::function<void(double)>& progress, Detail detail,
+RoomRuntime::RoomRuntime(Room room, RuntimeRates rates, const std::function<void(double)>& progress, Detail detail,
                    RoomStore* store, std::optional<Playback> playback)
     : impl_(std::make_unique<Impl>(std::move(room), rates, detail, store, std::move(playback))) {
   if (!impl_->driven()) impl_->mesh.make_whole_surface(progress);
@@ -136,30 +136,30 @@ RoomHost::RoomHost(Room room, HostRates rates, const std::function<void(double)>
   impl_->jobs.start();
 }
 
-RoomHost::~RoomHost() { stop(); }
+RoomRuntime::~RoomRuntime() { stop(); }
 
-const Case& RoomHost::bone() const { return impl_->room.bone(); }
-RoomSeq RoomHost::room_seq() const { return RoomSeq{impl_->room_seq}; }
-std::uint64_t RoomHost::lease_epoch(AuthorId holder) const {
+const Case& RoomRuntime::bone() const { return impl_->room.bone(); }
+RoomSeq RoomRuntime::room_seq() const { return RoomSeq{impl_->room_seq}; }
+std::uint64_t RoomRuntime::lease_epoch(AuthorId holder) const {
   const std::shared_lock lock(impl_->room_mutex);
   return impl_->room.lease_epoch(holder);
 }
-const ToolBox& RoomHost::tools() const { return *impl_->room.tools(); }
-std::vector<SceneItem> RoomHost::items() const {
+const ToolBox& RoomRuntime::tools() const { return *impl_->room.tools(); }
+std::vector<SceneItem> RoomRuntime::items() const {
   const std::shared_lock lock(impl_->room_mutex);
   return impl_->room.items();
 }
-std::vector<std::pair<RoomSeq, std::string>> RoomHost::marks() const {
+std::vector<std::pair<RoomSeq, std::string>> RoomRuntime::marks() const {
   const std::shared_lock lock(impl_->room_mutex);
   return impl_->room.marks();
 }
-bool RoomHost::knows(AuthorId author) const {
+bool RoomRuntime::knows(AuthorId author) const {
   if (impl_->player && author.value >= kFirstWatcherOfPlayback) return author.value < impl_->next_watcher;
   return author && author.value <= impl_->authors;
 }
 
-HostHealth RoomHost::health() const {
-  HostHealth health;
+RuntimeHealth RoomRuntime::health() const {
+  RuntimeHealth health;
   health.room_seq = room_seq();
   const auto look = [&](const StreamSink& sink) { health.furthest_behind = std::max(health.furthest_behind, sink.waiting()); };
   {
@@ -193,7 +193,7 @@ HostHealth RoomHost::health() const {
   return health;
 }
 
-void RoomHost::tick(std::chrono::nanoseconds now, bool keep) {
+void RoomRuntime::tick(std::chrono::nanoseconds now, bool keep) {
   OSTEON_CHECK(impl_->driven());
   impl_->tick(now, false);
   if (keep) impl_->committer.drain();
@@ -201,10 +201,10 @@ void RoomHost::tick(std::chrono::nanoseconds now, bool keep) {
   (void)impl_->room.take_stale_blocks();
 }
 
-// A driven host's jobs never start.
-void RoomHost::run_slowly(std::function<void()> job) { impl_->jobs.run(std::move(job)); }
+// A driven runtime's jobs never start.
+void RoomRuntime::run_slowly(std::function<void()> job) { impl_->jobs.run(std::move(job)); }
 
-void RoomHost::queue_cut(std::shared_ptr<SessionSink> sink, Cut cut, Clock::time_point arrived) {
+void RoomRuntime::queue_cut(std::shared_ptr<SessionSink> sink, Cut cut, Clock::time_point arrived) {
   {
     const std::lock_guard lock(impl_->queue_mutex);
     if (!impl_->queue_closed) {
@@ -215,7 +215,7 @@ void RoomHost::queue_cut(std::shared_ptr<SessionSink> sink, Cut cut, Clock::time
   sink->decided();
 }
 
-void RoomHost::queue_event(std::function<Result<RoomEvent>(Room&)> change,
+void RoomRuntime::queue_event(std::function<Result<RoomEvent>(Room&)> change,
                            std::function<void(const Result<RoomEvent>&)> answer) {
   {
     const std::lock_guard lock(impl_->queue_mutex);
@@ -227,11 +227,11 @@ void RoomHost::queue_event(std::function<Result<RoomEvent>(Room&)> change,
   answer(failure(ErrorCode::unavailable, "the room is closed"));
 }
 
-bool RoomHost::stopped() const { return impl_->stopping || impl_->closed(); }
+bool RoomRuntime::stopped() const { return impl_->stopping || impl_->closed(); }
 
-std::vector<FieldLeaf> RoomHost::all_leaves() const { return impl_->room.all_leaves(); }
+std::vector<FieldLeaf> RoomRuntime::all_leaves() const { return impl_->room.all_leaves(); }
 
-void RoomHost::stop() {
+void RoomRuntime::stop() {
   // The last tick may still make blocks due, so the mesh thread ends after it.
   impl_->stopping = true;
   if (impl_->tick_thread.joinable()) impl_->tick_thread.join();

@@ -1,4 +1,4 @@
-// What waits for a RoomHost's tick.
+// What waits for a RoomRuntime's tick.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -6,19 +6,19 @@
 #include <variant>
 #include <vector>
 
-#include "server/net/room_host.hpp"
+#include "server/net/room_runtime.hpp"
 
 namespace osteon {
 
 struct QueuedCut {
   std::shared_ptr<SessionSink> sink;  // owned by its stream and by its queued cuts
   Cut cut;
-  RoomHost::Clock::time_point arrived;
+  RoomRuntime::Clock::time_point arrived;
 };
 struct QueuedEvent {
   std::function<Result<RoomEvent>(Room&)> change;
   std::function<void(const Result<RoomEvent>&)> answer;
-  RoomHost::Clock::time_point arrived;
+  RoomRuntime::Clock::time_point arrived;
 };
 using Queued = std::variant<QueuedCut, QueuedEvent>;
 

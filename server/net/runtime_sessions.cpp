@@ -6,12 +6,12 @@
 #include <memory>
 
 #include "common/wire/convert.hpp"
-#include "server/net/host_impl.hpp"
+#include "server/net/runtime_impl.hpp"
 
 namespace osteon {
 namespace {
 
-using Clock = RoomHost::Clock;
+using Clock = RoomRuntime::Clock;
 
 // Cuts whose places a session begins with: a haptic client never has more that it knows nothing of.
 constexpr std::size_t kMostToldAgain = 1024;
@@ -23,7 +23,7 @@ Error only_to_be_watched() {
 }
 
 // A name that cannot be read now is shown as nobody's.
-std::map<std::uint32_t, std::string> RoomHost::Impl::names_of(RoomStore* store) {
+std::map<std::uint32_t, std::string> RoomRuntime::Impl::names_of(RoomStore* store) {
   std::map<std::uint32_t, std::string> names;
   if (store == nullptr) return names;
   const Result<std::vector<Person>> people = store->people();
@@ -36,7 +36,7 @@ std::map<std::uint32_t, std::string> RoomHost::Impl::names_of(RoomStore* store) 
   return names;
 }
 
-void RoomHost::Impl::decide(QueuedCut& queued) {
+void RoomRuntime::Impl::decide(QueuedCut& queued) {
   if (closed() || player) return later([sink = queued.sink](const Result<void>&) { sink->decided(); });
   const Clock::time_point taken = Clock::now();
   Result<Outcome> outcome = [&] {
@@ -87,7 +87,7 @@ void RoomHost::Impl::decide(QueuedCut& queued) {
   });
 }
 
-void RoomHost::Impl::decide(QueuedEvent& queued) {
+void RoomRuntime::Impl::decide(QueuedEvent& queued) {
   Result<RoomEvent> event = [&]() -> Result<RoomEvent> {
     if (const std::optional<Error> why = closed()) return tl::unexpected(*why);
     if (player) return tl::unexpected(only_to_be_watched());
@@ -130,7 +130,7 @@ void RoomHost::Impl::decide(QueuedEvent& queued) {
 }
 
 // [tick] Every second, what a client may hold the room to.
-void RoomHost::Impl::tell_kept(std::chrono::nanoseconds now) {
+void RoomRuntime::Impl::tell_kept(std::chrono::nanoseconds now) {
   if (!store || now < next_kept) return;
   next_kept = now + std::chrono::seconds(1);
   later([this](const Result<void>& durable) {
@@ -142,13 +142,13 @@ void RoomHost::Impl::tell_kept(std::chrono::nanoseconds now) {
 }
 
 // [any thread] Tools are numbered as they come to be told, the same for all sessions.
-std::uint32_t RoomHost::Impl::number_of(const Digest& tool) {
+std::uint32_t RoomRuntime::Impl::number_of(const Digest& tool) {
   const std::lock_guard lock(numbers_mutex);
   return tool_numbers.emplace(tool, static_cast<std::uint32_t>(tool_numbers.size() + 1)).first->second;
 }
 
 // [tick] What every session hears of an event that is not a cut. Only this thread changes the room.
-MessageParts RoomHost::Impl::rows_of(const RoomEvent& event) {
+MessageParts RoomRuntime::Impl::rows_of(const RoomEvent& event) {
   MessageParts rows;
   if (event.tool) rows.push_back(tool_row(event.room_seq, event.tool->tool, number_of(event.tool->hash)));
   if (event.bone) rows = change_rows(event);
@@ -157,7 +157,7 @@ MessageParts RoomHost::Impl::rows_of(const RoomEvent& event) {
   return rows;
 }
 
-RoomHost::Impl::Personal RoomHost::Impl::personal_row(const RoomEvent& event) {
+RoomRuntime::Impl::Personal RoomRuntime::Impl::personal_row(const RoomEvent& event) {
   if (const auto* decided = std::get_if<SuperviseRow>(&event.people)) {
     const Decider by{event.author, people.name_of(event.author)};
     return {decided->subject, supervised_row(event.room_seq, decided->supervision, event.lease_epoch, by),
@@ -170,21 +170,21 @@ RoomHost::Impl::Personal RoomHost::Impl::personal_row(const RoomEvent& event) {
 }
 
 // [thread of the board]
-bool RoomHost::Impl::tell_hands(const std::vector<CuttingState>& states) {
+bool RoomRuntime::Impl::tell_hands(const std::vector<CuttingState>& states) {
   bool owed = false;
   const std::lock_guard lock(sessions_mutex);
   sessions.each([&](SessionSink& sink) { owed |= sink.show_partners(states); });
   return owed;
 }
 
-void RoomHost::Impl::end_sessions(const std::string& why, bool to_return) {
+void RoomRuntime::Impl::end_sessions(const std::string& why, bool to_return) {
   const std::lock_guard lock(sessions_mutex);
   ended = why;
   may_return = to_return;
   sessions.each([&](SessionSink& sink) { to_return ? sink.replaced(why) : sink.end(why); });
 }
 
-Result<void> RoomHost::check_kept(const Witness& kept) {
+Result<void> RoomRuntime::check_kept(const Witness& kept) {
   if (impl_->player) return {};
   if (impl_->store) return impl_->store->check_witness(kept);
   return failure(ErrorCode::unavailable,
@@ -192,7 +192,7 @@ Result<void> RoomHost::check_kept(const Witness& kept) {
                      " events that you were told are kept; start again to join it as it is now");
 }
 
-Result<void> RoomHost::resume(AuthorId author, const Digest& secret, const std::optional<Witness>& kept, std::optional<Role> role) {
+Result<void> RoomRuntime::resume(AuthorId author, const Digest& secret, const std::optional<Witness>& kept, std::optional<Role> role) {
   if (impl_->player) return tl::unexpected(only_to_be_watched());
   if (kept)
     if (Result<void> has = check_kept(*kept); !has) return has;
@@ -210,7 +210,7 @@ Result<void> RoomHost::resume(AuthorId author, const Digest& secret, const std::
   return {};
 }
 
-void RoomHost::join(MemberKind kind, const std::string& name, const Digest& secret, Role role,
+void RoomRuntime::join(MemberKind kind, const std::string& name, const Digest& secret, Role role,
                     std::function<void(const Result<AuthorId>&)> answer) {
   if (impl_->player) {
     if (kind == MemberKind::watcher) return answer(AuthorId{impl_->next_watcher++});
@@ -235,13 +235,13 @@ void RoomHost::join(MemberKind kind, const std::string& name, const Digest& secr
       });
 }
 
-Result<AuthorId> RoomHost::join(MemberKind kind, const std::string& name, const Digest& secret, Role role) {
+Result<AuthorId> RoomRuntime::join(MemberKind kind, const std::string& name, const Digest& secret, Role role) {
   std::promise<Result<AuthorId>> answer;
   join(kind, name, secret, role, [&](const Result<AuthorId>& author) { answer.set_value(author); });
   return answer.get_future().get();
 }
 
-Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, const Digest& secret) {
+Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSink>& sink, const Digest& secret) {
   if (impl_->player) return tl::unexpected(only_to_be_watched());
   std::vector<FieldLeaf> leaves;
   MessageParts before;
@@ -305,35 +305,35 @@ Result<void> RoomHost::open_session(const std::shared_ptr<SessionSink>& sink, co
   return {};
 }
 
-void RoomHost::watch_mesh(MeshSink& sink, const std::optional<Look>& look) {
+void RoomRuntime::watch_mesh(MeshSink& sink, const std::optional<Look>& look) {
   impl_->people.came(sink.author());
   if (look) impl_->people.looked(sink.author(), *look);
   impl_->mesh.watch(sink, look);
 }
-void RoomHost::look(AuthorId viewer, const Look& from) {
+void RoomRuntime::look(AuthorId viewer, const Look& from) {
   impl_->mesh.look(viewer, from);
   impl_->people.looked(viewer, from);
 }
-bool RoomHost::draws_near() const { return impl_->mesh.draws_near(); }
-void RoomHost::watch_cutting(CuttingSink& sink) {
+bool RoomRuntime::draws_near() const { return impl_->mesh.draws_near(); }
+void RoomRuntime::watch_cutting(CuttingSink& sink) {
   impl_->people.came(sink.author());
   impl_->board.watch(sink);
 }
-void RoomHost::leave(MeshSink& sink) {
+void RoomRuntime::leave(MeshSink& sink) {
   impl_->mesh.leave(sink);
   impl_->people.went(sink.author());
 }
-void RoomHost::leave(CuttingSink& sink) {
+void RoomRuntime::leave(CuttingSink& sink) {
   impl_->board.leave(sink);
   impl_->people.went(sink.author());
 }
-PeopleBoard& RoomHost::people() { return impl_->people; }
-void RoomHost::offer_state(CuttingState state) { impl_->board.offer(std::move(state)); }
-void RoomHost::push_bone(AuthorId author, const BonePush& push) {
+PeopleBoard& RoomRuntime::people() { return impl_->people; }
+void RoomRuntime::offer_state(CuttingState state) { impl_->board.offer(std::move(state)); }
+void RoomRuntime::push_bone(AuthorId author, const BonePush& push) {
   if (impl_->mount) impl_->mount->push(author, push);
 }
 
-void RoomHost::leave(SessionSink& sink) {
+void RoomRuntime::leave(SessionSink& sink) {
   bool was_open = false;
   {
     const std::lock_guard lock(impl_->sessions_mutex);
@@ -346,20 +346,20 @@ void RoomHost::leave(SessionSink& sink) {
   impl_->people.went(sink.author());
 }
 
-void RoomHost::ask_to_redial(std::chrono::milliseconds after, const std::string& why) {
+void RoomRuntime::ask_to_redial(std::chrono::milliseconds after, const std::string& why) {
   const std::lock_guard lock(impl_->sessions_mutex);
   impl_->redial = redial_row(after, why);
   impl_->sessions.each([&](SessionSink& sink) { sink.answer(impl_->redial); });
 }
 
-void RoomHost::send_away(const std::string& why) {
+void RoomRuntime::send_away(const std::string& why) {
   impl_->end_sessions(why, true);
   impl_->mesh.end_streams(why);
   impl_->board.end_streams(why);
   impl_->people.end_streams(why);
 }
 
-void RoomHost::end_streams(const std::string& why) {
+void RoomRuntime::end_streams(const std::string& why) {
   impl_->end_sessions(why);
   impl_->mesh.end_streams(why);
   impl_->board.end_streams(why);

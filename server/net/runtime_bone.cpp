@@ -4,23 +4,23 @@
 #include <memory>
 
 #include "common/field/kernel.hpp"
-#include "server/net/host_impl.hpp"
+#include "server/net/runtime_impl.hpp"
 
 namespace osteon {
 namespace {
 
-using Clock = RoomHost::Clock;
+using Clock = RoomRuntime::Clock;
 
 // Leaves copied at once. Between two batches the room goes on cutting.
 constexpr std::size_t kLeafBatch = 64;
 
 }  // namespace
 
-Digest RoomHost::surface_hash() const { return impl_->mesh.surface_hash(); }
+Digest RoomRuntime::surface_hash() const { return impl_->mesh.surface_hash(); }
 
 // In batches: a room that is much cut has many leaves, and a tick must not wait until all of them are copied. Those of a
 // body that goes meanwhile stay without values.
-void RoomHost::Impl::read_leaves(std::vector<FieldLeaf>& leaves) {
+void RoomRuntime::Impl::read_leaves(std::vector<FieldLeaf>& leaves) {
   for (std::size_t i = 0; i < leaves.size();) {
     const std::shared_lock lock(room_mutex);
     for (const std::size_t end = std::min(leaves.size(), i + kLeafBatch); i < end; ++i)
@@ -29,7 +29,7 @@ void RoomHost::Impl::read_leaves(std::vector<FieldLeaf>& leaves) {
   std::erase_if(leaves, [](const FieldLeaf& leaf) { return leaf.values.empty(); });
 }
 
-RoomHost::Impl::BoneCopy RoomHost::Impl::copy_bone(Bodies which) {
+RoomRuntime::Impl::BoneCopy RoomRuntime::Impl::copy_bone(Bodies which) {
   const auto bodies = [&] { return which == Bodies::all ? room.all_bodies() : room.bodies(); };
   const auto places = [&] {
     std::vector<FieldLeaf> leaves;
@@ -75,7 +75,7 @@ RoomHost::Impl::BoneCopy RoomHost::Impl::copy_bone(Bodies which) {
   }
 }
 
-BoneStatus RoomHost::bone_status() {
+BoneStatus RoomRuntime::bone_status() {
   const std::lock_guard copying(impl_->copy_mutex);
   {
     const std::shared_lock lock(impl_->room_mutex);
@@ -98,7 +98,7 @@ BoneStatus RoomHost::bone_status() {
   return status;
 }
 
-RoomHost::Leaves RoomHost::leaves_now() {
+RoomRuntime::Leaves RoomRuntime::leaves_now() {
   const std::lock_guard copying(impl_->copy_mutex);
   const Impl::BoneCopy copy = impl_->copy_bone(Impl::Bodies::all);
   Leaves all{copy.room_seq, {}};
@@ -106,7 +106,7 @@ RoomHost::Leaves RoomHost::leaves_now() {
   return all;
 }
 
-SavedFields RoomHost::saved_fields() {
+SavedFields RoomRuntime::saved_fields() {
   const std::lock_guard copying(impl_->copy_mutex);
   const Impl::BoneCopy copy = impl_->copy_bone();
   SavedFields saved;
@@ -126,7 +126,7 @@ SavedFields RoomHost::saved_fields() {
 }
 
 // [piece thread] What it finds is a queued event like any other.
-void RoomHost::Impl::run_pieces() {
+void RoomRuntime::Impl::run_pieces() {
   while (true) {
     {
       std::unique_lock lock(pieces_mutex);
@@ -149,7 +149,7 @@ void RoomHost::Impl::run_pieces() {
 }
 
 // Waits for the room's decision: until then the room must not tell anyone of its changes, see Separation.
-void RoomHost::Impl::ask_for_split(Separation found) {
+void RoomRuntime::Impl::ask_for_split(Separation found) {
   const auto shared = std::make_shared<Separation>(std::move(found));  // by the queued event and by this thread
   bool decided = false;
   {
@@ -172,7 +172,7 @@ void RoomHost::Impl::ask_for_split(Separation found) {
   pieces_wake.wait(lock, [&] { return decided; });
 }
 
-void RoomHost::find_pieces() {
+void RoomRuntime::find_pieces() {
   std::unique_lock lock(impl_->pieces_mutex);
   // One that has begun may have missed the newest cuts.
   const std::uint64_t wanted = impl_->looks_begun + 1;

@@ -1,4 +1,4 @@
-// The inside of a RoomHost, for its own sources.
+// The inside of a RoomRuntime, for its own sources.
 #pragma once
 #include <algorithm>
 #include <atomic>
@@ -14,12 +14,12 @@
 #include <vector>
 
 #include "server/net/bone_mount.hpp"
-#include "server/net/host_parts.hpp"
+#include "server/net/runtime_parts.hpp"
 #include "server/net/job_thread.hpp"
 #include "server/net/mesh_room.hpp"
 #include "server/net/people_board.hpp"
 #include "server/net/piece_watch.hpp"
-#include "server/net/room_host.hpp"
+#include "server/net/room_runtime.hpp"
 #include "server/net/room_rows.hpp"
 #include "server/net/state_board.hpp"
 
@@ -33,10 +33,10 @@ inline constexpr std::uint64_t kFirstWatcherOfPlayback = 1ull << 40;
 // Lock order: copy_mutex, then room_mutex, then sessions_mutex or that of the surface or the board, then a stream's own, then
 // that of the people or the jobs.
 // queue_mutex, pieces_mutex, stats_mutex and that of the figures are never held with another.
-struct RoomHost::Impl {
-  using Clock = RoomHost::Clock;
+struct RoomRuntime::Impl {
+  using Clock = RoomRuntime::Clock;
 
-  Impl(Room r, HostRates rates, Detail detail, RoomStore* k, std::optional<Playback> p)
+  Impl(Room r, RuntimeRates rates, Detail detail, RoomStore* k, std::optional<Playback> p)
       : store(k), room(std::move(r)),
         rates_(rates),
         room_began(Clock::now() - std::chrono::duration_cast<Clock::duration>(k ? reopened_time(room) : room.time())),
@@ -112,7 +112,7 @@ struct RoomHost::Impl {
   Room room;
   std::shared_mutex room_mutex;
   std::optional<std::vector<Cut>> meanwhile;  // under room_mutex: cuts applied since copy_bone() began to copy
-  const HostRates rates_;
+  const RuntimeRates rates_;
   const Clock::time_point room_began;     // the room's time 0, as if it had hardly been closed
   std::atomic<std::uint64_t> room_seq{0}, authors{0};
   std::atomic<bool> stopping{false};
@@ -150,7 +150,7 @@ struct RoomHost::Impl {
   std::optional<std::string> ended;       // under sessions_mutex: why new sessions end at once
   bool may_return = false;                // under sessions_mutex: so that they come again
   Bytes redial;                           // under sessions_mutex: what sessions are told when the process is to stop
-  std::mutex copy_mutex;                  // held while the bone is copied: of a stopped host by whoever asks
+  std::mutex copy_mutex;                  // held while the bone is copied: of a stopped runtime by whoever asks
   std::optional<BoneStatus> last_status;  // under copy_mutex
   std::map<std::string, std::uint32_t> persons;  // of the tick thread: by name, where no journal numbers them
   std::vector<Queued> batch;              // of the tick thread
