@@ -261,8 +261,8 @@ Result<Placing> placing_from_wire(const v1::SetSceneItemRequest& request) {
   return Placing{};
 }
 
-v1::Look to_wire(const Look& look) {
-  v1::Look out;
+v1::ViewFrustum to_wire(const ViewFrustum& look) {
+  v1::ViewFrustum out;
   *out.mutable_eye_mm() = to_wire(look.eye_mm);
   *out.mutable_target_mm() = to_wire(look.target_mm);
   out.set_pixel_rad(look.pixel_rad);
@@ -276,8 +276,8 @@ Result<BlockKey> key_from_wire(const v1::MeshBlock& block) {
   return BlockKey{BodyId{block.body()}, block.level(), from_wire(block.index())};
 }
 
-Result<Look> from_wire(const v1::Look& look) {
-  Look out{from_wire(look.eye_mm()), from_wire(look.target_mm()), look.pixel_rad(), look.view_rad()};
+Result<ViewFrustum> from_wire(const v1::ViewFrustum& look) {
+  ViewFrustum out{from_wire(look.eye_mm()), from_wire(look.target_mm()), look.pixel_rad(), look.view_rad()};
   const auto placed = [](const Vec3& at) { return at.allFinite() && at.norm() <= kFurthest_mm; };
   if (!placed(out.eye_mm)) return bad("look.eye_mm", "is no place near the bone");
   if (!placed(out.target_mm)) return bad("look.target_mm", "is no place near the bone");

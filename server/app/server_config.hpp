@@ -6,7 +6,7 @@
 
 #include "common/core/result.hpp"
 #include "server/net/case_shelf.hpp"
-#include "server/net/mesh_room.hpp"
+#include "server/net/mesh_publisher.hpp"
 #include "server/net/rooms.hpp"
 #include "server/room/room.hpp"
 

@@ -77,14 +77,14 @@ bool is_gzip(std::span<const unsigned char> head) { return has(head, 0, "\x1f\x8
 bool is_tar(std::span<const unsigned char> head) { return has(head, 257, "ustar"); }
 
 // A descriptor of its own for every look, closed with the scope. A pipe does not keep us waiting.
-class Look {
+class ViewFrustum {
  public:
-  explicit Look(const fs::path& file) : descriptor_(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {}
-  ~Look() {
+  explicit ViewFrustum(const fs::path& file) : descriptor_(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {}
+  ~ViewFrustum() {
     if (descriptor_ >= 0) ::close(descriptor_);
   }
-  Look(const Look&) = delete;
-  Look& operator=(const Look&) = delete;
+  ViewFrustum(const ViewFrustum&) = delete;
+  ViewFrustum& operator=(const ViewFrustum&) = delete;
   std::size_t read(std::uint64_t at, std::span<unsigned char> bytes) const {
     const ssize_t n = descriptor_ < 0 ? -1 : ::pread(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(at));
     return n > 0 ? static_cast<std::size_t>(n) : 0;
@@ -175,7 +175,7 @@ InputKind input_kind(const fs::path& path, const KeepGoing& keep_going) {
   if (!fs::exists(status)) return InputKind::absent;
   if (fs::is_directory(status)) return InputKind::folder;
   if (!fs::is_regular_file(status)) return InputKind::other;
-  const Look look(path);
+  const ViewFrustum look(path);
   std::array<unsigned char, kHeadBytes> bytes{};
   const std::span<const unsigned char> head(bytes.data(), look.read(0, bytes));
   std::array<unsigned char, 5> mark{};

@@ -37,7 +37,7 @@ struct Recorded {
 }  // namespace
 
 // One thread of its own makes the cuts; the room's threads say what became of them.
-class Demonstration final : public SessionSink, public std::enable_shared_from_this<Demonstration> {
+class Demonstration final : public SessionSubscriber, public std::enable_shared_from_this<Demonstration> {
  public:
   Demonstration(RoomRuntime& runtime, AuthorId author, std::vector<Recorded> cuts, double speed)
       : runtime_(runtime), author_(author), cuts_(std::move(cuts)), speed_(speed) {}

@@ -12,7 +12,7 @@
 
 #include "common/core/bounded_text.hpp"
 #include "server/net/authorizer.hpp"
-#include "server/net/outbox.hpp"
+#include "server/net/send_queue.hpp"
 
 namespace osteon {
 

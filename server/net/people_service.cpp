@@ -18,7 +18,7 @@
 namespace osteon {
 namespace {
 
-class PeopleStream final : public OutStream<WriteReactor>, public PeopleSink {
+class PeopleStream final : public OutStream<WriteReactor>, public PresenceSubscriber {
  public:
   PeopleStream(std::shared_ptr<OpenRoom> room, AuthorId author) : room_(std::move(room)), author_(author) {}
   void begin() {
@@ -55,7 +55,7 @@ class PeopleStream final : public OutStream<WriteReactor>, public PeopleSink {
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
   const AuthorId author_;
   bool begun_ = false;
-  PeopleCursor cursor_;
+  PresenceCursor cursor_;
 };
 
 using PeopleBase = v1::PeopleService::WithRawCallbackMethod_WatchPeople<

@@ -9,7 +9,7 @@
 #include "common/mechanics/cutting_state.hpp"
 #include "common/mechanics/passivity.hpp"
 #include "server/journal/chain.hpp"
-#include "server/net/outbox.hpp"
+#include "server/net/send_queue.hpp"
 #include "server/room/room.hpp"
 
 namespace osteon {

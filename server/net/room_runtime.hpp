@@ -12,22 +12,22 @@
 #include "common/mechanics/cutting_state.hpp"
 #include "common/mechanics/passivity.hpp"
 #include "common/runtime/tick_stats.hpp"
-#include "common/surface/look.hpp"
+#include "common/surface/view_frustum.hpp"
 #include "common/wire/cut_run.hpp"
-#include "server/net/mesh_room.hpp"
+#include "server/net/mesh_publisher.hpp"
 #include "server/net/committer.hpp"
 #include "server/net/cut_figures.hpp"
 #include "server/net/room_store.hpp"
-#include "server/net/outbox.hpp"
-#include "server/net/people_board.hpp"
+#include "server/net/send_queue.hpp"
+#include "server/net/presence.hpp"
 #include "server/net/playback.hpp"
-#include "server/net/state_board.hpp"
-#include "server/net/stream_sink.hpp"
+#include "server/net/state_publisher.hpp"
+#include "server/net/subscriber.hpp"
 #include "server/room/room.hpp"
 
 namespace osteon {
 
-class SessionSink : public StreamSink {
+class SessionSubscriber : public Subscriber {
  public:
   [[nodiscard]] virtual AuthorId author() const = 0;
   // Of the leaves; rows come from here on. `before`: whole SessionResponses that go before the leaves, `complete` the one
@@ -146,22 +146,22 @@ class RoomRuntime {
   [[nodiscard]] SavedFields saved_fields();  // of all bodies, at its room_seq
   // The sink hears every row after those of its leaves. With the digest of the author's secret it takes the place of an
   // earlier session of his. Error: invalid_input (the author may not cut, or has an open session).
-  [[nodiscard]] Result<void> open_session(const std::shared_ptr<SessionSink>& sink, const Digest& secret = {});
+  [[nodiscard]] Result<void> open_session(const std::shared_ptr<SessionSubscriber>& sink, const Digest& secret = {});
   // From where its author looks at first; without a look it is sent the bone in full.
-  void watch_mesh(MeshSink& sink, const std::optional<Look>& look = std::nullopt);
+  void watch_mesh(MeshSubscriber& sink, const std::optional<ViewFrustum>& look = std::nullopt);
   // The newest of each viewer counts, until its last mesh stream ends. Of one without such a stream: nothing.
-  void look(AuthorId viewer, const Look& from);
+  void look(AuthorId viewer, const ViewFrustum& from);
   [[nodiscard]] bool draws_near() const;  // what Detail has come to mean here
-  void watch_cutting(CuttingSink& sink);
+  void watch_cutting(StateSubscriber& sink);
   // Whoever watches it, says how far they have heard, or asks who is there.
-  [[nodiscard]] PeopleBoard& people();
+  [[nodiscard]] Presence& people();
   // Afterwards the sink hears nothing more. Unknown sinks are none of its business.
-  void leave(SessionSink& sink);
-  void leave(MeshSink& sink);
-  void leave(CuttingSink& sink);
+  void leave(SessionSubscriber& sink);
+  void leave(MeshSubscriber& sink);
+  void leave(StateSubscriber& sink);
 
   // Queued until the next tick. The sink, kept alive until then, hears the outcome.
-  void queue_cut(std::shared_ptr<SessionSink> sink, Cut cut, Clock::time_point arrived);
+  void queue_cut(std::shared_ptr<SessionSubscriber> sink, Cut cut, Clock::time_point arrived);
   void offer_state(CuttingState state);  // newest of its author wins
   void push_bone(AuthorId author, const BonePush& push);  // likewise; of no effect where there is no mount
   // Queued until the next tick too, behind the cuts that came before. `answer` is called there and must return at once;

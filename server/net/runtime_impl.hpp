@@ -16,12 +16,12 @@
 #include "server/net/bone_mount.hpp"
 #include "server/net/runtime_parts.hpp"
 #include "server/net/job_thread.hpp"
-#include "server/net/mesh_room.hpp"
-#include "server/net/people_board.hpp"
+#include "server/net/mesh_publisher.hpp"
+#include "server/net/presence.hpp"
 #include "server/net/piece_watch.hpp"
 #include "server/net/room_runtime.hpp"
 #include "server/net/room_rows.hpp"
-#include "server/net/state_board.hpp"
+#include "server/net/state_publisher.hpp"
 
 namespace osteon {
 
@@ -125,13 +125,13 @@ struct RoomRuntime::Impl {
   bool queue_closed = false;  // the last tick has taken what was queued
 
   mutable std::mutex sessions_mutex;
-  Audience<SessionSink> sessions;
-  std::map<AuthorId, SessionSink*> open_authors;
+  Subscribers<SessionSubscriber> sessions;
+  std::map<AuthorId, SessionSubscriber*> open_authors;
 
   std::optional<BoneMount> mount;  // from the beginning
-  PeopleBoard people;
-  StateBoard board;
-  MeshRoom mesh;
+  Presence people;
+  StatePublisher board;
+  MeshPublisher mesh;
 
   std::mutex pieces_mutex;
   std::condition_variable pieces_wake;

@@ -77,7 +77,7 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
       // The author may have come back on another stream meanwhile.
       const auto author = open_authors.find(sink->author());
       if (!repeated && to_all)
-        sessions.each([&](SessionSink& one) { one.offer(place, row, fast); });
+        sessions.each([&](SessionSubscriber& one) { one.offer(place, row, fast); });
       else if (author != open_authors.end())
         repeated ? author->second->answer(row) : author->second->offer(place, row, fast);
     }
@@ -114,11 +114,11 @@ void RoomRuntime::Impl::decide(QueuedEvent& queued) {
       const std::lock_guard lock(sessions_mutex);
       if (event && event->tool && event->room_seq) {
         const std::uint32_t number = number_of(event->tool->hash);
-        sessions.each([&](SessionSink& sink) { sink.know_tool(number, event->tool->hash); });
+        sessions.each([&](SessionSubscriber& sink) { sink.know_tool(number, event->tool->hash); });
       }
       for (const Said& one : said)
         for (const Bytes& row : one.rows)
-          sessions.each([&](SessionSink& sink) {
+          sessions.each([&](SessionSubscriber& sink) {
             if (one.personal.is_for(sink.author()))
               sink.offer(one.place, one.personal.row, one.personal.fast);
             else
@@ -137,7 +137,7 @@ void RoomRuntime::Impl::tell_kept(std::chrono::nanoseconds now) {
     if (!durable) return;
     const Bytes row = kept_row(store->witness());
     const std::lock_guard lock(sessions_mutex);
-    sessions.each([&](SessionSink& sink) { sink.answer(row); });
+    sessions.each([&](SessionSubscriber& sink) { sink.answer(row); });
   });
 }
 
@@ -173,7 +173,7 @@ RoomRuntime::Impl::Personal RoomRuntime::Impl::personal_row(const RoomEvent& eve
 bool RoomRuntime::Impl::tell_hands(const std::vector<CuttingState>& states) {
   bool owed = false;
   const std::lock_guard lock(sessions_mutex);
-  sessions.each([&](SessionSink& sink) { owed |= sink.show_partners(states); });
+  sessions.each([&](SessionSubscriber& sink) { owed |= sink.show_partners(states); });
   return owed;
 }
 
@@ -181,7 +181,7 @@ void RoomRuntime::Impl::end_sessions(const std::string& why, bool to_return) {
   const std::lock_guard lock(sessions_mutex);
   ended = why;
   may_return = to_return;
-  sessions.each([&](SessionSink& sink) { to_return ? sink.replaced(why) : sink.end(why); });
+  sessions.each([&](SessionSubscriber& sink) { to_return ? sink.replaced(why) : sink.end(why); });
 }
 
 Result<void> RoomRuntime::check_kept(const Witness& kept) {
@@ -241,7 +241,7 @@ Result<AuthorId> RoomRuntime::join(MemberKind kind, const std::string& name, con
   return answer.get_future().get();
 }
 
-Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSink>& sink, const Digest& secret) {
+Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>& sink, const Digest& secret) {
   if (impl_->player) return tl::unexpected(only_to_be_watched());
   std::vector<FieldLeaf> leaves;
   MessageParts before;
@@ -270,7 +270,7 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSink>& sink,
       complete.mutable_complete()->add_decided_room_seqs(place.value);
     for (const BodyId body : impl_->room.bodies()) complete.mutable_complete()->add_bodies(body.value);
     const std::lock_guard lock(impl_->sessions_mutex);
-    SessionSink*& open = impl_->open_authors[sink->author()];
+    SessionSubscriber*& open = impl_->open_authors[sink->author()];
     if (open && !impl_->room.proves(sink->author(), secret))
       return failure(ErrorCode::invalid_input,
                      "open.author " + std::to_string(sink->author().value) + " has an open session; join again for another");
@@ -305,35 +305,35 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSink>& sink,
   return {};
 }
 
-void RoomRuntime::watch_mesh(MeshSink& sink, const std::optional<Look>& look) {
+void RoomRuntime::watch_mesh(MeshSubscriber& sink, const std::optional<ViewFrustum>& look) {
   impl_->people.came(sink.author());
   if (look) impl_->people.looked(sink.author(), *look);
   impl_->mesh.watch(sink, look);
 }
-void RoomRuntime::look(AuthorId viewer, const Look& from) {
+void RoomRuntime::look(AuthorId viewer, const ViewFrustum& from) {
   impl_->mesh.look(viewer, from);
   impl_->people.looked(viewer, from);
 }
 bool RoomRuntime::draws_near() const { return impl_->mesh.draws_near(); }
-void RoomRuntime::watch_cutting(CuttingSink& sink) {
+void RoomRuntime::watch_cutting(StateSubscriber& sink) {
   impl_->people.came(sink.author());
   impl_->board.watch(sink);
 }
-void RoomRuntime::leave(MeshSink& sink) {
+void RoomRuntime::leave(MeshSubscriber& sink) {
   impl_->mesh.leave(sink);
   impl_->people.went(sink.author());
 }
-void RoomRuntime::leave(CuttingSink& sink) {
+void RoomRuntime::leave(StateSubscriber& sink) {
   impl_->board.leave(sink);
   impl_->people.went(sink.author());
 }
-PeopleBoard& RoomRuntime::people() { return impl_->people; }
+Presence& RoomRuntime::people() { return impl_->people; }
 void RoomRuntime::offer_state(CuttingState state) { impl_->board.offer(std::move(state)); }
 void RoomRuntime::push_bone(AuthorId author, const BonePush& push) {
   if (impl_->mount) impl_->mount->push(author, push);
 }
 
-void RoomRuntime::leave(SessionSink& sink) {
+void RoomRuntime::leave(SessionSubscriber& sink) {
   bool was_open = false;
   {
     const std::lock_guard lock(impl_->sessions_mutex);
@@ -349,7 +349,7 @@ void RoomRuntime::leave(SessionSink& sink) {
 void RoomRuntime::ask_to_redial(std::chrono::milliseconds after, const std::string& why) {
   const std::lock_guard lock(impl_->sessions_mutex);
   impl_->redial = redial_row(after, why);
-  impl_->sessions.each([&](SessionSink& sink) { sink.answer(impl_->redial); });
+  impl_->sessions.each([&](SessionSubscriber& sink) { sink.answer(impl_->redial); });
 }
 
 void RoomRuntime::send_away(const std::string& why) {

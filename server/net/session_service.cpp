@@ -25,7 +25,7 @@ namespace {
 // One haptic client's session. Reading stops while kMaxQueuedCuts of its cuts wait for a tick, so a client that sends
 // faster than the room cuts is slowed down by the network instead of filling memory. Datagrams nobody slows down: who sends
 // more of them than a haptic client does before it has heard of the first is ended.
-class SessionStream final : public OutStream<BidiReactor>, public SessionSink, private SessionLink::Sink {
+class SessionStream final : public OutStream<BidiReactor>, public SessionSubscriber, private SessionLink::Sink {
  public:
   static constexpr int kMaxQueuedCuts = 256;
   static constexpr int kMostUnheard = 1024;  // cuts that a haptic client sends before it has heard of the first
@@ -53,20 +53,20 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     const std::lock_guard lock(mutex_);
     taken_ = decided;
     if (failing()) return;
-    outbox_.begin(contained, std::move(before), std::move(complete));
+    send_queue_.begin(contained, std::move(before), std::move(complete));
     pump();
   }
   void set_leaves(std::vector<FieldLeaf> leaves) override {
     if (!may_receive(StreamContent::field)) leaves.clear();
     const std::lock_guard lock(mutex_);
     if (failing()) return;
-    outbox_.set_leaves(std::move(leaves));
+    send_queue_.set_leaves(std::move(leaves));
     pump();
   }
   void offer(RoomSeq place, const Bytes& any) override {
     const Bytes row = in_its_version(row_for_role(place, any));
     const std::lock_guard lock(mutex_);
-    if (row && !closing()) send_or_give_up(outbox_.add(place, row));
+    if (row && !closing()) send_or_give_up(send_queue_.add(place, row));
   }
   // [committing thread]
   void offer(RoomSeq place, const Bytes& any, const wire::SessionRow& fast) override {
@@ -76,9 +76,9 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     {
       const std::lock_guard lock(mutex_);
       if (closing()) return;
-      const std::uint64_t before = outbox_.index();
-      send_or_give_up(outbox_.add(place, row));
-      if (outbox_.index() > before) index = outbox_.index();
+      const std::uint64_t before = send_queue_.index();
+      send_or_give_up(send_queue_.add(place, row));
+      if (send_queue_.index() > before) index = send_queue_.index();
     }
     // Beside the stream, which carries all.
     const bool goes = row == any && may_carry(content_of(fast));
@@ -102,9 +102,9 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     if (is_closing() || !may_carry(DatagramContent::bone_seen)) return;
     const bool by_link = link_ && link_->set_bone(seen);
     const std::lock_guard lock(mutex_);
-    const auto now = PartnerOutbox::Clock::now();
+    const auto now = PartnerSendQueue::Clock::now();
     if (by_link || closing() || now < next_bone_) return;
-    next_bone_ = now + PartnerOutbox::kApart;
+    next_bone_ = now + PartnerSendQueue::kApart;
     bone_ = seen;
     pump();
   }
@@ -114,7 +114,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   void answer(const Bytes& any) override {
     const Bytes row = in_its_version(any);
     const std::lock_guard lock(mutex_);
-    if (row && !closing()) send_or_give_up(outbox_.add_answer(row));
+    if (row && !closing()) send_or_give_up(send_queue_.add_answer(row));
   }
   void refuse(const Error& why) override { close(invalid(why.message)); }
   void decided() override {
@@ -133,7 +133,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   void replaced(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
   std::size_t waiting() const override {
     const std::lock_guard lock(mutex_);
-    return outbox_.waiting();
+    return send_queue_.waiting();
   }
 
   void OnReadDone(bool ok) override {
@@ -171,7 +171,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     const Digest secret = digest_of_secret(request.secret());
     // Reading goes on after the leaves were taken, so that no cut of this author is among them.
     runtime_.run_slowly([this, keep = self(), secret] {
-      const std::shared_ptr<SessionSink> sink(keep, this);
+      const std::shared_ptr<SessionSubscriber> sink(keep, this);
       if (const Result<void> opened = runtime_.open_session(sink, secret); !opened) return close(invalid(opened.error().message));
       // A reader that went away meanwhile has left the runtime's list before it was on it.
       if (!read_on()) leave();
@@ -206,7 +206,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
       ++queued_;
       taken_ = std::max(taken_, cut.author_seq);
     }
-    runtime_.queue_cut(std::shared_ptr<SessionSink>(self(), this), std::move(cut), RoomRuntime::Clock::now());
+    runtime_.queue_cut(std::shared_ptr<SessionSubscriber>(self(), this), std::move(cut), RoomRuntime::Clock::now());
   }
   void take(CuttingState state) override {
     if (may_carry(DatagramContent::tool_state)) runtime_.offer_state(std::move(state));
@@ -217,7 +217,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   void arrived(std::uint64_t index) override {
     const RoomSeq newest = [&] {
       const std::lock_guard lock(mutex_);
-      return outbox_.arrived(index);
+      return send_queue_.arrived(index);
     }();
     if (newest) runtime_.people().heard(author_, newest);
   }
@@ -305,7 +305,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     if (taken)
       pump();
     else
-      close_locked({StatusCode::RESOURCE_EXHAUSTED, "the reader is more than " + std::to_string(SessionOutbox::kMaxRows) +
+      close_locked({StatusCode::RESOURCE_EXHAUSTED, "the reader is more than " + std::to_string(SessionSendQueue::kMaxRows) +
                                                         " events behind the room; join again"});
   }
   [[nodiscard]] bool is_closing() const {
@@ -313,19 +313,19 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
     return closing();
   }
   void drop_waiting() override {
-    outbox_ = {};
+    send_queue_ = {};
     partners_ = {};
     bone_.reset();
   }
   bool take(ByteBuffer& message) override {
-    MessageParts parts = outbox_.take();
-    if (parts.empty() && outbox_.begun() && bone_) {
+    MessageParts parts = send_queue_.take();
+    if (parts.empty() && send_queue_.begun() && bone_) {
       if (const Bytes row = in_its_version(bone_row(*bone_))) parts = {row};
       bone_.reset();
     }
     // Where others' tools are only after all rows: no row is held up.
-    while (parts.empty() && outbox_.begun()) {
-      const std::optional<CuttingState> partner = partners_.take(PartnerOutbox::Clock::now());
+    while (parts.empty() && send_queue_.begun()) {
+      const std::optional<CuttingState> partner = partners_.take(PartnerSendQueue::Clock::now());
       if (!partner) break;
       if (const Bytes row = in_its_version(partner_row(*partner))) parts = {row};
     }
@@ -353,10 +353,10 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSink, p
   AuthorId author_;           // set before the runtime knows the stream, as the next
   std::uint32_t version_ = wire::kProtocolVersion;
   bool opened_ = false;       // only reactions to reads use it, and these come one by one
-  SessionOutbox outbox_;
-  PartnerOutbox partners_;
+  SessionSendQueue send_queue_;
+  PartnerSendQueue partners_;
   std::optional<BoneSeen> bone_;                // newest place of the bone that the stream is to tell
-  PartnerOutbox::Clock::time_point next_bone_{};
+  PartnerSendQueue::Clock::time_point next_bone_{};
   int queued_ = 0;            // cuts between reading and deciding
   std::uint64_t taken_ = 0;   // newest author_seq that was queued, here or in an earlier session
   bool paused_ = false, reading_ended_ = false;

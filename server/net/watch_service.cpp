@@ -15,7 +15,7 @@
 namespace osteon {
 namespace {
 
-class MeshStream final : public OutStream<WriteReactor>, public MeshSink {
+class MeshStream final : public OutStream<WriteReactor>, public MeshSubscriber {
  public:
   MeshStream(std::shared_ptr<OpenRoom> room, AuthorId author) : room_(std::move(room)), author_(author) {}
 
@@ -23,13 +23,13 @@ class MeshStream final : public OutStream<WriteReactor>, public MeshSink {
   void begin(MeshUpdate whole_surface) override {
     const std::lock_guard lock(mutex_);
     if (failing()) return;
-    outbox_.emplace(std::move(whole_surface));
+    send_queue_.emplace(std::move(whole_surface));
     pump();
   }
   void offer(const MeshUpdate& update) override {
     const std::lock_guard lock(mutex_);
     if (closing()) return;
-    outbox_->add(update);
+    send_queue_->add(update);
   }
   void send() override {
     const std::lock_guard lock(mutex_);
@@ -38,25 +38,25 @@ class MeshStream final : public OutStream<WriteReactor>, public MeshSink {
   void end(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
   std::size_t waiting() const override {
     const std::lock_guard lock(mutex_);
-    return outbox_ ? outbox_->waiting() : 0;
+    return send_queue_ ? send_queue_->waiting() : 0;
   }
 
  private:
   bool take(ByteBuffer& message) override {
-    if (!outbox_ || !may_receive(StreamContent::surface)) return false;
-    const MessageParts parts = outbox_->take();
+    if (!send_queue_ || !may_receive(StreamContent::surface)) return false;
+    const MessageParts parts = send_queue_->take();
     if (!parts.empty()) message = buffer_of(parts);
     return !parts.empty();
   }
-  void drop_waiting() override { outbox_.reset(); }
+  void drop_waiting() override { send_queue_.reset(); }
   void leave() override { room_->runtime().leave(*this); }
 
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
   const AuthorId author_;
-  std::optional<MeshOutbox> outbox_;
+  std::optional<MeshSendQueue> send_queue_;
 };
 
-class CuttingStream final : public OutStream<WriteReactor>, public CuttingSink {
+class CuttingStream final : public OutStream<WriteReactor>, public StateSubscriber {
  public:
   CuttingStream(std::shared_ptr<OpenRoom> room, AuthorId author, std::chrono::nanoseconds apart)
       : room_(std::move(room)), author_(author), apart_(apart) {}
@@ -108,9 +108,9 @@ class WatchServiceImpl final : public WatchBase {
     const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context, AuthorId{request->author()});
     if (!room) return refused(status_of(room.error()));
     if (!(*room)->runtime().knows(AuthorId{request->author()})) return refused(not_joined("WatchMeshRequest", request->author()));
-    std::optional<Look> look;
+    std::optional<ViewFrustum> look;
     if (request->has_look()) {
-      const Result<Look> stated = wire::from_wire(request->look());
+      const Result<ViewFrustum> stated = wire::from_wire(request->look());
       if (!stated) return refused(invalid(stated.error().message));
       look = *stated;
     }
@@ -126,7 +126,7 @@ class WatchServiceImpl final : public WatchBase {
                                      v1::LookFromResponse*) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     if (!admitted<v1::LookFromRequest>(rooms_, *context, reactor)) return reactor;
-    const Result<Look> look = wire::from_wire(request->look());
+    const Result<ViewFrustum> look = wire::from_wire(request->look());
     const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context, AuthorId{request->author()});
     if (!room) {
       reactor->Finish(status_of(room.error()));

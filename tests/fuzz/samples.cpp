@@ -35,6 +35,6 @@ CuttingState a_state() {
   return state;
 }
 
-Look a_look() { return {{1, 2, 3}, {4, 5, 6}, 0.001, 0.3}; }
+ViewFrustum a_look() { return {{1, 2, 3}, {4, 5, 6}, 0.001, 0.3}; }
 
 }  // namespace osteon::fuzz

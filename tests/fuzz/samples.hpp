@@ -3,7 +3,7 @@
 #include "common/field/cut.hpp"
 #include "common/field/supervision.hpp"
 #include "common/mechanics/cutting_state.hpp"
-#include "common/surface/look.hpp"
+#include "common/surface/view_frustum.hpp"
 #include "common/tools/annotation.hpp"
 #include "common/tools/scene_item.hpp"
 
@@ -14,6 +14,6 @@ namespace osteon::fuzz {
 [[nodiscard]] Supervision a_supervision();
 [[nodiscard]] Annotation an_annotation();
 [[nodiscard]] CuttingState a_state();
-[[nodiscard]] Look a_look();
+[[nodiscard]] ViewFrustum a_look();
 
 }  // namespace osteon::fuzz

@@ -205,7 +205,7 @@ std::vector<Target> targets() {
           {"scene_item", parse_and_convert<v1::SceneItem>, {bytes_of(wire::to_wire(an_item()).SerializeAsString())}},
           {"tool_definition", parse_and_convert<v1::ToolDefinition>, {bytes_of(wire::to_wire(builtin_tools()[0]).SerializeAsString())}},
           {"look",
-           parse_and_convert<v1::Look>,
+           parse_and_convert<v1::ViewFrustum>,
            {bytes_of(wire::to_wire(a_look()).SerializeAsString())}},
           packet_target<v1::UpPacket>("up_packet", as_up_packet, an_up_packet(), up_packets),
           packet_target<v1::DownPacket>("down_packet", as_down_packet, a_down_packet(), down_packets),

@@ -48,7 +48,7 @@ struct Times {
 };
 
 // A hand's client and its end in the room, put together as the programs do.
-class Line final : public SessionSink, private SessionLink::Sink, public std::enable_shared_from_this<Line> {
+class Line final : public SessionSubscriber, private SessionLink::Sink, public std::enable_shared_from_this<Line> {
  public:
   // `port`: at which the client's datagrams reach the links, 0 for their own.
   Line(RoomRuntime& runtime, LinkServer& links, AuthorId author, std::uint16_t port, std::size_t cuts)

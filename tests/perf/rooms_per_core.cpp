@@ -37,7 +37,7 @@ double cpu_of_thread() {
 }
 
 // A session whose client reads everything at once.
-class Listener final : public SessionSink {
+class Listener final : public SessionSubscriber {
  public:
   explicit Listener(AuthorId author) : author_(author) {}
   AuthorId author() const override { return author_; }

@@ -36,7 +36,7 @@ std::shared_ptr<ToolBox> few_tools() {
 }
 
 // What SessionStream of server/net/session_service.cpp does between gRPC and the runtime.
-class SimServer::Session final : public SessionSink,
+class SimServer::Session final : public SessionSubscriber,
                                  public std::enable_shared_from_this<Session>,
                                  private SessionLink::Sink {
  public:
@@ -71,17 +71,17 @@ class SimServer::Session final : public SessionSink,
     }
     if (server_.condition_.breakage == Breakage::hasty && !server_.power_is_out())
       for (const Bytes& row : std::exchange(before, {})) stream_->write(SimStream::server, *row);
-    outbox_.begin(contained, std::move(before), std::move(complete));
+    send_queue_.begin(contained, std::move(before), std::move(complete));
     pump();
   }
   void set_leaves(std::vector<FieldLeaf> leaves) override {
-    outbox_.set_leaves(std::move(leaves));
+    send_queue_.set_leaves(std::move(leaves));
     pump();
   }
   void offer(RoomSeq place, const Bytes& row) override { offer(place, row, {.room_seq = place}); }
   void offer(RoomSeq place, const Bytes& row, const wire::SessionRow& fast) override {
     if (closing_ || done_) return;
-    const auto chance = [&] { return outbox_.takes(place) && server_.random_.index(8) == 0; };
+    const auto chance = [&] { return send_queue_.takes(place) && server_.random_.index(8) == 0; };
     if (server_.condition_.breakage == Breakage::skipping && chance()) return;
     if (server_.condition_.breakage == Breakage::unsaid && fast.kind == wire::SessionRowKind::supervised && server_.random_.index(2) == 0)
       return tell(place, noted_row(place, {}), {.room_seq = place});
@@ -103,7 +103,7 @@ class SimServer::Session final : public SessionSink,
   void know_tool(std::uint32_t number, const Digest& tool) override {
     if (link_) link_->know_tool(number, tool);
   }
-  void answer(const Bytes& row) override { add(outbox_.add_answer(row)); }
+  void answer(const Bytes& row) override { add(send_queue_.add_answer(row)); }
   void refuse(const Error& why) override { close({true, why.message}); }
   void decided() override {
     --queued_;
@@ -113,7 +113,7 @@ class SimServer::Session final : public SessionSink,
   }
   void end(const std::string& why) override { close({true, why}); }
   void replaced(const std::string& why) override { close({false, why}); }
-  std::size_t waiting() const override { return outbox_.waiting(); }
+  std::size_t waiting() const override { return send_queue_.waiting(); }
 
  private:
   void take(const std::string& bytes) {
@@ -171,18 +171,18 @@ class SimServer::Session final : public SessionSink,
   void take(CuttingState state) override {
     if (!closing_ && !done_) server_.runtime_->offer_state(std::move(state));
   }
-  void arrived(std::uint64_t index) override { outbox_.arrived(index); }
+  void arrived(std::uint64_t index) override { send_queue_.arrived(index); }
 
   void tell(RoomSeq place, const Bytes& row, const wire::SessionRow& fast) {
-    const std::uint64_t before = outbox_.index();
-    const bool taken = outbox_.add(place, row);
-    tell_fast(fast, outbox_.index() > before);
+    const std::uint64_t before = send_queue_.index();
+    const bool taken = send_queue_.add(place, row);
+    tell_fast(fast, send_queue_.index() > before);
     add(taken);
   }
   void tell_fast(const wire::SessionRow& fast, bool numbered) {
     if (!link_) return;
-    const bool goes = link_->tell(numbered ? outbox_.index() : 0, fast);
-    if (goes && server_.condition_.breakage == Breakage::pruning) outbox_.arrived(outbox_.index());
+    const bool goes = link_->tell(numbered ? send_queue_.index() : 0, fast);
+    if (goes && server_.condition_.breakage == Breakage::pruning) send_queue_.arrived(send_queue_.index());
   }
   void unlink() {
     if (link_) server_.links_->remove(link_);
@@ -191,8 +191,8 @@ class SimServer::Session final : public SessionSink,
 
   void add(bool taken) {
     if (closing_ || done_) return;
-    server_.most_behind_ = std::max(server_.most_behind_, outbox_.waiting());
-    server_.ledger_.check(outbox_.waiting() <= SessionOutbox::kMaxRows, Invariant::bounds, "an outbox holds too many rows");
+    server_.most_behind_ = std::max(server_.most_behind_, send_queue_.waiting());
+    server_.ledger_.check(send_queue_.waiting() <= SessionSendQueue::kMaxRows, Invariant::bounds, "an send_queue holds too many rows");
     if (taken)
       pump();
     else
@@ -207,7 +207,7 @@ class SimServer::Session final : public SessionSink,
     if (done_ || server_.power_is_out()) return;
     server_.note_kept();
     while (!closing_ && stream_->writable(SimStream::server)) {
-      const MessageParts parts = outbox_.take();
+      const MessageParts parts = send_queue_.take();
       if (parts.empty()) return;
       stream_->write(SimStream::server, joined(parts));
     }
@@ -228,7 +228,7 @@ class SimServer::Session final : public SessionSink,
   SimServer& server_;
   std::shared_ptr<SimStream> stream_;
   AuthorId author_;
-  SessionOutbox outbox_;
+  SessionSendQueue send_queue_;
   std::shared_ptr<SimLinks::Link> link_;  // with the server's links
   struct HeldBack {
     RoomSeq place;

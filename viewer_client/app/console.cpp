@@ -543,7 +543,7 @@ Console::Answer Console::said(const Words& words) {
 Console::Answer Console::view(const Words& words) {
   if (words.size() != 2) return bad("");
   // Who looks is somebody's viewer, which has no hand.
-  std::optional<Look> look;
+  std::optional<ViewFrustum> look;
   const Result<PersonSeen> person = find(words[1]);
   if (!person) return tl::unexpected(person.error());
   look = person->look;

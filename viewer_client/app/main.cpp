@@ -133,7 +133,7 @@ Result<void> run(const Arguments& arguments) {
   auto window = BoneWindow::open(*window_size);
   if (!window) return tl::unexpected(window.error());
 
-  Inbox inbox;
+  RenderQueue render_queue;
   RoomWatchOptions watch_options;
   watch_options.address = arguments.server;
   watch_options.room = arguments.room;
@@ -143,7 +143,7 @@ Result<void> run(const Arguments& arguments) {
   watch_options.keep_trying = !scripted;
   const auto seen_from = [size = *window_size](const CameraView& view) { return look_of(view, size.width_px, size.height_px); };
   watch_options.first_look = [seen_from](const Box& bone) { return seen_from(overview(bone)); };
-  auto watch = RoomWatch::start(watch_options, inbox, [&stop] { return stop.requested(); });
+  auto watch = RoomWatch::start(watch_options, render_queue, [&stop] { return stop.requested(); });
   if (!watch) {
     if (stop.requested()) return {};
     return tl::unexpected(watch.error());
@@ -189,7 +189,7 @@ Result<void> run(const Arguments& arguments) {
   }
   options.answers = !arguments.script.empty();
   options.stop_at_error = scripted && arguments.script != "-";
-  auto viewer = Viewer::make(options, **window, inbox, std::move(script));
+  auto viewer = Viewer::make(options, **window, render_queue, std::move(script));
   if (!viewer) return tl::unexpected(viewer.error());
   log::info("watching", {{"server", arguments.server}, {"case", options.case_title}});
 

@@ -34,9 +34,9 @@ struct Overloaded : F... {
 
 }  // namespace
 
-Result<Viewer> Viewer::make(const ViewerOptions& options, BoneWindow& window, Inbox& inbox,
+Result<Viewer> Viewer::make(const ViewerOptions& options, BoneWindow& window, RenderQueue& render_queue,
                             std::optional<ScriptReader> script) {
-  Viewer viewer(options, window, inbox, std::move(script));
+  Viewer viewer(options, window, render_queue, std::move(script));
   if (!options.frame_log.empty()) {
     viewer.frame_log_.open(options.frame_log);
     viewer.frame_log_ << "room_seq,received_mono_ns,rendered_mono_ns\n" << std::flush;
@@ -49,11 +49,11 @@ Result<Viewer> Viewer::make(const ViewerOptions& options, BoneWindow& window, In
   return viewer;
 }
 
-Viewer::Viewer(const ViewerOptions& options, BoneWindow& window, Inbox& inbox, std::optional<ScriptReader> script)
-    : options_(options), window_(&window), inbox_(&inbox), script_(std::move(script)), people_(options.hand) {}
+Viewer::Viewer(const ViewerOptions& options, BoneWindow& window, RenderQueue& render_queue, std::optional<ScriptReader> script)
+    : options_(options), window_(&window), queue_(&render_queue), script_(std::move(script)), people_(options.hand) {}
 
 Result<Viewer::State> Viewer::turn(bool interrupted) {
-  inbox_->wait_for(kTurn);
+  queue_->wait_for(kTurn);
   dirty_ = dirty_ || interrupted != interrupted_;
   interrupted_ = interrupted;
 
@@ -92,7 +92,7 @@ void Viewer::follow_cap() {
 }
 
 void Viewer::receive() {
-  Delivery delivery = inbox_->take();
+  Delivery delivery = queue_->take();
   for (const Tool& tool : delivery.tools) window_->learn_tool(tool);
   if (delivery.any_states) {
     states_ = std::move(delivery.states);

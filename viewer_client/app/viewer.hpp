@@ -16,7 +16,7 @@
 #include "common/runtime/tick_stats.hpp"
 #include "viewer_client/app/script.hpp"
 #include "viewer_client/render/window.hpp"
-#include "viewer_client/scene/inbox.hpp"
+#include "viewer_client/scene/render_queue.hpp"
 #include "viewer_client/scene/people_view.hpp"
 #include "viewer_client/scene/room_answer.hpp"
 
@@ -40,7 +40,7 @@ struct ViewerOptions {
 class Viewer {
  public:
   // Error internal: the frame log cannot be written.
-  [[nodiscard]] static Result<Viewer> make(const ViewerOptions& options, BoneWindow& window, Inbox& inbox,
+  [[nodiscard]] static Result<Viewer> make(const ViewerOptions& options, BoneWindow& window, RenderQueue& render_queue,
                                            std::optional<ScriptReader> script);
 
   enum class State { running, finished };
@@ -52,7 +52,7 @@ class Viewer {
   [[nodiscard]] std::string summary_json() const;
 
  private:
-  Viewer(const ViewerOptions& options, BoneWindow& window, Inbox& inbox, std::optional<ScriptReader> script);
+  Viewer(const ViewerOptions& options, BoneWindow& window, RenderQueue& render_queue, std::optional<ScriptReader> script);
 
   void receive();
   void follow_cap();
@@ -77,7 +77,7 @@ class Viewer {
 
   ViewerOptions options_;
   BoneWindow* window_;
-  Inbox* inbox_;
+  RenderQueue* queue_;
   std::optional<ScriptReader> script_;
   std::ofstream frame_log_;
   std::chrono::steady_clock::time_point capped_;  // when the cap was last asked
@@ -103,7 +103,7 @@ class Viewer {
   std::vector<std::string> said_;
   std::string holding_;
   std::string followed_;           // who moves the camera; empty: nobody
-  std::optional<Look> look_taken_;
+  std::optional<ViewFrustum> look_taken_;
 
   struct Pending {
     std::string line;

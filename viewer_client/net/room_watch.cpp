@@ -145,7 +145,7 @@ class KnownTools {
 
 struct RoomWatch::Impl {
   RoomWatchOptions options;
-  Inbox& inbox;
+  RenderQueue& render_queue;
   std::function<bool()> asked_to_stop;
   WatchedRoom room;
   std::atomic<bool> ending{false};
@@ -160,12 +160,12 @@ struct RoomWatch::Impl {
   grpc::ClientContext* cutting_context = nullptr;
   grpc::ClientContext* look_context = nullptr;
   std::optional<Error> failed;
-  std::optional<Look> newest_look, said_look;
+  std::optional<ViewFrustum> newest_look, said_look;
 
   std::thread mesh_thread, cutting_thread, look_thread;
 
-  Impl(RoomWatchOptions o, Inbox& i, std::function<bool()> s)
-      : options(std::move(o)), inbox(i), asked_to_stop(std::move(s)) {}
+  Impl(RoomWatchOptions o, RenderQueue& i, std::function<bool()> s)
+      : options(std::move(o)), render_queue(i), asked_to_stop(std::move(s)) {}
 
   bool stopping() const { return ending.load() || asked_to_stop(); }
   Result<void> join(std::chrono::milliseconds patience);
@@ -246,7 +246,7 @@ Result<void> RoomWatch::Impl::read_mesh_stream() {
   const auto reader = stub->WatchMesh(&context, request);
 
   Result<void> outcome;
-  inbox.begin_stream();
+  render_queue.begin_stream();
   v1::WatchMeshResponse message;
   while (outcome && reader->Read(&message)) {
     const std::int64_t received = mono_ns();
@@ -263,7 +263,7 @@ Result<void> RoomWatch::Impl::read_mesh_stream() {
       blocks.push_back(std::move(*block));
     }
     if (outcome) {
-      inbox.put_mesh(RoomSeq{message.room_seq()}, std::move(blocks), message.snapshot_complete(),
+      render_queue.put_mesh(RoomSeq{message.room_seq()}, std::move(blocks), message.snapshot_complete(),
                      message.snapshot_blocks(), received);
     }
   }
@@ -320,7 +320,7 @@ void RoomWatch::Impl::fetch_tools(const std::shared_ptr<grpc::Channel>& channel,
       continue;
     }
     known.add(*tool);
-    inbox.put_tool(*tool);
+    render_queue.put_tool(*tool);
   }
 }
 
@@ -363,7 +363,7 @@ void RoomWatch::Impl::read_cutting() {
       for (const CuttingState& state : states) missed |= known.miss(state.tool_name);
       for (const SceneItem& item : items) missed |= known.miss(item.tool);
       if (missed) fetch_tools(channel, request.author(), known);
-      inbox.put_states(std::move(states), std::move(items), std::move(bodies));
+      render_queue.put_states(std::move(states), std::move(items), std::move(bodies));
     }
     reader->Finish();
     leave(cutting_context);
@@ -397,9 +397,9 @@ void RoomWatch::Impl::say_looks() {
 
 RoomWatch::RoomWatch(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-Result<std::unique_ptr<RoomWatch>> RoomWatch::start(const RoomWatchOptions& options, Inbox& inbox,
+Result<std::unique_ptr<RoomWatch>> RoomWatch::start(const RoomWatchOptions& options, RenderQueue& render_queue,
                                                     std::function<bool()> stop) {
-  auto impl = std::make_unique<Impl>(options, inbox, std::move(stop));
+  auto impl = std::make_unique<Impl>(options, render_queue, std::move(stop));
   if (auto joined = impl->join(options.patience); !joined) return tl::unexpected(joined.error());
   impl->room = {impl->joined.case_title, impl->joined.pitch_mm, impl->joined.bounds};
   if (options.first_look) impl->newest_look = options.first_look(impl->room.bounds);
@@ -435,7 +435,7 @@ std::optional<Error> RoomWatch::failure_seen() const {
   return impl_->failed;
 }
 
-void RoomWatch::look(const Look& from) {
+void RoomWatch::look(const ViewFrustum& from) {
   const std::lock_guard lock(impl_->mutex);
   impl_->newest_look = from;
   impl_->changed.notify_all();

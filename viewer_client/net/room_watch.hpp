@@ -1,4 +1,4 @@
-// A viewer's connection to the server: joins the room and fills an Inbox from its two streams.
+// A viewer's connection to the server: joins the room and fills an RenderQueue from its two streams.
 #pragma once
 #include <chrono>
 #include <functional>
@@ -9,10 +9,10 @@
 #include "common/core/id.hpp"
 #include "common/core/result.hpp"
 #include "common/geometry/lattice.hpp"
-#include "common/surface/look.hpp"
+#include "common/surface/view_frustum.hpp"
 #include "common/wire/credentials.hpp"
 #include "common/wire/room_client.hpp"
-#include "viewer_client/scene/inbox.hpp"
+#include "viewer_client/scene/render_queue.hpp"
 #include "viewer_client/scene/item_place.hpp"
 #include "viewer_client/scene/room_answer.hpp"
 
@@ -25,7 +25,7 @@ struct RoomWatchOptions {
   std::string name = "viewer";  // shown to others
   std::chrono::milliseconds patience{5000};
   // From where the window looks at a bone with these bounds at first; none: it wants all of the bone in full.
-  std::function<Look(const Box&)> first_look;
+  std::function<ViewFrustum(const Box&)> first_look;
   bool keep_trying = false;  // after the connection was lost: until it is back, not just for `patience`
 };
 
@@ -38,9 +38,9 @@ struct WatchedRoom {
 // From start() to the destructor two reader threads, one for each stream, and one that says where the window looks.
 class RoomWatch {
  public:
-  // Joins first. Errors: unavailable, unsupported, cancelled; one sentence each. `inbox` must outlive the watch;
+  // Joins first. Errors: unavailable, unsupported, cancelled; one sentence each. `render_queue` must outlive the watch;
   // `stop` is asked from several threads.
-  [[nodiscard]] static Result<std::unique_ptr<RoomWatch>> start(const RoomWatchOptions& options, Inbox& inbox,
+  [[nodiscard]] static Result<std::unique_ptr<RoomWatch>> start(const RoomWatchOptions& options, RenderQueue& render_queue,
                                                                 std::function<bool()> stop);
   ~RoomWatch();
 
@@ -53,7 +53,7 @@ class RoomWatch {
   [[nodiscard]] bool interrupted() const;
 
   // Where the window looks now; returns at once. The server is told of a real change, at most 4 times a second.
-  void look(const Look& from);
+  void look(const ViewFrustum& from);
 
   // What a viewer may ask of the room. They wait for the answer. Errors:
   // invalid_input, not_found (no such tool or item), unavailable (nothing to undo, no answer).

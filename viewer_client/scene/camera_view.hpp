@@ -2,7 +2,7 @@
 #pragma once
 #include "common/geometry/lattice.hpp"
 #include "common/geometry/pose.hpp"
-#include "common/surface/look.hpp"
+#include "common/surface/view_frustum.hpp"
 
 namespace osteon {
 
@@ -14,11 +14,11 @@ struct CameraView {
 };
 
 // What a window of this size shows of it.
-[[nodiscard]] Look look_of(const CameraView& view, int width_px, int height_px);
+[[nodiscard]] ViewFrustum look_of(const CameraView& view, int width_px, int height_px);
 
 // As somebody else looks. Where they do not say which way is up, the head is, or the face where one looks along the body. A
-// Look has no picture's height: the angle stays that of `now`, this window's own view.
-[[nodiscard]] CameraView looking_as(const Look& look, const CameraView& now);
+// ViewFrustum has no picture's height: the angle stays that of `now`, this window's own view.
+[[nodiscard]] CameraView looking_as(const ViewFrustum& look, const CameraView& now);
 
 // The whole bone from the front, its left and a little above (DICOM LPS: +x left, -y front, +z up).
 [[nodiscard]] CameraView overview(const Box& bone);

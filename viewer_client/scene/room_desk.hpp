@@ -13,7 +13,7 @@
 #include "common/core/id.hpp"
 #include "common/core/result.hpp"
 #include "common/field/supervision.hpp"
-#include "common/surface/look.hpp"
+#include "common/surface/view_frustum.hpp"
 #include "common/tools/annotation.hpp"
 
 namespace osteon {
@@ -26,7 +26,7 @@ struct PersonSeen {
   Supervision supervision;         // what holds for the hand
   RoomSeq decided, heard;          // the place of what was decided last, null for nothing; the newest that their client has
   AuthorId decided_by;             // who decided it; null: nobody knows
-  std::optional<Look> look;        // from where they look, where somebody knows
+  std::optional<ViewFrustum> look;        // from where they look, where somebody knows
   std::uint32_t cuts = 0;          // that were taken
   [[nodiscard]] bool pending() const { return decided && heard < decided; }
 };

@@ -238,7 +238,7 @@ TEST_F(Refused, WhatMakesNoSenseIsRefusedWithAStatus) {
   expect_refused("look", [&](grpc::ClientContext& context) {
     v1::LookFromRequest request;
     request.set_author(author);
-    *request.mutable_look() = wire::to_wire(Look{.eye_mm = {0, 0, kNan}});
+    *request.mutable_look() = wire::to_wire(ViewFrustum{.eye_mm = {0, 0, kNan}});
     v1::LookFromResponse response;
     return v1::WatchService::NewStub(ina->channel)->LookFrom(&context, request, &response);
   });

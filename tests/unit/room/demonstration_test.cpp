@@ -25,7 +25,7 @@ using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
 // Every state of a tool that viewers are told, of any author.
-class SeenTools final : public CuttingSink {
+class SeenTools final : public StateSubscriber {
  public:
   void offer(const ShownNow& now) override {
     v1::WatchCuttingResponse told;
@@ -58,7 +58,7 @@ class SeenTools final : public CuttingSink {
 };
 
 // A hand at the bone on its mount.
-class MountedHand final : public SessionSink {
+class MountedHand final : public SessionSubscriber {
  public:
   explicit MountedHand(AuthorId author) : author_(author) {}
   AuthorId author() const override { return author_; }

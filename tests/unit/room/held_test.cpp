@@ -245,7 +245,7 @@ TEST(TakeBackByPerson, AtAnyOfTheirPrograms) {
 }
 
 // Keeps the places that a session is told.
-class Placed final : public SessionSink {
+class Placed final : public SessionSubscriber {
  public:
   explicit Placed(AuthorId author) : author_(author) {}
   AuthorId author() const override { return author_; }
@@ -312,7 +312,7 @@ void expect_held(HeldRuntime& lesson) {
   EXPECT_EQ(session->places.back(), lesson.runtime.room_seq().value);
   for (std::size_t i = 1; i < session->places.size(); ++i) EXPECT_EQ(session->places[i], session->places[i - 1] + 1);
   // And the board of people shows it.
-  PeopleCursor cursor;
+  PresenceCursor cursor;
   v1::WatchPeopleResponse news;
   ASSERT_TRUE(news.ParseFromString(*lesson.runtime.people().news(cursor, ada, {})));
   const auto person = std::ranges::find(news.people(), again.value, &v1::Person::author);

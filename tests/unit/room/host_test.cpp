@@ -18,23 +18,23 @@ using namespace std::chrono_literals;
 using test::strokes;
 
 // Keeps a replica from what a session's stream would carry.
-class FakeSession final : public SessionSink {
+class FakeSession final : public SessionSubscriber {
  public:
   FakeSession(AuthorId author, const Case& bone) : author_(author), replica_(bone, BodyId{0}, tools_) {}
 
   AuthorId author() const override { return author_; }
   void begin(RoomSeq contained, MessageParts before, Bytes complete) override {
     const std::lock_guard lock(mutex_);
-    outbox_.begin(contained, std::move(before), std::move(complete));
+    send_queue_.begin(contained, std::move(before), std::move(complete));
   }
   void set_leaves(std::vector<FieldLeaf> leaves) override {
     const std::lock_guard lock(mutex_);
-    outbox_.set_leaves(std::move(leaves));
+    send_queue_.set_leaves(std::move(leaves));
     read();
   }
   void offer(RoomSeq place, const Bytes& row) override {
     const std::lock_guard lock(mutex_);
-    ASSERT_TRUE(outbox_.add(place, row));
+    ASSERT_TRUE(send_queue_.add(place, row));
     read();
   }
   void answer(const Bytes&) override {}
@@ -52,7 +52,7 @@ class FakeSession final : public SessionSink {
 
  private:
   void read() {
-    for (MessageParts parts = outbox_.take(); !parts.empty(); parts = outbox_.take()) {
+    for (MessageParts parts = send_queue_.take(); !parts.empty(); parts = send_queue_.take()) {
       v1::SessionResponse response;
       ASSERT_TRUE(response.ParseFromString(*parts.front()));
       if (response.has_tool()) tools_->add(wire::from_wire(response.tool().tool()).value());
@@ -78,7 +78,7 @@ class FakeSession final : public SessionSink {
 
   const AuthorId author_;
   mutable std::mutex mutex_;
-  SessionOutbox outbox_;
+  SessionSendQueue send_queue_;
   std::shared_ptr<ToolBox> tools_ = builtin_tool_box();
   haptic::Replica replica_;
   RoomSeq seq_;
@@ -86,7 +86,7 @@ class FakeSession final : public SessionSink {
   std::atomic<bool> ended_{false};
 };
 
-class FakeMesh final : public MeshSink {
+class FakeMesh final : public MeshSubscriber {
  public:
   void begin(MeshUpdate whole_surface) override { offer(whole_surface); }
   void offer(const MeshUpdate& update) override {

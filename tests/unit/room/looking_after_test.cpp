@@ -132,7 +132,7 @@ TEST(HealthWatch, ARoomServesUntilItIsClosedOrKeepsNothingAnyMore) {
 }
 
 // A hand's stream, which hears why it ends.
-class Hand final : public SessionSink {
+class Hand final : public SessionSubscriber {
  public:
   explicit Hand(AuthorId author) : author_(author) {}
   AuthorId author() const override { return author_; }

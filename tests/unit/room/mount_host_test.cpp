@@ -13,7 +13,7 @@ namespace {
 using namespace std::chrono_literals;
 
 // Keeps the places that a session is told.
-class HeardBone final : public SessionSink {
+class HeardBone final : public SessionSubscriber {
  public:
   explicit HeardBone(AuthorId author) : author_(author) {}
   AuthorId author() const override { return author_; }

@@ -25,11 +25,11 @@ Case ball() {
 }
 
 // Close enough for full detail, in a picture of `wide_mm` from its middle to its corner.
-Look close_to(const Vec3& target_mm, double wide_mm) {
+ViewFrustum close_to(const Vec3& target_mm, double wide_mm) {
   return {target_mm + Vec3(0, -40, 0), target_mm, 0.3 * kPitch_mm / 40, std::atan(wide_mm / 40)};
 }
 
-class Reader final : public MeshSink {
+class Reader final : public MeshSubscriber {
  public:
   explicit Reader(AuthorId author) : author_(author) {}
   AuthorId author() const override { return author_; }

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "osteon/v1/watch.pb.h"
-#include "server/net/state_board.hpp"
+#include "server/net/state_publisher.hpp"
 #include "tests/support/wait.hpp"
 
 namespace osteon {
@@ -60,7 +60,7 @@ TEST(Pace, ManyThatBeginTogetherTakeTurns) {
 }
 
 // A stream that is told slowly, as many are together.
-class SlowSink final : public CuttingSink {
+class SlowSink final : public StateSubscriber {
  public:
   explicit SlowSink(std::chrono::nanoseconds apart = {}) : apart_(apart) {}
   void offer(const ShownNow& now) override {
@@ -109,8 +109,8 @@ CuttingState state(std::uint64_t seq) {
   return state;
 }
 
-TEST(StateBoard, ATickWaitsForNoStreamAndEveryStreamEndsWithTheNewest) {
-  StateBoard board;
+TEST(StatePublisher, ATickWaitsForNoStreamAndEveryStreamEndsWithTheNewest) {
+  StatePublisher board;
   SlowSink slow, prompt, seldom(20ms);
   for (SlowSink* sink : {&slow, &prompt, &seldom}) board.watch(*sink);
   slow.open(false);
@@ -135,8 +135,8 @@ TEST(StateBoard, ATickWaitsForNoStreamAndEveryStreamEndsWithTheNewest) {
   for (SlowSink* sink : {&slow, &prompt, &seldom}) board.leave(*sink);
 }
 
-TEST(StateBoard, WhoComesLateIsShownTheNewestAtOnceAndStoppingTellsTheLast) {
-  StateBoard board;
+TEST(StatePublisher, WhoComesLateIsShownTheNewestAtOnceAndStoppingTellsTheLast) {
+  StatePublisher board;
   board.show({}, {BodyId{0}, BodyId{3}});
   SlowSink early, late;
   board.watch(early);

@@ -10,7 +10,7 @@
 
 #include "common/wire/convert.hpp"
 #include "osteon/v1/people.pb.h"
-#include "server/net/people_board.hpp"
+#include "server/net/presence.hpp"
 #include "server/net/room_runtime.hpp"
 #include "server/net/room_store.hpp"
 #include "tests/support/temp_dir.hpp"
@@ -22,7 +22,7 @@ namespace {
 using namespace std::chrono_literals;
 
 // Keeps what a session is told.
-class HeardSession final : public SessionSink {
+class HeardSession final : public SessionSubscriber {
  public:
   explicit HeardSession(AuthorId author) : author_(author) {}
   AuthorId author() const override { return author_; }
@@ -117,7 +117,7 @@ struct Lesson {
   Result<RoomEvent> supervise(AuthorId subject, const Supervision& word) {
     return ask([&](Room& room) { return room.supervise(instructor, subject, word); });
   }
-  v1::WatchPeopleResponse news(PeopleCursor& cursor, AuthorId reader, const PeopleRights& rights = {}) {
+  v1::WatchPeopleResponse news(PresenceCursor& cursor, AuthorId reader, const PeopleRights& rights = {}) {
     v1::WatchPeopleResponse response;
     const Bytes bytes = runtime.people().news(cursor, reader, rights);
     EXPECT_TRUE(!bytes || response.ParseFromString(*bytes));
@@ -218,7 +218,7 @@ TEST(PeopleHost, WhoComesIsToldFirstWhatHolds) {
 
 TEST(PeopleHost, WhatIsDecidedIsPendingUntilItIsHeard) {
   Lesson lesson;
-  PeopleCursor cursor;
+  PresenceCursor cursor;
   const v1::WatchPeopleResponse first = lesson.news(cursor, lesson.instructor);
   EXPECT_TRUE(first.complete());
   ASSERT_EQ(first.people_size(), 3);
@@ -260,7 +260,7 @@ TEST(PeopleHost, AReaderIsToldWhatConcernsThem) {
   ASSERT_TRUE(lesson.ask([&](Room& room) { return room.say(lesson.other, lesson.instructor, "why?"); }));
   const PeopleRights trainees{.others_supervision = false, .others_words = false};
   const auto told = [&](AuthorId reader, const PeopleRights& rights) {
-    PeopleCursor cursor;
+    PresenceCursor cursor;
     return lesson.news(cursor, reader, rights);
   };
   EXPECT_FALSE(Lesson::person(told(lesson.other, trainees), lesson.trainee)->has_supervision());
@@ -286,7 +286,7 @@ TEST(PeopleHost, AReaderIsToldWhatConcernsThem) {
 
 TEST(PeopleHost, DrawingsComeAndGoAndWordsAreBounded) {
   Lesson lesson;
-  PeopleCursor cursor;
+  PresenceCursor cursor;
   (void)lesson.news(cursor, lesson.instructor);
   const auto draw = [&](std::int32_t x) {
     return lesson.ask([&](Room& room) { return room.annotate(lesson.instructor, {.points = {{x, 2, 3}}}); });
@@ -309,23 +309,23 @@ TEST(PeopleHost, DrawingsComeAndGoAndWordsAreBounded) {
   for (int i = 0; i < 100; ++i)
     ASSERT_TRUE(lesson.ask([&](Room& room) { return room.say(lesson.instructor, {}, std::to_string(i)); }));
   news = lesson.news(cursor, lesson.instructor);
-  ASSERT_EQ(news.words_size(), static_cast<int>(PeopleBoard::kMostWords));
+  ASSERT_EQ(news.words_size(), static_cast<int>(Presence::kMostWords));
   EXPECT_EQ(news.words(news.words_size() - 1).words(), "99") << "the newest";
 }
 
 // However many have come and gone, a reader is told of a bounded number.
-TEST(PeopleBoard, ThoseWhoWereHereLongestAgoAreLeftOut) {
+TEST(Presence, ThoseWhoWereHereLongestAgoAreLeftOut) {
   Room room(test::test_block());
   for (int i = 0; i < 600; ++i) (void)room.join(MemberKind::surgeon);
-  PeopleBoard board(room, {});
+  Presence board(room, {});
   const auto count = [&] {
-    PeopleCursor cursor;
+    PresenceCursor cursor;
     v1::WatchPeopleResponse news;
     EXPECT_TRUE(news.ParseFromString(*board.news(cursor, {}, {})));
     return news;
   };
-  EXPECT_EQ(count().people_size(), static_cast<int>(PeopleBoard::kMostAbsent));
-  EXPECT_EQ(count().people(0).author(), 600 - PeopleBoard::kMostAbsent + 1);
+  EXPECT_EQ(count().people_size(), static_cast<int>(Presence::kMostAbsent));
+  EXPECT_EQ(count().people(0).author(), 600 - Presence::kMostAbsent + 1);
   board.came(AuthorId{3});
   EXPECT_EQ(count().people(0).author(), 3u) << "who is here is told in any case";
   board.went(AuthorId{3});
@@ -339,15 +339,15 @@ CuttingState state(std::uint64_t author, std::uint64_t seq) {
   return one;
 }
 
-TEST(PartnerOutbox, TellsTheNewestThirtyTimesASecond) {
-  PartnerOutbox outbox;
-  const PartnerOutbox::Clock::time_point start{};
+TEST(PartnerSendQueue, TellsTheNewestThirtyTimesASecond) {
+  PartnerSendQueue send_queue;
+  const PartnerSendQueue::Clock::time_point start{};
   int told = 0;
   std::uint64_t newest = 0;
   for (std::uint64_t ms = 0; ms < 1000; ++ms) {
-    outbox.offer({state(1, ms + 1)}, true);
-    EXPECT_TRUE(outbox.waits());
-    if (const auto one = outbox.take(start + std::chrono::milliseconds(ms))) {
+    send_queue.offer({state(1, ms + 1)}, true);
+    EXPECT_TRUE(send_queue.waits());
+    if (const auto one = send_queue.take(start + std::chrono::milliseconds(ms))) {
       ++told;
       newest = one->state_seq;
       EXPECT_EQ(newest, ms + 1) << "never an older one";
@@ -357,28 +357,28 @@ TEST(PartnerOutbox, TellsTheNewestThirtyTimesASecond) {
   EXPECT_LE(told, 31);
   // The last one is still owed, and comes.
   EXPECT_NE(newest, 1000u);
-  EXPECT_EQ(outbox.take(start + 2s)->state_seq, 1000u);
-  EXPECT_FALSE(outbox.waits());
-  outbox.offer({state(1, 1000)}, true);
-  EXPECT_FALSE(outbox.waits()) << "the same again";
+  EXPECT_EQ(send_queue.take(start + 2s)->state_seq, 1000u);
+  EXPECT_FALSE(send_queue.waits());
+  send_queue.offer({state(1, 1000)}, true);
+  EXPECT_FALSE(send_queue.waits()) << "the same again";
 }
 
-TEST(PartnerOutbox, HoldsNothingOfWhatGoesAnotherWayOrOfWhoIsGone) {
-  PartnerOutbox outbox;
-  outbox.offer({state(1, 1), state(2, 1)}, false);
-  EXPECT_FALSE(outbox.waits());
-  outbox.offer({state(1, 2), state(2, 1)}, true);
-  EXPECT_EQ(outbox.take({})->author, AuthorId{1});
-  EXPECT_FALSE(outbox.take({}));
-  outbox.offer({state(2, 2)}, true);
-  outbox.offer({}, true);
-  EXPECT_FALSE(outbox.waits());
+TEST(PartnerSendQueue, HoldsNothingOfWhatGoesAnotherWayOrOfWhoIsGone) {
+  PartnerSendQueue send_queue;
+  send_queue.offer({state(1, 1), state(2, 1)}, false);
+  EXPECT_FALSE(send_queue.waits());
+  send_queue.offer({state(1, 2), state(2, 1)}, true);
+  EXPECT_EQ(send_queue.take({})->author, AuthorId{1});
+  EXPECT_FALSE(send_queue.take({}));
+  send_queue.offer({state(2, 2)}, true);
+  send_queue.offer({}, true);
+  EXPECT_FALSE(send_queue.waits());
   std::vector<CuttingState> many;
   for (std::uint64_t author = 1; author <= 40; ++author) many.push_back(state(author, 1));
-  outbox.offer(many, true);
+  send_queue.offer(many, true);
   std::size_t told = 0;
-  while (outbox.take({})) ++told;
-  EXPECT_EQ(told, PartnerOutbox::kMost);
+  while (send_queue.take({})) ++told;
+  EXPECT_EQ(told, PartnerSendQueue::kMost);
 }
 
 // Who somebody was, what was decided about them and what they drew is there again when the room is.
@@ -410,7 +410,7 @@ TEST(PeopleHost, NamesAndDecisionsOutliveTheProcess) {
   PersistedRoom kept = open();
   RoomRuntime runtime(std::move(kept.room), {.tick = 1ms, .mesh = 1s, .pieces = 0ns}, {}, Detail::automatic,
                 kept.store.get());
-  PeopleCursor cursor;
+  PresenceCursor cursor;
   v1::WatchPeopleResponse news;
   ASSERT_TRUE(news.ParseFromString(*runtime.people().news(cursor, {}, {})));
   const v1::Person* ben = Lesson::person(news, trainee);

@@ -155,7 +155,7 @@ TEST_F(RoomServerTest, ASlowReaderIsBoundedAndCatchesUp) {
   EXPECT_EQ(health.mesh_streams, 2u);
   ASSERT_TRUE(slow.read_to(RoomSeq{400}));
   EXPECT_EQ(slow.hashes(), prompt.hashes());
-  EXPECT_LT(slow.largest_message(), 2 * MeshOutbox::kMessageBytes);
+  EXPECT_LT(slow.largest_message(), 2 * MeshSendQueue::kMessageBytes);
 }
 
 TEST_F(RoomServerTest, AKilledClientDisturbsNobody) {

@@ -25,24 +25,24 @@ using test::test_block;
 const Digest kSecret{{7}};
 
 // What its reader is told at once, as over a line that takes everything.
-class Told final : public SessionSink {
+class Told final : public SessionSubscriber {
  public:
   explicit Told(AuthorId author) : author_(author) {}
   AuthorId author() const override { return author_; }
   void begin(RoomSeq contained, MessageParts before, Bytes complete) override {
-    outbox_.begin(contained, std::move(before), std::move(complete));
+    send_queue_.begin(contained, std::move(before), std::move(complete));
     read();
   }
   void set_leaves(std::vector<FieldLeaf> leaves) override {
-    outbox_.set_leaves(std::move(leaves));
+    send_queue_.set_leaves(std::move(leaves));
     read();
   }
   void offer(RoomSeq place, const Bytes& row) override {
-    ASSERT_TRUE(outbox_.add(place, row));
+    ASSERT_TRUE(send_queue_.add(place, row));
     read();
   }
   void answer(const Bytes& row) override {
-    ASSERT_TRUE(outbox_.add_answer(row));
+    ASSERT_TRUE(send_queue_.add_answer(row));
     read();
   }
   void refuse(const Error& why) override { ADD_FAILURE() << why.message; }
@@ -55,14 +55,14 @@ class Told final : public SessionSink {
 
  private:
   void read() {
-    for (MessageParts parts = outbox_.take(); !parts.empty(); parts = outbox_.take()) {
+    for (MessageParts parts = send_queue_.take(); !parts.empty(); parts = send_queue_.take()) {
       std::string whole;
       for (const Bytes& part : parts) whole += *part;
       ASSERT_TRUE(told.emplace_back().ParseFromString(whole));
     }
   }
   const AuthorId author_;
-  SessionOutbox outbox_;
+  SessionSendQueue send_queue_;
 };
 
 // A driven runtime over a disk in memory, with an instructor and a hand.

@@ -73,7 +73,7 @@ class Company : public test::Picture {
     berg.name = "Dr. Berg";
     berg.role = Role::instructor;
     ada.here = berg.here = true;
-    berg.look = Look{Vec3(0, -200, 100), Vec3(1, 2, 3), 0.001, 0.5};
+    berg.look = ViewFrustum{Vec3(0, -200, 100), Vec3(1, 2, 3), 0.001, 0.5};
     room_.people_here = {ada, berg};
   }
   // Obeys some lines; what ended it.
@@ -83,12 +83,12 @@ class Company : public test::Picture {
     options.people = &room_;
     options.hand = hand;
     options.stop_at_error = true;
-    Inbox inbox;
-    inbox.begin_stream();
+    RenderQueue render_queue;
+    render_queue.begin_stream();
     std::vector<ReceivedBlock> blocks;
     blocks.push_back(test::block({BodyId{0}, 0, {0, 0, 0}}, 1, "ball", test::sphere_mesh(Vec3::Zero(), 15.0, 0)));
-    inbox.put_mesh(RoomSeq{1}, std::move(blocks), true, 1, 0);
-    auto viewer = Viewer::make(options, *window_, inbox, ScriptReader::of("wait surface\n" + lines));
+    render_queue.put_mesh(RoomSeq{1}, std::move(blocks), true, 1, 0);
+    auto viewer = Viewer::make(options, *window_, render_queue, ScriptReader::of("wait surface\n" + lines));
     if (!viewer) return tl::unexpected(viewer.error());
     for (int i = 0; i < 2000; ++i) {
       if (on_turn_) on_turn_(i);
@@ -192,8 +192,8 @@ TEST_F(Company, DrawingsOfOthersAreSeen) {
 TEST_F(Company, WithoutARoomThereIsNobody) {
   ViewerOptions options;
   options.stop_at_error = true;
-  Inbox inbox;
-  auto viewer = Viewer::make(options, *window_, inbox, ScriptReader::of("say hello"));
+  RenderQueue render_queue;
+  auto viewer = Viewer::make(options, *window_, render_queue, ScriptReader::of("say hello"));
   ASSERT_TRUE(viewer);
   const auto state = viewer->turn(false);
   ASSERT_FALSE(state);

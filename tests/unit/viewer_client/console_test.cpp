@@ -266,7 +266,7 @@ TEST_F(ConsoleTest, SpeaksToOneOrToAll) {
 
 TEST_F(ConsoleTest, SaysWhereSomebodyLooksAndWhetherTheyHaveHeard) {
   EXPECT_EQ(say("view Ben").find("error nobody knows"), 0u);
-  desk.people_[2].look = Look{.eye_mm = {1, 2, 3}, .target_mm = {4, 5, -6}};
+  desk.people_[2].look = ViewFrustum{.eye_mm = {1, 2, 3}, .target_mm = {4, 5, -6}};
   EXPECT_EQ(say("view Ben"), "ok eye 1.000 2.000 3.000 target 4.000 5.000 -6.000") << "by the viewer of the same name";
   desk.people_[2].look->up = Vec3(0, 1, 0);
   EXPECT_EQ(say("view Ben"), "ok eye 1.000 2.000 3.000 target 4.000 5.000 -6.000 up 0.000 1.000 0.000");

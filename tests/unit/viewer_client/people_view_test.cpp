@@ -194,7 +194,7 @@ TEST(PeopleView, OfOneNameWhoFitsBetterIsMeant) {
   PeopleSeen seen = all_three();
   PersonSeen window = person(AuthorId{2}, "Ada");  // older than her hand
   window.hand = false;
-  window.look = Look{};
+  window.look = ViewFrustum{};
   seen.people.push_back(window);
   seen.people.push_back(person(AuthorId{9}, "Ada"));
   seen.people.back().hand = false;
@@ -237,7 +237,7 @@ TEST(Wrapped, BreaksAtBlanksAndCutsOff) {
 TEST(CameraView, LooksAsSomebodyElse) {
   CameraView own;
   own.view_angle_rad = 0.7;
-  Look look;
+  ViewFrustum look;
   look.eye_mm = Vec3(10, -200, 50);
   look.target_mm = Vec3(10, 0, 0);
   const CameraView view = looking_as(look, own);
@@ -258,7 +258,7 @@ TEST(CameraView, RollsAsSomebodyElseDoes) {
   theirs.eye_mm = Vec3(10, -200, 0);
   theirs.target_mm = Vec3(10, 0, 0);
   theirs.up = Vec3(2, 3, 2);  // as `look at … up` takes it
-  const Look look = look_of(theirs, 800, 600);
+  const ViewFrustum look = look_of(theirs, 800, 600);
   ASSERT_TRUE(look.up);
   EXPECT_LT((*look.up - Vec3(1, 0, 1).normalized()).norm(), 1e-9) << "across the line of sight, of length 1";
   EXPECT_LT((looking_as(look, CameraView()).up - *look.up).norm(), 1e-9);
@@ -270,7 +270,7 @@ TEST(CameraView, RollsAsSomebodyElseDoes) {
 
 // A turn of the picture is told as any other move of the camera is.
 TEST(CameraView, LooksThatRollAreNotNearEachOther) {
-  Look look{Vec3(0, -200, 0), Vec3::Zero(), 0.001, 0.4, Vec3(0, 0, 1)}, other = look;
+  ViewFrustum look{Vec3(0, -200, 0), Vec3::Zero(), 0.001, 0.4, Vec3(0, 0, 1)}, other = look;
   EXPECT_TRUE(nearly_equal(look, other));
   other.up = Vec3(std::sin(0.03), 0, std::cos(0.03));
   EXPECT_TRUE(nearly_equal(look, other));

@@ -187,14 +187,14 @@ TEST_F(Picture, IsSavedAsPng) {
   EXPECT_FALSE(window_->save_png("/nowhere/at/all.png"));
 }
 
-// The render loop between a network thread's inbox and the window.
+// The render loop between a network thread's render_queue and the window.
 TEST_F(Picture, TheLoopShowsWhatTheInboxBrings) {
   const test::TempDir folder;
   ViewerOptions options;
   options.bounds = {Vec3(-20, -20, -20), Vec3(20, 20, 20)};
   options.frame_log = folder / "frames.csv";
-  Inbox inbox;
-  auto viewer = Viewer::make(options, *window_, inbox,
+  RenderQueue render_queue;
+  auto viewer = Viewer::make(options, *window_, render_queue,
                              ScriptReader::of("wait surface\nwait seq 5\nstatus " + (folder / "status.json").string()));
   ASSERT_TRUE(viewer);
 
@@ -203,7 +203,7 @@ TEST_F(Picture, TheLoopShowsWhatTheInboxBrings) {
     std::vector<ReceivedBlock> blocks;
     blocks.push_back(test::block(key, seq + 1, std::to_string(seq), sphere_mesh(Vec3::Zero(), radius_mm, 0)));
     const auto now = std::chrono::steady_clock::now().time_since_epoch();
-    inbox.put_mesh(RoomSeq{seq}, std::move(blocks), complete, 1, std::chrono::nanoseconds(now).count());
+    render_queue.put_mesh(RoomSeq{seq}, std::move(blocks), complete, 1, std::chrono::nanoseconds(now).count());
   };
   const auto turns = [&](int count) {
     for (int i = 0; i < count; ++i) {
@@ -213,7 +213,7 @@ TEST_F(Picture, TheLoopShowsWhatTheInboxBrings) {
     return false;
   };
   // Until the whole surface is there, nothing of it is drawn.
-  inbox.begin_stream();
+  render_queue.begin_stream();
   deliver(3, 15.0, false);
   EXPECT_FALSE(turns(8));
   const Image before = window_->image();

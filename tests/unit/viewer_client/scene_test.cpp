@@ -9,7 +9,7 @@
 #include "synthetic.hpp"
 #include "viewer_client/scene/camera_view.hpp"
 #include "viewer_client/scene/gauges.hpp"
-#include "viewer_client/scene/inbox.hpp"
+#include "viewer_client/scene/render_queue.hpp"
 #include "viewer_client/scene/surface_scene.hpp"
 #include "viewer_client/scene/tool_mesh.hpp"
 
@@ -127,28 +127,28 @@ TEST(SurfaceScene, ASnapshotAfterAnInterruptionReplacesEverything) {
   EXPECT_FALSE(scene.replace(block(key(0), 1, "late copy", small_sphere(7))));
 }
 
-TEST(Inbox, HoldsOnlyTheNewestOfEachBlock) {
-  Inbox inbox;
-  inbox.begin_stream();
+TEST(RenderQueue, HoldsOnlyTheNewestOfEachBlock) {
+  RenderQueue render_queue;
+  render_queue.begin_stream();
   for (std::uint64_t version = 1; version <= 500; ++version) {
     std::vector<ReceivedBlock> blocks;
     blocks.push_back(block(key(0), version, std::to_string(version), small_sphere(0)));
-    inbox.put_mesh(RoomSeq{version}, std::move(blocks), version > 10, 1, static_cast<std::int64_t>(version));
+    render_queue.put_mesh(RoomSeq{version}, std::move(blocks), version > 10, 1, static_cast<std::int64_t>(version));
   }
-  Delivery delivery = inbox.take();
+  Delivery delivery = render_queue.take();
   EXPECT_TRUE(delivery.snapshot_begun);
   EXPECT_TRUE(delivery.snapshot_complete);
   ASSERT_EQ(delivery.blocks.size(), 1u);
   EXPECT_EQ(delivery.blocks.begin()->second.version, 500u);
   EXPECT_EQ(delivery.room_seq, RoomSeq{500});
   EXPECT_EQ(delivery.arrivals.size(), 500u);
-  EXPECT_FALSE(inbox.take().any_mesh);
+  EXPECT_FALSE(render_queue.take().any_mesh);
 }
 
-TEST(Inbox, ArrivalsOfAStalledViewerAreBounded) {
-  Inbox inbox;
-  for (std::uint64_t i = 1; i <= 5000; ++i) inbox.put_mesh(RoomSeq{i}, {}, true, 0, 0);
-  const Delivery delivery = inbox.take();
+TEST(RenderQueue, ArrivalsOfAStalledViewerAreBounded) {
+  RenderQueue render_queue;
+  for (std::uint64_t i = 1; i <= 5000; ++i) render_queue.put_mesh(RoomSeq{i}, {}, true, 0, 0);
+  const Delivery delivery = render_queue.take();
   EXPECT_LT(delivery.arrivals.size(), 2000u);
   EXPECT_EQ(delivery.arrivals.back().room_seq, RoomSeq{5000});
 }

@@ -279,31 +279,31 @@ TEST(Wire, ABlocksLevelHasASign) {
 }
 
 TEST(Wire, ALookComesBackAndBadOnesAreRefusedByTheNameOfTheField) {
-  const Look look{{1, -2, 300}, {4, 5, 6}, 0.0005, 0.4};
+  const ViewFrustum look{{1, -2, 300}, {4, 5, 6}, 0.0005, 0.4};
   const auto back = wire::from_wire(wire::to_wire(look));
   ASSERT_TRUE(back) << back.error().message;
   EXPECT_EQ(*back, look);
-  const auto refused = [&](const std::function<void(v1::Look&)>& change, const std::string& field) {
-    v1::Look bad = wire::to_wire(look);
+  const auto refused = [&](const std::function<void(v1::ViewFrustum&)>& change, const std::string& field) {
+    v1::ViewFrustum bad = wire::to_wire(look);
     change(bad);
     const auto answer = wire::from_wire(bad);
     ASSERT_FALSE(answer) << field;
     EXPECT_NE(answer.error().message.find(field), std::string::npos) << answer.error().message;
   };
-  refused([](v1::Look& l) { l.mutable_eye_mm()->set_x(std::numeric_limits<double>::quiet_NaN()); }, "eye_mm");
-  refused([](v1::Look& l) { l.mutable_target_mm()->set_z(1e300); }, "target_mm");
-  refused([](v1::Look& l) { l.set_pixel_rad(0); }, "pixel_rad");
-  refused([](v1::Look& l) { l.set_view_rad(std::numeric_limits<double>::infinity()); }, "view_rad");
-  refused([](v1::Look& l) { l.Clear(); }, "pixel_rad");
+  refused([](v1::ViewFrustum& l) { l.mutable_eye_mm()->set_x(std::numeric_limits<double>::quiet_NaN()); }, "eye_mm");
+  refused([](v1::ViewFrustum& l) { l.mutable_target_mm()->set_z(1e300); }, "target_mm");
+  refused([](v1::ViewFrustum& l) { l.set_pixel_rad(0); }, "pixel_rad");
+  refused([](v1::ViewFrustum& l) { l.set_view_rad(std::numeric_limits<double>::infinity()); }, "view_rad");
+  refused([](v1::ViewFrustum& l) { l.Clear(); }, "pixel_rad");
   EXPECT_FALSE(back->up) << "of those who do not say it nobody knows which way is up";
 
-  Look upright = look;
+  ViewFrustum upright = look;
   upright.up = Vec3(1, 0, 0);
   const auto with_up = wire::from_wire(wire::to_wire(upright));
   ASSERT_TRUE(with_up);
   EXPECT_EQ(*with_up, upright);
   const auto up_of = [](double x, double y, double z) {
-    return [=](v1::Look& l) {
+    return [=](v1::ViewFrustum& l) {
       l.mutable_up()->set_x(x);
       l.mutable_up()->set_y(y);
       l.mutable_up()->set_z(z);
@@ -316,7 +316,7 @@ TEST(Wire, ALookComesBackAndBadOnesAreRefusedByTheNameOfTheField) {
   const Vec3 sight = (look.target_mm - look.eye_mm).normalized();
   refused(up_of(sight.x(), sight.y(), sight.z()), "look.up");
   refused(up_of(-sight.x(), -sight.y(), -sight.z()), "look.up");
-  refused([&](v1::Look& l) {
+  refused([&](v1::ViewFrustum& l) {
     *l.mutable_target_mm() = l.eye_mm();
     up_of(0, 1, 0)(l);
   }, "look.up");

@@ -1,4 +1,4 @@
-#include "server/net/outbox.hpp"
+#include "server/net/send_queue.hpp"
 
 #include <algorithm>
 #include <iterator>
@@ -12,19 +12,19 @@ Bytes serialised(const google::protobuf::MessageLite& message) {
   return std::make_shared<const std::string>(message.SerializeAsString());
 }
 
-MeshOutbox::MeshOutbox(MeshUpdate snapshot)
+MeshSendQueue::MeshSendQueue(MeshUpdate snapshot)
     : waiting_(std::move(snapshot.blocks)),
       snapshot_blocks_(waiting_.size()),
       snapshot_seq_(snapshot.room_seq),
       newest_(snapshot.room_seq) {}
 
-void MeshOutbox::add(const MeshUpdate& update) {
+void MeshSendQueue::add(const MeshUpdate& update) {
   for (const auto& [key, bytes] : update.blocks) waiting_.insert_or_assign(key, bytes);
   newest_ = update.room_seq;
   news_ = true;
 }
 
-MessageParts MeshOutbox::take() {
+MessageParts MeshSendQueue::take() {
   if (waiting_.empty() && !news_) return {};
   MessageParts parts;
   std::size_t size = 0;
@@ -60,18 +60,18 @@ MessageParts MeshOutbox::take() {
   return parts;
 }
 
-void SessionOutbox::begin(RoomSeq contained, MessageParts before, Bytes complete) {
+void SessionSendQueue::begin(RoomSeq contained, MessageParts before, Bytes complete) {
   contained_ = contained;
   before_.assign(std::make_move_iterator(before.begin()), std::make_move_iterator(before.end()));
   complete_ = std::move(complete);
 }
 
-void SessionOutbox::set_leaves(std::vector<FieldLeaf> leaves) {
+void SessionSendQueue::set_leaves(std::vector<FieldLeaf> leaves) {
   leaves_ = std::move(leaves);
   leaves_known_ = true;
 }
 
-bool SessionOutbox::add(RoomSeq place, Bytes row) {
+bool SessionSendQueue::add(RoomSeq place, Bytes row) {
   if (!takes(place)) return true;
   if (rows_.size() >= kMaxRows) return false;
   rows_.push_back({++index_, std::move(row)});
@@ -80,20 +80,20 @@ bool SessionOutbox::add(RoomSeq place, Bytes row) {
   return true;
 }
 
-bool SessionOutbox::add_answer(Bytes row) {
+bool SessionSendQueue::add_answer(Bytes row) {
   if (rows_.size() >= kMaxRows) return false;
   rows_.push_back({0, std::move(row)});
   return true;
 }
 
-RoomSeq SessionOutbox::arrived(std::uint64_t index) {
+RoomSeq SessionSendQueue::arrived(std::uint64_t index) {
   std::erase_if(rows_, [&](const Row& row) { return row.index != 0 && row.index <= index; });
   RoomSeq newest;
   for (; !places_.empty() && places_.front().first <= index; places_.pop_front()) newest = places_.front().second;
   return newest;
 }
 
-MessageParts SessionOutbox::take() {
+MessageParts SessionSendQueue::take() {
   // Until then some of it may not be kept.
   if (!leaves_known_) return {};
   if (!before_.empty()) {
@@ -123,7 +123,7 @@ MessageParts SessionOutbox::take() {
   return {row.bytes, serialised(number)};
 }
 
-void PartnerOutbox::offer(const std::vector<CuttingState>& all, bool by_stream) {
+void PartnerSendQueue::offer(const std::vector<CuttingState>& all, bool by_stream) {
   std::erase_if(partners_, [&](const auto& known) {
     return std::ranges::find(all, known.first, &CuttingState::author) == all.end();
   });
@@ -139,7 +139,7 @@ void PartnerOutbox::offer(const std::vector<CuttingState>& all, bool by_stream) 
   }
 }
 
-std::optional<CuttingState> PartnerOutbox::take(Clock::time_point now) {
+std::optional<CuttingState> PartnerSendQueue::take(Clock::time_point now) {
   for (auto& [author, partner] : partners_) {
     if (!partner.waits || now < partner.next) continue;
     partner.waits = false;
@@ -149,7 +149,7 @@ std::optional<CuttingState> PartnerOutbox::take(Clock::time_point now) {
   return std::nullopt;
 }
 
-bool PartnerOutbox::waits() const {
+bool PartnerSendQueue::waits() const {
   return std::ranges::any_of(partners_, [](const auto& entry) { return entry.second.waits; });
 }
 

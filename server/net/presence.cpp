@@ -1,4 +1,4 @@
-#include "server/net/people_board.hpp"
+#include "server/net/presence.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -9,7 +9,7 @@
 
 namespace osteon {
 
-PeopleBoard::PeopleBoard(const Room& room, const std::map<std::uint32_t, std::string>& names)
+Presence::Presence(const Room& room, const std::map<std::uint32_t, std::string>& names)
     : room_seq_(room.room_seq()) {
   revision_ = room.authors() + 1;  // whoever is here from now on was here later than any of them
   for (std::uint64_t author = 1; author <= room.authors(); ++author) {
@@ -28,14 +28,14 @@ PeopleBoard::PeopleBoard(const Room& room, const std::map<std::uint32_t, std::st
   for (const auto& [id, drawn] : room.people().annotations()) annotations_[id] = {revision_, drawn};
 }
 
-PeopleBoard::Entry* PeopleBoard::change(AuthorId author) {
+Presence::Entry* Presence::change(AuthorId author) {
   const auto found = people_.find(author);
   if (found == people_.end()) return nullptr;
   found->second.revision = ++revision_;
   return &found->second;
 }
 
-void PeopleBoard::joined(AuthorId author, const std::string& name, Role role, bool hand) {
+void Presence::joined(AuthorId author, const std::string& name, Role role, bool hand) {
   const std::lock_guard lock(mutex_);
   Entry& entry = people_[author];
   entry.revision = entry.last_here = ++revision_;
@@ -44,12 +44,12 @@ void PeopleBoard::joined(AuthorId author, const std::string& name, Role role, bo
   entry.hand = hand;
 }
 
-void PeopleBoard::came(AuthorId author) {
+void Presence::came(AuthorId author) {
   const std::lock_guard lock(mutex_);
   if (Entry* entry = change(author)) ++entry->streams;
 }
 
-void PeopleBoard::went(AuthorId author) {
+void Presence::went(AuthorId author) {
   const std::lock_guard lock(mutex_);
   Entry* entry = change(author);
   if (entry == nullptr || entry->streams == 0 || --entry->streams > 0) return;
@@ -57,7 +57,7 @@ void PeopleBoard::went(AuthorId author) {
   entry->last_here = revision_;
 }
 
-void PeopleBoard::take(const RoomEvent& event) {
+void Presence::take(const RoomEvent& event) {
   const std::lock_guard lock(mutex_);
   if (const auto* decided = std::get_if<SuperviseRow>(&event.people)) {
     if (Entry* entry = change(decided->subject)) {
@@ -78,23 +78,23 @@ void PeopleBoard::take(const RoomEvent& event) {
   }
 }
 
-void PeopleBoard::took_cut(AuthorId author) {
+void Presence::took_cut(AuthorId author) {
   const std::lock_guard lock(mutex_);
   if (Entry* entry = change(author)) ++entry->cuts;
 }
 
-void PeopleBoard::heard(AuthorId author, RoomSeq place) {
+void Presence::heard(AuthorId author, RoomSeq place) {
   const std::lock_guard lock(mutex_);
   const auto found = people_.find(author);
   if (found != people_.end() && place > found->second.heard) change(author)->heard = place;
 }
 
-void PeopleBoard::looked(AuthorId author, const Look& from) {
+void Presence::looked(AuthorId author, const ViewFrustum& from) {
   const std::lock_guard lock(mutex_);
   if (Entry* entry = change(author)) entry->look = from;
 }
 
-std::vector<AuthorId> PeopleBoard::hands_overseen() const {
+std::vector<AuthorId> Presence::hands_overseen() const {
   const std::lock_guard lock(mutex_);
   std::vector<AuthorId> hands;
   for (const auto& [author, entry] : people_)
@@ -102,42 +102,42 @@ std::vector<AuthorId> PeopleBoard::hands_overseen() const {
   return hands;
 }
 
-RoomSeq PeopleBoard::heard_of(AuthorId author) const {
+RoomSeq Presence::heard_of(AuthorId author) const {
   const std::lock_guard lock(mutex_);
   const auto found = people_.find(author);
   return found == people_.end() ? RoomSeq{} : found->second.heard;
 }
 
-std::string PeopleBoard::name_of(AuthorId author) const {
+std::string Presence::name_of(AuthorId author) const {
   const std::lock_guard lock(mutex_);
   const auto found = people_.find(author);
   return found == people_.end() ? std::string() : found->second.name;
 }
 
-void PeopleBoard::watch(PeopleSink& sink) {
+void Presence::watch(PresenceSubscriber& sink) {
   const std::lock_guard lock(streams_mutex_);
   sinks_.push_back(&sink);
   sink.changed();
   if (ended_) sink.end(*ended_);
 }
 
-void PeopleBoard::leave(PeopleSink& sink) {
+void Presence::leave(PresenceSubscriber& sink) {
   const std::lock_guard lock(streams_mutex_);
   std::erase(sinks_, &sink);
 }
 
-void PeopleBoard::end_streams(const std::string& why) {
+void Presence::end_streams(const std::string& why) {
   const std::lock_guard lock(streams_mutex_);
   ended_ = why;
-  for (PeopleSink* sink : sinks_) sink->end(why);
+  for (PresenceSubscriber* sink : sinks_) sink->end(why);
 }
 
-std::size_t PeopleBoard::streams() const {
+std::size_t Presence::streams() const {
   const std::lock_guard lock(streams_mutex_);
   return sinks_.size();
 }
 
-void PeopleBoard::publish(RoomSeq room_seq, Clock::time_point now) {
+void Presence::publish(RoomSeq room_seq, Clock::time_point now) {
   if (now < next_) return;
   {
     const std::lock_guard lock(mutex_);
@@ -146,10 +146,10 @@ void PeopleBoard::publish(RoomSeq room_seq, Clock::time_point now) {
   }
   next_ = now + kApart;
   const std::lock_guard lock(streams_mutex_);
-  for (PeopleSink* sink : sinks_) sink->changed();
+  for (PresenceSubscriber* sink : sinks_) sink->changed();
 }
 
-Bytes PeopleBoard::news(PeopleCursor& cursor, AuthorId reader, const PeopleRights& rights) const {
+Bytes Presence::news(PresenceCursor& cursor, AuthorId reader, const PeopleRights& rights) const {
   const std::lock_guard lock(mutex_);
   if (cursor.begun && cursor.revision == revision_) return nullptr;
   // Of those who are not here, whoever was here last.

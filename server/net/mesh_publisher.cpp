@@ -1,4 +1,4 @@
-#include "server/net/mesh_room.hpp"
+#include "server/net/mesh_publisher.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -13,14 +13,14 @@ constexpr Coord kFirstCoord{INT32_MIN, INT32_MIN, INT32_MIN};  // before every b
 
 }  // namespace
 
-MeshRoom::MeshRoom(Room& room, std::shared_mutex& room_mutex, MeshRates rates, Detail detail, ToolTips tool_tips_mm)
+MeshPublisher::MeshPublisher(Room& room, std::shared_mutex& room_mutex, MeshRates rates, Detail detail, ToolTips tool_tips_mm)
     : room_(room),
       room_mutex_(room_mutex),
       rates_(rates),
       near_(detail == Detail::near || (detail == Detail::automatic && room.bone_blocks().size() > kMostFullBlocks)),
       tool_tips_mm_(std::move(tool_tips_mm)) {}
 
-void MeshRoom::make_whole_surface(const std::function<void(double)>& progress) {
+void MeshPublisher::make_whole_surface(const std::function<void(double)>& progress) {
   if (near_) room_.focus({focus_on_nothing()});
   std::vector<BlockKey> keys = room_.bone_blocks();
   for (const BlockKey& key : room_.take_stale_blocks()) keys.push_back(key);  // fine ones of fields that were loaded
@@ -46,11 +46,11 @@ void MeshRoom::make_whole_surface(const std::function<void(double)>& progress) {
   if (progress) progress(1.0);
 }
 
-void MeshRoom::start() {
+void MeshPublisher::start() {
   thread_ = std::thread([this] { run(); });
 }
 
-void MeshRoom::stop() {
+void MeshPublisher::stop() {
   {
     const std::lock_guard lock(wake_mutex_);
     end_ = true;
@@ -59,7 +59,7 @@ void MeshRoom::stop() {
   if (thread_.joinable()) thread_.join();
 }
 
-void MeshRoom::run() {
+void MeshPublisher::run() {
   const auto about = rates_.mesh / (2 * Pace::kTurns);
   Clock::time_point next{};
   bool due = false;
@@ -86,35 +86,35 @@ void MeshRoom::run() {
   }
 }
 
-void MeshRoom::changed(Clock::time_point arrived) {
+void MeshPublisher::changed(Clock::time_point arrived) {
   const std::lock_guard lock(wake_mutex_);
   unmeshed_.push_back(arrived);
 }
 
-void MeshRoom::wake() {
+void MeshPublisher::wake() {
   const std::lock_guard lock(wake_mutex_);
   due_ = fresh_ = true;
   wake_.notify_one();
 }
 
 // [mesh thread]
-void MeshRoom::follow_looks(Clock::time_point now) {
+void MeshPublisher::follow_looks(Clock::time_point now) {
   if (!near_ || now < next_look_) return;
   next_look_ = now + rates_.looks;
-  auto focuses = lookers_.focuses(room_.bone().pitch_mm(), tool_tips_mm_());
+  auto focuses = view_interest_.focuses(room_.bone().pitch_mm(), tool_tips_mm_());
   if (!focuses) return;
   const std::unique_lock lock(room_mutex_);
   room_.focus(std::move(*focuses));
 }
 
-void MeshRoom::update(bool due) {
+void MeshPublisher::update(bool due) {
   const auto now = Clock::now();
   follow_looks(now);
   make_stale_blocks(due);
   send_owed(now);
 }
 
-void MeshRoom::make_stale_blocks(bool due) {
+void MeshPublisher::make_stale_blocks(bool due) {
   std::vector<BlockKey> keys;
   std::vector<BodyId> bodies_now;
   std::vector<Clock::time_point> arrivals;
@@ -180,7 +180,7 @@ void MeshRoom::make_stale_blocks(bool due) {
   for (const Clock::time_point arrived : arrivals) update_.record(ready - arrived);
 }
 
-void MeshRoom::send_owed(Clock::time_point now) {
+void MeshPublisher::send_owed(Clock::time_point now) {
   if (!std::exchange(owed_, false)) return;
   const std::lock_guard lock(surface_mutex_);
   turns_ = std::min(Pace::kTurns, 1 + static_cast<int>(streams_.size() / kTurnViewers));
@@ -196,11 +196,11 @@ void MeshRoom::send_owed(Clock::time_point now) {
   }
 }
 
-void MeshRoom::watch(MeshSink& sink, const std::optional<Look>& look) {
+void MeshPublisher::watch(MeshSubscriber& sink, const std::optional<ViewFrustum>& look) {
   {
     const std::lock_guard lock(surface_mutex_);
     streams_.push_back({&sink, Pace(rates_.mesh, streams_.size())});
-    lookers_.open(sink.author(), look);
+    view_interest_.open(sink.author(), look);
     // What is there: the finer blocks that this viewer's look asks for follow.
     sink.begin(surface_);
     if (ended_) sink.end(*ended_);
@@ -208,22 +208,22 @@ void MeshRoom::watch(MeshSink& sink, const std::optional<Look>& look) {
   wake();
 }
 
-void MeshRoom::leave(MeshSink& sink) {
+void MeshPublisher::leave(MeshSubscriber& sink) {
   const std::lock_guard lock(surface_mutex_);
-  if (std::erase_if(streams_, [&](const Stream& stream) { return stream.sink == &sink; }) > 0) lookers_.close(sink.author());
+  if (std::erase_if(streams_, [&](const Stream& stream) { return stream.sink == &sink; }) > 0) view_interest_.close(sink.author());
 }
 
-void MeshRoom::look(AuthorId viewer, const Look& from) {
-  if (lookers_.look(viewer, from)) wake();
+void MeshPublisher::look(AuthorId viewer, const ViewFrustum& from) {
+  if (view_interest_.look(viewer, from)) wake();
 }
 
-void MeshRoom::end_streams(const std::string& why) {
+void MeshPublisher::end_streams(const std::string& why) {
   const std::lock_guard lock(surface_mutex_);
   ended_ = why;
   for (const Stream& stream : streams_) stream.sink->end(why);
 }
 
-MeshHealth MeshRoom::health() const {
+MeshHealth MeshPublisher::health() const {
   MeshHealth health;
   {
     const std::lock_guard lock(surface_mutex_);
@@ -237,7 +237,7 @@ MeshHealth MeshRoom::health() const {
   return health;
 }
 
-Digest MeshRoom::surface_hash() const {
+Digest MeshPublisher::surface_hash() const {
   const std::lock_guard lock(surface_mutex_);
   return store_.hash();
 }

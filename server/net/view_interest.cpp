@@ -1,23 +1,23 @@
-#include "server/net/lookers.hpp"
+#include "server/net/view_interest.hpp"
 
 #include <algorithm>
 
 namespace osteon {
 
-void Lookers::open(AuthorId viewer, const std::optional<Look>& look) {
+void ViewInterest::open(AuthorId viewer, const std::optional<ViewFrustum>& look) {
   const std::lock_guard lock(mutex_);
   Viewer& entry = viewers_[viewer];
   ++entry.streams;
   entry.look = look;
 }
 
-void Lookers::close(AuthorId viewer) {
+void ViewInterest::close(AuthorId viewer) {
   const std::lock_guard lock(mutex_);
   const auto entry = viewers_.find(viewer);
   if (entry != viewers_.end() && --entry->second.streams == 0) viewers_.erase(entry);
 }
 
-bool Lookers::look(AuthorId viewer, const Look& from) {
+bool ViewInterest::look(AuthorId viewer, const ViewFrustum& from) {
   const std::lock_guard lock(mutex_);
   const auto entry = viewers_.find(viewer);
   if (entry == viewers_.end()) return false;
@@ -25,7 +25,7 @@ bool Lookers::look(AuthorId viewer, const Look& from) {
   return true;
 }
 
-std::optional<std::vector<Focus>> Lookers::focuses(double pitch_mm, std::span<const Vec3> tool_tips_mm) {
+std::optional<std::vector<Focus>> ViewInterest::focuses(double pitch_mm, std::span<const Vec3> tool_tips_mm) {
   std::vector<Focus> wanted{focus_on_nothing()};
   {
     const std::lock_guard lock(mutex_);

@@ -37,7 +37,7 @@ struct Delivery {
 };
 
 // Any thread may call any function; one mutex, held for a few moves at a time.
-class Inbox {
+class RenderQueue {
  public:
   // A stream begins: what waits of the stream before it is void.
   void begin_stream();

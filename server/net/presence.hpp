@@ -13,20 +13,20 @@
 
 #include "common/access/role.hpp"
 #include "common/core/id.hpp"
-#include "common/surface/look.hpp"
-#include "server/net/outbox.hpp"
-#include "server/net/stream_sink.hpp"
+#include "common/surface/view_frustum.hpp"
+#include "server/net/send_queue.hpp"
+#include "server/net/subscriber.hpp"
 #include "server/room/room.hpp"
 
 namespace osteon {
 
-class PeopleSink : public StreamSink {
+class PresenceSubscriber : public Subscriber {
  public:
   virtual void changed() = 0;  // there may be news(): it asks for them when it can send
 };
 
 // How far a reader has come.
-struct PeopleCursor {
+struct PresenceCursor {
   std::uint64_t revision = 0, words = 0;
   std::set<std::uint32_t> annotations;
   bool begun = false;
@@ -38,7 +38,7 @@ struct PeopleRights {
 };
 
 // Any thread. Lock order: that of the streams, then a stream's own, then that of the people.
-class PeopleBoard {
+class Presence {
  public:
   using Clock = std::chrono::steady_clock;
   static constexpr std::size_t kMostWords = 64;    // said last
@@ -46,7 +46,7 @@ class PeopleBoard {
   static constexpr std::chrono::milliseconds kApart{100};
 
   // `names`: of people by their pseudonym, as far as they are known.
-  PeopleBoard(const Room& room, const std::map<std::uint32_t, std::string>& names);
+  Presence(const Room& room, const std::map<std::uint32_t, std::string>& names);
 
   void joined(AuthorId author, const std::string& name, Role role, bool hand);
   void came(AuthorId author);  // one more session or stream of theirs; of nobody: nothing
@@ -54,7 +54,7 @@ class PeopleBoard {
   void take(const RoomEvent& event);  // supervise, annotation, words; of another kind: nothing
   void took_cut(AuthorId author);
   void heard(AuthorId author, RoomSeq place);
-  void looked(AuthorId author, const Look& from);
+  void looked(AuthorId author, const ViewFrustum& from);
 
   // Of those who have a hand, here or not, and may be overseen together: instructors are not among them.
   [[nodiscard]] std::vector<AuthorId> hands_overseen() const;
@@ -62,8 +62,8 @@ class PeopleBoard {
   [[nodiscard]] std::string name_of(AuthorId author) const;  // empty: nobody's, or not known any more
 
   // The sink hears of every change until it leaves or all streams end.
-  void watch(PeopleSink& sink);
-  void leave(PeopleSink& sink);
+  void watch(PresenceSubscriber& sink);
+  void leave(PresenceSubscriber& sink);
   void end_streams(const std::string& why);  // those open now and those that come later
   [[nodiscard]] std::size_t streams() const;
   // [tick] Readers hear at most every kApart that there is something new.
@@ -71,7 +71,7 @@ class PeopleBoard {
 
   // A whole WatchPeopleResponse of what the reader lacks; null: nothing. The newest of each person and annotation, and
   // of words those that are still here.
-  [[nodiscard]] Bytes news(PeopleCursor& cursor, AuthorId reader, const PeopleRights& rights) const;
+  [[nodiscard]] Bytes news(PresenceCursor& cursor, AuthorId reader, const PeopleRights& rights) const;
 
  private:
   struct Entry {
@@ -83,7 +83,7 @@ class PeopleBoard {
     Supervision supervision;
     RoomSeq decided, heard;
     AuthorId decided_by;
-    std::optional<Look> look;
+    std::optional<ViewFrustum> look;
     std::uint32_t cuts = 0;
     std::uint64_t last_here = 0;  // revision
   };
@@ -100,7 +100,7 @@ class PeopleBoard {
   Entry* change(AuthorId author);  // under mutex_; null: nobody is known by that
 
   mutable std::mutex streams_mutex_;
-  std::vector<PeopleSink*> sinks_;
+  std::vector<PresenceSubscriber*> sinks_;
   std::optional<std::string> ended_;
   Clock::time_point next_{};  // of the tick
 

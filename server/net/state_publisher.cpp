@@ -1,4 +1,4 @@
-#include "server/net/state_board.hpp"
+#include "server/net/state_publisher.hpp"
 
 #include <algorithm>
 #include <memory>
@@ -8,9 +8,9 @@
 
 namespace osteon {
 
-StateBoard::StateBoard() : thread_([this] { run(); }) {}
+StatePublisher::StatePublisher() : thread_([this] { run(); }) {}
 
-void StateBoard::stop() {
+void StatePublisher::stop() {
   {
     const std::lock_guard lock(states_mutex_);
     end_ = true;
@@ -19,7 +19,7 @@ void StateBoard::stop() {
   if (thread_.joinable()) thread_.join();
 }
 
-void StateBoard::watch(CuttingSink& sink) {
+void StatePublisher::watch(StateSubscriber& sink) {
   const std::lock_guard lock(streams_mutex_);
   Stream& stream = streams_.emplace_back(Stream{&sink, Pace(sink.apart(), streams_.size())});
   std::unique_lock states_lock(states_mutex_);
@@ -30,28 +30,28 @@ void StateBoard::watch(CuttingSink& sink) {
   if (ended_) sink.end(*ended_);
 }
 
-void StateBoard::leave(CuttingSink& sink) {
+void StatePublisher::leave(StateSubscriber& sink) {
   const std::lock_guard lock(streams_mutex_);
   std::erase_if(streams_, [&](const Stream& stream) { return stream.sink == &sink; });
 }
 
-void StateBoard::end_streams(const std::string& why) {
+void StatePublisher::end_streams(const std::string& why) {
   const std::lock_guard lock(streams_mutex_);
   ended_ = why;
   for (const Stream& stream : streams_) stream.sink->end(why);
 }
 
-std::size_t StateBoard::streams() const {
+std::size_t StatePublisher::streams() const {
   const std::lock_guard lock(streams_mutex_);
   return streams_.size();
 }
 
-void StateBoard::tell_hands(TellHands tell) {
+void StatePublisher::tell_hands(TellHands tell) {
   const std::lock_guard lock(states_mutex_);
   tell_hands_ = std::move(tell);
 }
 
-void StateBoard::offer(CuttingState state) {
+void StatePublisher::offer(CuttingState state) {
   const std::lock_guard lock(states_mutex_);
   Shown& shown = states_[state.author];
   shown = {std::move(state)};
@@ -59,7 +59,7 @@ void StateBoard::offer(CuttingState state) {
 }
 
 // A tool whose hand is gone stands still: readers must not go on sounding and drawing its last moment.
-void StateBoard::session_over(AuthorId author) {
+void StatePublisher::session_over(AuthorId author) {
   const std::lock_guard lock(states_mutex_);
   const auto shown = states_.find(author);
   if (shown == states_.end()) return;
@@ -72,7 +72,7 @@ void StateBoard::session_over(AuthorId author) {
   changed_ = true;
 }
 
-void StateBoard::show(const std::vector<SceneItem>& items, const std::vector<BodyId>& bodies) {
+void StatePublisher::show(const std::vector<SceneItem>& items, const std::vector<BodyId>& bodies) {
   v1::WatchCuttingResponse scene;
   for (const SceneItem& item : items) *scene.add_items() = wire::to_wire(item);
   for (const BodyId body : bodies) scene.add_bodies(body.value);
@@ -81,7 +81,7 @@ void StateBoard::show(const std::vector<SceneItem>& items, const std::vector<Bod
   changed_ = true;
 }
 
-void StateBoard::publish(RoomSeq room_seq) {
+void StatePublisher::publish(RoomSeq room_seq) {
   const std::lock_guard lock(states_mutex_);
   for (auto& [author, shown] : states_) shown.ticks_over += shown.over ? 1 : 0;
   if (std::erase_if(states_, [](const auto& entry) { return entry.second.ticks_over > kShowIdleTicks; }) > 0) changed_ = true;
@@ -97,7 +97,7 @@ void StateBoard::publish(RoomSeq room_seq) {
   if (due_) wake_.notify_one();
 }
 
-void StateBoard::run() {
+void StatePublisher::run() {
   std::unique_lock lock(states_mutex_);
   while (true) {
     wake_.wait(lock, [&] { return due_ || end_; });
@@ -117,7 +117,7 @@ void StateBoard::run() {
 }
 
 // Where telling everyone takes longer than a tick, the next round brings the newest and skips what came between.
-void StateBoard::tell(Clock::time_point now) {
+void StatePublisher::tell(Clock::time_point now) {
   const std::lock_guard lock(streams_mutex_);
   std::unique_lock states_lock(states_mutex_);
   const ShownNow shown = newest_;
@@ -135,13 +135,13 @@ void StateBoard::tell(Clock::time_point now) {
   owed_ = owed;
 }
 
-void StateBoard::offer(Stream& stream, std::uint64_t number, const ShownNow& shown, Clock::time_point now) {
+void StatePublisher::offer(Stream& stream, std::uint64_t number, const ShownNow& shown, Clock::time_point now) {
   stream.told = number;
   stream.pace.done(now);
   stream.sink->offer(shown);
 }
 
-std::vector<Vec3> StateBoard::tool_tips_mm() const {
+std::vector<Vec3> StatePublisher::tool_tips_mm() const {
   const std::lock_guard lock(states_mutex_);
   std::vector<Vec3> tips_mm;
   for (const auto& [author, shown] : states_)

@@ -10,9 +10,9 @@ namespace osteon {
 
 // What a room says to an open stream. Called under a lock of the part that says it: must return at once and never call
 // back.
-class StreamSink {
+class Subscriber {
  public:
-  virtual ~StreamSink() = default;
+  virtual ~Subscriber() = default;
   virtual void end(const std::string& why) = 0;             // the server stops
   [[nodiscard]] virtual std::size_t waiting() const = 0;    // rows or blocks that the reader is behind
 };
@@ -43,7 +43,7 @@ class Pace {
 
 // The open streams of one kind.
 template <class Sink>
-class Audience {
+class Subscribers {
  public:
   void add(Sink& sink) { sinks_.push_back(&sink); }
   // False: it was not among them.

@@ -15,8 +15,8 @@
 #include "common/geometry/pose.hpp"
 #include "common/mechanics/cutting_state.hpp"
 #include "common/tools/scene_item.hpp"
-#include "server/net/outbox.hpp"
-#include "server/net/stream_sink.hpp"
+#include "server/net/send_queue.hpp"
+#include "server/net/subscriber.hpp"
 
 namespace osteon {
 
@@ -26,7 +26,7 @@ struct ShownNow {
   Bytes scene;  // items and bodies
 };
 
-class CuttingSink : public StreamSink {
+class StateSubscriber : public Subscriber {
  public:
   virtual void offer(const ShownNow& now) = 0;  // newest wins
   // Whose stream it is; null: nobody knows.
@@ -36,21 +36,21 @@ class CuttingSink : public StreamSink {
 };
 
 // Lock order: the room's, then that of the streams, then a stream's own or that of the states.
-class StateBoard {
+class StatePublisher {
  public:
   using Clock = std::chrono::steady_clock;
   // A tool whose session is over is shown idle for so many ticks, so that every reader sees it stop.
   static constexpr std::uint64_t kShowIdleTicks = 1200;
 
-  StateBoard();
-  ~StateBoard() { stop(); }
-  StateBoard(const StateBoard&) = delete;
-  StateBoard& operator=(const StateBoard&) = delete;
+  StatePublisher();
+  ~StatePublisher() { stop(); }
+  StatePublisher(const StatePublisher&) = delete;
+  StatePublisher& operator=(const StatePublisher&) = delete;
   void stop();  // tells what was published, then joins the thread
 
   // The sink is offered the newest message at once, and later ones until it leaves or all streams end.
-  void watch(CuttingSink& sink);
-  void leave(CuttingSink& sink);
+  void watch(StateSubscriber& sink);
+  void leave(StateSubscriber& sink);
   void end_streams(const std::string& why);  // those open now and those that come later
   [[nodiscard]] std::size_t streams() const;
 
@@ -72,7 +72,7 @@ class StateBoard {
     std::uint64_t ticks_over = 0;
   };
   struct Stream {
-    CuttingSink* sink;
+    StateSubscriber* sink;
     Pace pace;
     std::uint64_t told = 0;  // the newest message that it was offered
   };

@@ -1,4 +1,4 @@
-#include "viewer_client/scene/inbox.hpp"
+#include "viewer_client/scene/render_queue.hpp"
 
 #include <utility>
 
@@ -9,7 +9,7 @@ namespace {
 constexpr std::size_t kMostArrivals = 1024;
 }  // namespace
 
-void Inbox::begin_stream() {
+void RenderQueue::begin_stream() {
   const std::lock_guard lock(mutex_);
   next_.snapshot_begun = true;
   next_.snapshot_complete = false;
@@ -17,7 +17,7 @@ void Inbox::begin_stream() {
   next_.arrivals.clear();
 }
 
-void Inbox::put_mesh(RoomSeq room_seq, std::vector<ReceivedBlock> blocks, bool snapshot_complete,
+void RenderQueue::put_mesh(RoomSeq room_seq, std::vector<ReceivedBlock> blocks, bool snapshot_complete,
                      std::uint32_t snapshot_blocks, std::int64_t received_mono_ns) {
   {
     const std::lock_guard lock(mutex_);
@@ -36,12 +36,12 @@ void Inbox::put_mesh(RoomSeq room_seq, std::vector<ReceivedBlock> blocks, bool s
   arrived_.notify_one();
 }
 
-void Inbox::put_tool(Tool tool) {
+void RenderQueue::put_tool(Tool tool) {
   const std::lock_guard lock(mutex_);
   next_.tools.push_back(std::move(tool));
 }
 
-void Inbox::put_states(std::vector<CuttingState> states, std::vector<SceneItem> items, std::vector<BodyId> bodies) {
+void RenderQueue::put_states(std::vector<CuttingState> states, std::vector<SceneItem> items, std::vector<BodyId> bodies) {
   {
     const std::lock_guard lock(mutex_);
     next_.states = std::move(states);
@@ -53,13 +53,13 @@ void Inbox::put_states(std::vector<CuttingState> states, std::vector<SceneItem> 
   arrived_.notify_one();
 }
 
-Delivery Inbox::take() {
+Delivery RenderQueue::take() {
   const std::lock_guard lock(mutex_);
   waiting_ = false;
   return std::exchange(next_, Delivery{});
 }
 
-void Inbox::wait_for(std::chrono::milliseconds time) {
+void RenderQueue::wait_for(std::chrono::milliseconds time) {
   std::unique_lock lock(mutex_);
   arrived_.wait_for(lock, time, [this] { return waiting_; });
 }

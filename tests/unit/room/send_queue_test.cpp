@@ -1,4 +1,4 @@
-#include "server/net/outbox.hpp"
+#include "server/net/send_queue.hpp"
 
 #include <gtest/gtest.h>
 
@@ -48,35 +48,35 @@ struct Reader {
   }
 };
 
-TEST(MeshOutbox, ASlowReaderHoldsOneVersionOfEachBlock) {
+TEST(MeshSendQueue, ASlowReaderHoldsOneVersionOfEachBlock) {
   MeshUpdate surface;
   for (int x = 0; x < 10; ++x) surface.blocks[key_at(x)] = block(x, 1);
-  MeshOutbox outbox(surface);
+  MeshSendQueue send_queue(surface);
   for (std::uint64_t seq = 1; seq <= 10'000; ++seq) {
     const int x = static_cast<int>(seq % 10);
-    outbox.add({RoomSeq{seq}, {{key_at(x), block(x, seq + 1)}}});
-    ASSERT_LE(outbox.waiting(), 10u);
+    send_queue.add({RoomSeq{seq}, {{key_at(x), block(x, seq + 1)}}});
+    ASSERT_LE(send_queue.waiting(), 10u);
   }
   Reader reader;
-  while (outbox.waiting() > 0) reader.take(received(outbox.take()));
-  EXPECT_TRUE(outbox.take().empty());
+  while (send_queue.waiting() > 0) reader.take(received(send_queue.take()));
+  EXPECT_TRUE(send_queue.take().empty());
   EXPECT_EQ(reader.room_seq, 10'000u);
   for (int x = 0; x < 10; ++x) EXPECT_EQ(reader.versions[x], 9'991u + static_cast<unsigned>(x == 0 ? 10 : x));
 }
 
 // However many readers stall and however long: of every block, its newest version is all that is held.
-TEST(MeshOutbox, StalledReadersShareOneVersionOfEachBlock) {
+TEST(MeshSendQueue, StalledReadersShareOneVersionOfEachBlock) {
   constexpr int kBlocks = 30, kReaders = 150;
   MeshUpdate surface;
   for (int x = 0; x < kBlocks; ++x) surface.blocks[key_at(x)] = block(x, 1);
-  std::vector<MeshOutbox> stalled(kReaders, MeshOutbox(surface));
-  for (MeshOutbox& outbox : stalled) EXPECT_FALSE(outbox.take().empty()) << "a message in flight, never finished";
+  std::vector<MeshSendQueue> stalled(kReaders, MeshSendQueue(surface));
+  for (MeshSendQueue& send_queue : stalled) EXPECT_FALSE(send_queue.take().empty()) << "a message in flight, never finished";
   std::vector<std::weak_ptr<const std::string>> made;
   for (std::uint64_t seq = 1; seq <= 1000; ++seq) {
     const int x = static_cast<int>(seq * 7 % kBlocks);
     MeshUpdate update{RoomSeq{seq}, {{key_at(x), block(x, seq + 1)}}};
     made.push_back(update.blocks.at(key_at(x)));
-    for (MeshOutbox& outbox : stalled) outbox.add(update);
+    for (MeshSendQueue& send_queue : stalled) send_queue.add(update);
   }
   EXPECT_EQ(std::ranges::count_if(made, [](const auto& version) { return !version.expired(); }), kBlocks);
   for (const auto& version : made) {
@@ -85,15 +85,15 @@ TEST(MeshOutbox, StalledReadersShareOneVersionOfEachBlock) {
   }
 }
 
-TEST(MeshOutbox, MessagesAreBoundedAndTheSnapshotEndsOnce) {
+TEST(MeshSendQueue, MessagesAreBoundedAndTheSnapshotEndsOnce) {
   MeshUpdate surface{RoomSeq{7}, {}};
   for (int x = 0; x < 100; ++x) surface.blocks[key_at(x)] = block(x, 1, 30'000);
-  MeshOutbox outbox(surface);
+  MeshSendQueue send_queue(surface);
   Reader reader;
   int messages = 0;
-  for (MessageParts parts = outbox.take(); !parts.empty(); parts = outbox.take()) {
+  for (MessageParts parts = send_queue.take(); !parts.empty(); parts = send_queue.take()) {
     const auto message = received(parts);
-    EXPECT_LE(message.ByteSizeLong(), MeshOutbox::kMessageBytes + 100);
+    EXPECT_LE(message.ByteSizeLong(), MeshSendQueue::kMessageBytes + 100);
     EXPECT_EQ(message.snapshot_blocks(), 100u);
     reader.take(message);
     ++messages;
@@ -103,24 +103,24 @@ TEST(MeshOutbox, MessagesAreBoundedAndTheSnapshotEndsOnce) {
   EXPECT_EQ(reader.room_seq, 7u);
 }
 
-TEST(MeshOutbox, AnEmptySurfaceIsCompleteAtOnceAndRowsWithoutBlocksAreTold) {
-  MeshOutbox outbox(MeshUpdate{});
-  EXPECT_TRUE(received(outbox.take()).snapshot_complete());
-  EXPECT_TRUE(outbox.take().empty());
-  outbox.add({RoomSeq{3}, {}});  // a rejected cut changes no block, yet who waits for its place must hear of it
-  EXPECT_EQ(received(outbox.take()).room_seq(), 3u);
+TEST(MeshSendQueue, AnEmptySurfaceIsCompleteAtOnceAndRowsWithoutBlocksAreTold) {
+  MeshSendQueue send_queue(MeshUpdate{});
+  EXPECT_TRUE(received(send_queue.take()).snapshot_complete());
+  EXPECT_TRUE(send_queue.take().empty());
+  send_queue.add({RoomSeq{3}, {}});  // a rejected cut changes no block, yet who waits for its place must hear of it
+  EXPECT_EQ(received(send_queue.take()).room_seq(), 3u);
 }
 
-TEST(MeshOutbox, BlocksThatChangeAllTheTimeStarveNoOther) {
+TEST(MeshSendQueue, BlocksThatChangeAllTheTimeStarveNoOther) {
   MeshUpdate surface;
   for (int x = 0; x < 40; ++x) surface.blocks[key_at(x)] = block(x, 1, 30'000);
-  MeshOutbox outbox(surface);
+  MeshSendQueue send_queue(surface);
   Reader reader;
   for (std::uint64_t round = 2; round < 20 && !reader.complete; ++round) {
     MeshUpdate busy{RoomSeq{round}, {}};
     for (int x = 0; x < 10; ++x) busy.blocks[key_at(x)] = block(x, round, 30'000);
-    outbox.add(busy);
-    reader.take(received(outbox.take()));
+    send_queue.add(busy);
+    reader.take(received(send_queue.take()));
   }
   EXPECT_TRUE(reader.complete);
   for (int x = 0; x < 40; ++x) EXPECT_GE(reader.versions[x], 1u);
@@ -128,7 +128,7 @@ TEST(MeshOutbox, BlocksThatChangeAllTheTimeStarveNoOther) {
 
 // Whatever order changes and messages come in: a message that says "contains room_seq N" leaves the reader with every
 // block at least as new as at N.
-TEST(MeshOutbox, ClaimsOnlyWhatTheReaderHolds) {
+TEST(MeshSendQueue, ClaimsOnlyWhatTheReaderHolds) {
   std::mt19937 random(11);
   for (int run = 0; run < 50; ++run) {
     std::map<int, std::uint64_t> now;                             // version by block
@@ -136,7 +136,7 @@ TEST(MeshOutbox, ClaimsOnlyWhatTheReaderHolds) {
     MeshUpdate surface;
     for (int x = 0; x < 30; ++x) surface.blocks[key_at(x)] = block(x, now[x] = 1, 20'000);
     at.push_back(now);
-    MeshOutbox outbox(surface);
+    MeshSendQueue send_queue(surface);
     Reader reader;
     for (std::uint64_t seq = 1; seq < 60; ++seq) {
       MeshUpdate update{RoomSeq{seq}, {}};
@@ -145,9 +145,9 @@ TEST(MeshOutbox, ClaimsOnlyWhatTheReaderHolds) {
         if (!update.blocks.contains(key_at(x))) update.blocks[key_at(x)] = block(x, ++now[x], 20'000);
       }
       at.push_back(now);
-      outbox.add(update);
+      send_queue.add(update);
       for (unsigned n = random() % 3; n > 0; --n) {
-        const MessageParts parts = outbox.take();
+        const MessageParts parts = send_queue.take();
         if (parts.empty()) break;
         reader.take(received(parts));
         if (!reader.complete) continue;
@@ -183,55 +183,55 @@ v1::SessionResponse parsed(const MessageParts& parts) {
   return response;
 }
 
-TEST(SessionOutbox, SendsLeavesThenCompleteThenOnlyTheRowsAfterThem) {
-  SessionOutbox outbox;
-  outbox.begin(RoomSeq{4}, {tool()}, complete(4));
+TEST(SessionSendQueue, SendsLeavesThenCompleteThenOnlyTheRowsAfterThem) {
+  SessionSendQueue send_queue;
+  send_queue.begin(RoomSeq{4}, {tool()}, complete(4));
   std::vector<FieldLeaf> leaves(2);
   for (FieldLeaf& leaf : leaves) leaf.values.assign(kLeafVoxels, 5);
   leaves[1].origin = {8, 0, 0};
   // The publisher may still bring the row that the leaves already contain.
-  EXPECT_TRUE(outbox.add(RoomSeq{4}, row(4)));
-  EXPECT_TRUE(outbox.add(RoomSeq{5}, row(5)));
-  EXPECT_TRUE(outbox.take().empty()) << "nothing before the leaves are known";
-  outbox.set_leaves(leaves);
-  EXPECT_TRUE(parsed(outbox.take()).has_tool()) << "tools go before the leaves";
-  EXPECT_EQ(parsed(outbox.take()).leaf().origin().x(), 0);
-  EXPECT_EQ(parsed(outbox.take()).leaf().origin().x(), 8);
-  EXPECT_EQ(parsed(outbox.take()).complete().room_seq(), 4u);
-  const v1::SessionResponse first = parsed(outbox.take());
+  EXPECT_TRUE(send_queue.add(RoomSeq{4}, row(4)));
+  EXPECT_TRUE(send_queue.add(RoomSeq{5}, row(5)));
+  EXPECT_TRUE(send_queue.take().empty()) << "nothing before the leaves are known";
+  send_queue.set_leaves(leaves);
+  EXPECT_TRUE(parsed(send_queue.take()).has_tool()) << "tools go before the leaves";
+  EXPECT_EQ(parsed(send_queue.take()).leaf().origin().x(), 0);
+  EXPECT_EQ(parsed(send_queue.take()).leaf().origin().x(), 8);
+  EXPECT_EQ(parsed(send_queue.take()).complete().room_seq(), 4u);
+  const v1::SessionResponse first = parsed(send_queue.take());
   EXPECT_EQ(first.committed().room_seq(), 5u);
   EXPECT_EQ(first.index(), 1u) << "the first after the leaves";
-  EXPECT_TRUE(outbox.take().empty());
-  EXPECT_TRUE(outbox.add_answer(row(2))) << "an old outcome told again";
-  const v1::SessionResponse again = parsed(outbox.take());
+  EXPECT_TRUE(send_queue.take().empty());
+  EXPECT_TRUE(send_queue.add_answer(row(2))) << "an old outcome told again";
+  const v1::SessionResponse again = parsed(send_queue.take());
   EXPECT_EQ(again.committed().room_seq(), 2u);
   EXPECT_EQ(again.index(), 0u) << "it has no place in the order of this session";
 }
 
 // What a reader has had by another way is not sent again; its numbers stay.
-TEST(SessionOutbox, LeavesOutWhatHasArrived) {
-  SessionOutbox outbox;
-  outbox.begin(RoomSeq{0}, {}, complete(0));
-  outbox.set_leaves({});
-  (void)outbox.take();
-  for (std::uint64_t seq = 1; seq <= 5; ++seq) EXPECT_TRUE(outbox.add(RoomSeq{seq}, row(seq)));
-  EXPECT_TRUE(outbox.add_answer(row(1)));
-  outbox.arrived(3);
-  EXPECT_EQ(outbox.waiting(), 3u);
-  EXPECT_EQ(outbox.index(), 5u);
-  EXPECT_EQ(parsed(outbox.take()).index(), 4u);
-  EXPECT_EQ(parsed(outbox.take()).index(), 5u);
-  EXPECT_EQ(parsed(outbox.take()).index(), 0u) << "an answer is not a row of the order";
+TEST(SessionSendQueue, LeavesOutWhatHasArrived) {
+  SessionSendQueue send_queue;
+  send_queue.begin(RoomSeq{0}, {}, complete(0));
+  send_queue.set_leaves({});
+  (void)send_queue.take();
+  for (std::uint64_t seq = 1; seq <= 5; ++seq) EXPECT_TRUE(send_queue.add(RoomSeq{seq}, row(seq)));
+  EXPECT_TRUE(send_queue.add_answer(row(1)));
+  send_queue.arrived(3);
+  EXPECT_EQ(send_queue.waiting(), 3u);
+  EXPECT_EQ(send_queue.index(), 5u);
+  EXPECT_EQ(parsed(send_queue.take()).index(), 4u);
+  EXPECT_EQ(parsed(send_queue.take()).index(), 5u);
+  EXPECT_EQ(parsed(send_queue.take()).index(), 0u) << "an answer is not a row of the order";
 }
 
-TEST(SessionOutbox, GivesUpAReaderThatIsTooFarBehind) {
-  SessionOutbox outbox;
-  outbox.begin(RoomSeq{0}, {}, complete(0));
-  outbox.set_leaves({});
+TEST(SessionSendQueue, GivesUpAReaderThatIsTooFarBehind) {
+  SessionSendQueue send_queue;
+  send_queue.begin(RoomSeq{0}, {}, complete(0));
+  send_queue.set_leaves({});
   std::uint64_t seq = 0;
-  while (outbox.add(RoomSeq{seq + 1}, row(seq + 1))) ++seq;
-  EXPECT_EQ(seq, SessionOutbox::kMaxRows);
-  EXPECT_EQ(outbox.waiting(), SessionOutbox::kMaxRows);
+  while (send_queue.add(RoomSeq{seq + 1}, row(seq + 1))) ++seq;
+  EXPECT_EQ(seq, SessionSendQueue::kMaxRows);
+  EXPECT_EQ(send_queue.waiting(), SessionSendQueue::kMaxRows);
 }
 
 }  // namespace

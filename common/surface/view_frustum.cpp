@@ -1,4 +1,4 @@
-#include "common/surface/look.hpp"
+#include "common/surface/view_frustum.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +16,7 @@ constexpr double kSmallStep = 1.0 / 16.0;
 
 Focus focus_on_nothing() { return {Vec3::Zero(), kNowhere_mm, kNowhere_mm}; }
 
-Focus focus_of(const Look& look, double pitch_mm) {
+Focus focus_of(const ViewFrustum& look, double pitch_mm) {
   const double distance_mm = (look.target_mm - look.eye_mm).norm();
   const double pixel_mm = distance_mm * look.pixel_rad;
   const double seen_mm = kMargin * distance_mm * std::tan(look.view_rad);
@@ -28,7 +28,7 @@ Focus focus_of(const Look& look, double pitch_mm) {
 
 Focus focus_of_tool(const Vec3& tip_mm) { return {tip_mm, kToolFull_mm, kToolHalf_mm}; }
 
-bool nearly_equal(const Look& a, const Look& b) {
+bool nearly_equal(const ViewFrustum& a, const ViewFrustum& b) {
   if (a.up.has_value() != b.up.has_value()) return false;
   if (a.up && (*a.up - *b.up).norm() > kSmallStep) return false;  // radians, as long as it is little
   const double small_mm = kSmallStep * (a.target_mm - a.eye_mm).norm();

@@ -13,15 +13,15 @@
 
 #include "common/core/digest.hpp"
 #include "common/runtime/tick_stats.hpp"
-#include "common/surface/look.hpp"
-#include "server/net/lookers.hpp"
-#include "server/net/outbox.hpp"
-#include "server/net/stream_sink.hpp"
+#include "common/surface/view_frustum.hpp"
+#include "server/net/view_interest.hpp"
+#include "server/net/send_queue.hpp"
+#include "server/net/subscriber.hpp"
 #include "server/room/room.hpp"
 
 namespace osteon {
 
-class MeshSink : public StreamSink {
+class MeshSubscriber : public Subscriber {
  public:
   [[nodiscard]] virtual AuthorId author() const { return {}; }
   virtual void begin(MeshUpdate whole_surface) = 0;
@@ -48,7 +48,7 @@ struct MeshHealth {
 };
 
 // Lock order: the room's, then the surface's, then a stream's own. The others are never held with another.
-class MeshRoom {
+class MeshPublisher {
  public:
   using Clock = std::chrono::steady_clock;
   using ToolTips = std::function<std::vector<Vec3>()>;  // where tools are, mm
@@ -56,10 +56,10 @@ class MeshRoom {
   // between two messages to one.
   static constexpr std::size_t kTurnViewers = 16;
 
-  MeshRoom(Room& room, std::shared_mutex& room_mutex, MeshRates rates, Detail detail, ToolTips tool_tips_mm);
-  ~MeshRoom() { stop(); }
-  MeshRoom(const MeshRoom&) = delete;
-  MeshRoom& operator=(const MeshRoom&) = delete;
+  MeshPublisher(Room& room, std::shared_mutex& room_mutex, MeshRates rates, Detail detail, ToolTips tool_tips_mm);
+  ~MeshPublisher() { stop(); }
+  MeshPublisher(const MeshPublisher&) = delete;
+  MeshPublisher& operator=(const MeshPublisher&) = delete;
 
   // Before start(), on all processors: nobody else uses the room. `progress` hears fractions from one thread at a time.
   void make_whole_surface(const std::function<void(double)>& progress);
@@ -73,10 +73,10 @@ class MeshRoom {
   void wake();                              // there are events to tell of
 
   // From where its author looks at first; without a look it is sent the bone in full.
-  void watch(MeshSink& sink, const std::optional<Look>& look);
-  void leave(MeshSink& sink);
+  void watch(MeshSubscriber& sink, const std::optional<ViewFrustum>& look);
+  void leave(MeshSubscriber& sink);
   // The newest of each viewer counts, until its last stream ends. Of one without a stream: nothing.
-  void look(AuthorId viewer, const Look& from);
+  void look(AuthorId viewer, const ViewFrustum& from);
   void end_streams(const std::string& why);  // those open now and those that come later
 
   [[nodiscard]] bool draws_near() const { return near_; }  // what Detail has come to mean here
@@ -85,7 +85,7 @@ class MeshRoom {
 
  private:
   struct Stream {
-    MeshSink* sink;
+    MeshSubscriber* sink;
     Pace pace;
     bool owed = false;  // it was offered something that it was not sent
   };
@@ -105,7 +105,7 @@ class MeshRoom {
   BlockStore store_;
   MeshUpdate surface_;  // every block with a surface, as it travels
   std::optional<std::string> ended_;
-  Lookers lookers_;     // has a lock of its own
+  ViewInterest view_interest_;     // has a lock of its own
   Clock::time_point next_look_{};  // of the mesh thread, as is the next
   bool owed_ = false;              // to some stream
   int turns_ = 1;

@@ -37,11 +37,11 @@ struct MeshUpdate {
 };
 
 // The waiting set of a mesh subscriber: at most one version of every block.
-class MeshOutbox {
+class MeshSendQueue {
  public:
   static constexpr std::size_t kMessageBytes = 256 * 1024;
 
-  explicit MeshOutbox(MeshUpdate snapshot);
+  explicit MeshSendQueue(MeshUpdate snapshot);
   void add(const MeshUpdate& update);
   // The next message, of about kMessageBytes at most. Blocks leave in the order of their keys, round and round, so
   // none starves behind others that change all the time.
@@ -63,7 +63,7 @@ class MeshOutbox {
 // What a session sends: the tools, scene and field as they were on joining, then rows in room_seq order. Nothing of it before
 // the leaves are given, which is when all that it tells of is kept. Rows cannot be skipped, so a reader that falls too far
 // behind is given up instead.
-class SessionOutbox {
+class SessionSendQueue {
  public:
   static constexpr std::size_t kMaxRows = 8192;
 
@@ -106,7 +106,7 @@ class SessionOutbox {
 };
 
 // Newest states of others' tools that go over a session's stream, where datagrams do not get through.
-class PartnerOutbox {
+class PartnerSendQueue {
  public:
   using Clock = std::chrono::steady_clock;
   static constexpr std::size_t kMost = 16;                    // as many as a link tells of
