@@ -12,8 +12,8 @@
 
 #include "common/runtime/progress.hpp"
 #include "server/app/asking.hpp"
-#include "server/intake/case_archive.hpp"
-#include "server/intake/case_check.hpp"
+#include "server/upload_validation/case_archive.hpp"
+#include "server/upload_validation/case_check.hpp"
 
 namespace osteon {
 namespace {

@@ -168,11 +168,11 @@ Result<Room> open_journal(const ServerConfig& options, const Case& bone, std::sh
 // Cases that were uploaded earlier are served as those of the command line are, and read when a room is of them. One that cannot
 // be described is none.
 Result<std::vector<KnownCase>> open_uploads(const std::filesystem::path& folder, RoomsOptions& rooms) {
-  Result<std::unique_ptr<CaseStore>> store = CaseStore::open(folder, "/proc/self/exe");
+  Result<std::unique_ptr<CaseRepository>> store = CaseRepository::open(folder, "/proc/self/exe");
   if (!store) return tl::unexpected(store.error());
   std::vector<KnownCase> known;
   for (const std::filesystem::path& kept : (*store)->folders()) {
-    const Result<StoredCase> stored = CaseStore::peek(kept);
+    const Result<StoredCase> stored = CaseRepository::peek(kept);
     if (!stored) {
       log::error("an uploaded case cannot be read", {{"folder", kept.string()}, {"reason", stored.error().message}});
       continue;

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "common/core/result.hpp"
-#include "server/net/case_shelf.hpp"
+#include "server/net/case_cache.hpp"
 #include "server/net/mesh_publisher.hpp"
 #include "server/net/rooms.hpp"
 #include "server/room/room.hpp"

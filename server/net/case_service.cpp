@@ -170,7 +170,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
   }
 
   Rooms& rooms_;
-  const std::shared_ptr<CaseStore> store_;  // shared with the rooms; outlives what was uploaded here
+  const std::shared_ptr<CaseRepository> store_;  // shared with the rooms; outlives what was uploaded here
   v1::UploadCaseResponse* const response_;  // until it has finished
   v1::UploadCaseRequest request_;
   std::atomic<bool> cancelled_{false};

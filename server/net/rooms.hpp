@@ -19,8 +19,8 @@
 #include "common/core/result.hpp"
 #include "common/tools/tool_box.hpp"
 #include "server/audit/audit_trail.hpp"
-#include "server/intake/case_store.hpp"
-#include "server/net/case_shelf.hpp"
+#include "server/upload_validation/case_repository.hpp"
+#include "server/net/case_cache.hpp"
 #include "server/net/demonstration.hpp"
 #include "server/net/job_thread.hpp"
 #include "server/net/refusals.hpp"
@@ -63,7 +63,7 @@ struct RoomsOptions {
   std::shared_ptr<const SigningKeys> keys = nullptr;  // sign the journals; null: nobody does
   int retention_days = 0;             // after which it is forgotten who somebody was; 0: never
   std::shared_ptr<AuditTrail> trail = nullptr;  // shared with the server's calls; null: nothing is taken down
-  std::shared_ptr<CaseStore> store{};  // where uploaded cases are kept, shared with uploads under way; null: none are taken
+  std::shared_ptr<CaseRepository> store{};  // where uploaded cases are kept, shared with uploads under way; null: none are taken
   std::uint64_t case_memory_bytes = kMostCaseMemory;  // of all cases that rooms have
   int most_rooms = kMostRooms;        // open and closed ones together; none is made beyond
   // Of those that one person made: rooms, branches and playbacks together, and backups in the folder.
@@ -140,7 +140,7 @@ class Rooms {
   void add_case(KnownCase known) { cases_.add(std::move(known)); }
   [[nodiscard]] std::uint64_t case_bytes() const { return cases_.loaded_bytes(); }  // that cases take in memory
   [[nodiscard]] const std::shared_ptr<AuditTrail>& trail() const { return options_.trail; }
-  [[nodiscard]] const std::shared_ptr<CaseStore>& store() const { return options_.store; }
+  [[nodiscard]] const std::shared_ptr<CaseRepository>& store() const { return options_.store; }
   [[nodiscard]] std::vector<RoomListing> list() const;
 
   // A room that was made elsewhere, with its store. `save`: see OpenRoom. `progress` hears how far its first surface is.
@@ -186,7 +186,7 @@ class Rooms {
   JobThread jobs;        // whatever changes the rooms: one at a time, and opening one may take minutes
   JobThread files;       // what everybody asks for who comes: the lists of rooms and of cases, a case's files piece by piece
   JobThread recordings;  // journals that are read for demonstrations; that of a closed room waits until no room is being changed
-  JobThread checks;      // uploaded cases, each looked through by a process, for as long as IntakeQuota lets it
+  JobThread checks;      // uploaded cases, each looked through by a process, for as long as UploadQuota lets it
   void end_calls();      // after those that wait; later ones run where they are made
   RefusalCounts refusals;  // of all doors
   Authorizer* authorizer = nullptr;    // before every call; null: plain text, and everybody may do anything. It outlives the rooms' calls
@@ -209,7 +209,7 @@ class Rooms {
   [[nodiscard]] MaintenanceCalls until_the_end() const;
 
   const RoomsOptions options_;
-  CaseShelf cases_;
+  CaseCache cases_;
   mutable std::mutex changing_;  // held by whatever changes the rooms; taken before mutex_, never within it
   mutable std::mutex mutex_;
   std::map<std::string, std::shared_ptr<OpenRoom>> open_;

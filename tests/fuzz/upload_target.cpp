@@ -5,14 +5,14 @@
 #include <utility>
 
 #include "common/core/check.hpp"
-#include "server/intake/case_archive.hpp"
+#include "server/upload_validation/case_archive.hpp"
 #include "tests/fuzz/archive_bytes.hpp"
 
 namespace osteon::fuzz {
 namespace {
 
 // Small, so that an input of a few hundred bytes can go beyond each.
-constexpr IntakeQuota kQuota{.unpacked_bytes = 1 << 16, .entries = 4, .ratio = 50, .ratio_free_bytes = 1 << 10};
+constexpr UploadQuota kQuota{.unpacked_bytes = 1 << 16, .entries = 4, .ratio = 50, .ratio_free_bytes = 1 << 10};
 
 void unpack(std::span<const std::uint8_t> data) {
   std::map<std::string, std::uint64_t, std::less<>> put;

@@ -3,7 +3,7 @@
 
 #include <fstream>
 
-#include "server/intake/case_archive.hpp"
+#include "server/upload_validation/case_archive.hpp"
 #include "tests/integration/stage.hpp"
 
 namespace osteon::test {

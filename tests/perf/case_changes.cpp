@@ -11,7 +11,7 @@
 #include <sstream>
 
 #include "common/volume/case.hpp"
-#include "server/intake/case_check.hpp"
+#include "server/upload_validation/case_check.hpp"
 #include "tests/support/changed_bytes.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/scenes/bones.hpp"

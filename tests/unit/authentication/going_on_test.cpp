@@ -34,10 +34,10 @@ std::string content(const fs::path& file) {
 
 class GoingOn : public ::testing::Test {
  protected:
-  void start(ConnectionOptions doors = {}, IntakeQuota quota = {}, const fs::path& checker = "/bin/false") {
+  void start(ConnectionOptions doors = {}, UploadQuota quota = {}, const fs::path& checker = "/bin/false") {
     const Case bone = test::test_block();
     ASSERT_TRUE(bone.save(dir_ / "case"));
-    auto store = CaseStore::open(dir_ / "cases", checker, quota);
+    auto store = CaseRepository::open(dir_ / "cases", checker, quota);
     ASSERT_TRUE(store.has_value()) << store.error().message;
     store_ = std::move(*store);
     RoomsOptions options{.cases = {{bone, dir_ / "case"}}, .folder = dir_ / "rooms", .store = store_};
@@ -76,7 +76,7 @@ class GoingOn : public ::testing::Test {
 
   test::TempDir dir_;
   test::People people_;
-  std::shared_ptr<CaseStore> store_;
+  std::shared_ptr<CaseRepository> store_;
   std::unique_ptr<RoomServer> server_;
 };
 

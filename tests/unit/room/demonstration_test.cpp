@@ -11,7 +11,7 @@
 #include "osteon/v1/cases.grpc.pb.h"
 #include "osteon/v1/people.grpc.pb.h"
 #include "osteon/v1/rooms.grpc.pb.h"
-#include "server/intake/case_archive.hpp"
+#include "server/upload_validation/case_archive.hpp"
 #include "server/net/authorizer.hpp"
 #include "server/net/room_server.hpp"
 #include "tests/support/temp_dir.hpp"
@@ -99,7 +99,7 @@ class DemonstrationTest : public ::testing::Test {
     // A program that takes long to look a case through, and says when it begins.
     std::ofstream(dir_ / "checker") << "#!/bin/sh\n: > '" << (dir_ / "checks").string() << "'\nexec sleep 60\n";
     fs::permissions(dir_ / "checker", fs::perms::owner_all);
-    auto store = CaseStore::open(dir_ / "cases", dir_ / "checker", {});
+    auto store = CaseRepository::open(dir_ / "cases", dir_ / "checker", {});
     ASSERT_TRUE(store.has_value()) << store.error().message;
     RoomsOptions options{.cases = {{test_block(), dir_ / "case"}}, .folder = dir_ / "rooms", .store = std::move(*store)};
     options.rates.mount = true;

@@ -1,48 +1,48 @@
-#include "server/net/case_shelf.hpp"
+#include "server/net/case_cache.hpp"
 
 #include <system_error>
 #include <utility>
 
 namespace osteon {
 
-void CaseShelf::keep(ServedCase served) {
+void CaseCache::keep(ServedCase served) {
   const auto bone = std::make_shared<const Case>(std::move(served.bone));  // shared with its rooms
   const std::lock_guard lock(mutex_);
   entries_[bone->hash()] = {{bone->hash(), bone->info().title, std::move(served.folder), bone->memory_bytes()}, bone, bone};
 }
 
-void CaseShelf::add(KnownCase known) {
+void CaseCache::add(KnownCase known) {
   const std::lock_guard lock(mutex_);
   const Digest hash = known.hash;
   entries_.try_emplace(hash, Entry{std::move(known), nullptr, {}});
 }
 
-std::optional<KnownCase> CaseShelf::find(const Digest& hash) const {
+std::optional<KnownCase> CaseCache::find(const Digest& hash) const {
   const std::lock_guard lock(mutex_);
   const auto found = entries_.find(hash);
   return found == entries_.end() ? std::nullopt : std::optional(found->second.known);
 }
 
-std::vector<KnownCase> CaseShelf::all() const {
+std::vector<KnownCase> CaseCache::all() const {
   const std::lock_guard lock(mutex_);
   std::vector<KnownCase> all;
   for (const auto& [hash, entry] : entries_) all.push_back(entry.known);
   return all;
 }
 
-std::uint64_t CaseShelf::loaded_bytes() const {
+std::uint64_t CaseCache::loaded_bytes() const {
   const std::lock_guard lock(mutex_);
   return loaded_locked();
 }
 
-std::uint64_t CaseShelf::loaded_locked() const {
+std::uint64_t CaseCache::loaded_locked() const {
   std::uint64_t bytes = 0;
   for (const auto& [hash, entry] : entries_)
     if (!entry.loaded.expired()) bytes += entry.known.memory_bytes;
   return bytes;
 }
 
-Result<void> CaseShelf::check_space(const KnownCase& known, std::uint64_t bytes) const {
+Result<void> CaseCache::check_space(const KnownCase& known, std::uint64_t bytes) const {
   const std::uint64_t loaded = loaded_locked();
   if (bytes <= most_bytes_ && loaded <= most_bytes_ - bytes) return {};
   const auto mib = [](std::uint64_t n) { return std::to_string((n + (1 << 20) - 1) >> 20); };
@@ -52,7 +52,7 @@ Result<void> CaseShelf::check_space(const KnownCase& known, std::uint64_t bytes)
                      "start the server with a larger --case-memory-mib");
 }
 
-Result<LoadedCase> CaseShelf::load(const Digest& hash) {
+Result<LoadedCase> CaseCache::load(const Digest& hash) {
   const std::lock_guard loading(loading_);
   KnownCase known;
   {

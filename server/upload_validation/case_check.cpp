@@ -1,4 +1,4 @@
-#include "server/intake/case_check.hpp"
+#include "server/upload_validation/case_check.hpp"
 
 #include <fcntl.h>
 #include <poll.h>
@@ -26,7 +26,7 @@
 #include "common/core/bounded_text.hpp"
 #include "common/runtime/log.hpp"
 #include "common/volume/case.hpp"
-#include "server/intake/confine.hpp"
+#include "server/upload_validation/confine.hpp"
 
 extern char** environ;
 
@@ -118,13 +118,13 @@ void limit_self(__rlimit_resource resource, std::uint64_t most) {
 }
 
 // What the process may unpack, in one of its arguments.
-std::string text_of(const IntakeQuota& quota) {
+std::string text_of(const UploadQuota& quota) {
   return nlohmann::json{{"archive_bytes", quota.archive_bytes}, {"unpacked_bytes", quota.unpacked_bytes}, {"entries", quota.entries},
                         {"ratio", quota.ratio}, {"ratio_free_bytes", quota.ratio_free_bytes}}.dump();
 }
-IntakeQuota quota_of(const std::string& text) {
+UploadQuota quota_of(const std::string& text) {
   const nlohmann::json said = nlohmann::json::parse(text);
-  IntakeQuota quota;
+  UploadQuota quota;
   said.at("archive_bytes").get_to(quota.archive_bytes);
   said.at("unpacked_bytes").get_to(quota.unpacked_bytes);
   said.at("entries").get_to(quota.entries);
@@ -192,7 +192,7 @@ class Files {
 };
 
 // [the process]
-Result<Case> unpack_and_read(const fs::path& archive, const fs::path& sent, const IntakeQuota& quota) {
+Result<Case> unpack_and_read(const fs::path& archive, const fs::path& sent, const UploadQuota& quota) {
   std::error_code error;
   fs::create_directory(sent, error);
   if (error) return failure(ErrorCode::internal, "the server cannot unpack a case: " + error.message());
@@ -207,7 +207,7 @@ Result<Case> unpack_and_read(const fs::path& archive, const fs::path& sent, cons
 
 }  // namespace
 
-Result<CheckedCase> check_case(const fs::path& program, const fs::path& archive, const fs::path& folder, const IntakeQuota& quota,
+Result<CheckedCase> check_case(const fs::path& program, const fs::path& archive, const fs::path& folder, const UploadQuota& quota,
                                const std::function<bool()>& stop) {
   int ends[2];
   if (::pipe2(ends, O_CLOEXEC) != 0) return cannot_start(errno);

@@ -15,7 +15,7 @@
 
 namespace osteon {
 
-struct IntakeQuota {
+struct UploadQuota {
   std::uint64_t archive_bytes = std::uint64_t{2} << 30;
   std::uint64_t unpacked_bytes = std::uint64_t{8} << 30;
   std::uint64_t kept_bytes = std::uint64_t{64} << 30;  // of all cases in the folder; what is under way comes on top
@@ -40,10 +40,10 @@ using PutPiece = std::function<Result<void>(std::string_view file, std::span<con
 // Files and their sizes. Errors: invalid_input (no zip archive, damaged, encrypted, an entry that is no plain file of a case, is
 // named by a path beyond one folder or comes twice, a file that is missing), exhausted (beyond a quota), and those of `put`.
 // Each names the archive as `name`, the entry and the remedy.
-[[nodiscard]] Result<std::map<std::string, std::uint64_t>> unpack_case(const std::filesystem::path& archive, const IntakeQuota& quota,
+[[nodiscard]] Result<std::map<std::string, std::uint64_t>> unpack_case(const std::filesystem::path& archive, const UploadQuota& quota,
                                                                        const PutPiece& put);
 [[nodiscard]] Result<std::map<std::string, std::uint64_t>> unpack_case(std::span<const std::byte> archive, const std::string& name,
-                                                                       const IntakeQuota& quota, const PutPiece& put);
+                                                                       const UploadQuota& quota, const PutPiece& put);
 
 // Writes a case's folder as an archive. Errors: not_found (no case there), internal (disk).
 [[nodiscard]] Result<void> pack_case(const std::filesystem::path& folder, const std::filesystem::path& archive);

@@ -11,7 +11,7 @@
 
 #include "common/core/digest.hpp"
 #include "common/core/result.hpp"
-#include "server/intake/case_archive.hpp"
+#include "server/upload_validation/case_archive.hpp"
 
 namespace osteon {
 
@@ -35,10 +35,10 @@ class Upload {
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
 
  private:
-  friend class CaseStore;
-  Upload(std::filesystem::path folder, const IntakeQuota& quota, std::atomic<int>& open);
+  friend class CaseRepository;
+  Upload(std::filesystem::path folder, const UploadQuota& quota, std::atomic<int>& open);
   std::filesystem::path folder_;
-  const IntakeQuota quota_;
+  const UploadQuota quota_;
   std::atomic<int>& open_;
   std::uint64_t bytes_ = 0;
   struct File;
@@ -46,14 +46,14 @@ class Upload {
 };
 
 // Any thread.
-class CaseStore {
+class CaseRepository {
  public:
   static constexpr int kMostUploads = 4;  // at once
 
   // `program`: what check_case() starts. What was left half done by an earlier process goes. Error internal: the folder
   // cannot be made or written.
-  [[nodiscard]] static Result<std::unique_ptr<CaseStore>> open(std::filesystem::path folder, std::filesystem::path program,
-                                                               IntakeQuota quota = {});
+  [[nodiscard]] static Result<std::unique_ptr<CaseRepository>> open(std::filesystem::path folder, std::filesystem::path program,
+                                                               UploadQuota quota = {});
 
   // Error exhausted: so many are under way already, or the store is full.
   [[nodiscard]] Result<std::unique_ptr<Upload>> begin();
@@ -64,15 +64,15 @@ class CaseStore {
   [[nodiscard]] std::vector<std::filesystem::path> folders() const;
   // What is kept in one of them, without reading its bone. Error invalid_input: its description cannot be read.
   [[nodiscard]] static Result<StoredCase> peek(const std::filesystem::path& folder);
-  [[nodiscard]] const IntakeQuota& quota() const { return quota_; }
+  [[nodiscard]] const UploadQuota& quota() const { return quota_; }
 
  private:
-  CaseStore(std::filesystem::path folder, std::filesystem::path program, IntakeQuota quota)
+  CaseRepository(std::filesystem::path folder, std::filesystem::path program, UploadQuota quota)
       : folder_(std::move(folder)), program_(std::move(program)), quota_(quota) {}
   [[nodiscard]] std::uint64_t case_bytes() const;  // of those that are kept
 
   const std::filesystem::path folder_, program_;
-  const IntakeQuota quota_;
+  const UploadQuota quota_;
   std::mutex keeping_;  // one is moved to its place at a time
   std::atomic<int> open_{0};
   std::atomic<std::uint64_t> next_{0};

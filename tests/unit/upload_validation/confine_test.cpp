@@ -1,5 +1,5 @@
 // What a process that has confined itself can still do. Each attempt is one of a child's own, made by the system's own calls.
-#include "server/intake/confine.hpp"
+#include "server/upload_validation/confine.hpp"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@
 #include <string>
 #include <thread>
 
-#include "server/intake/case_archive.hpp"
+#include "server/upload_validation/case_archive.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/scenes/bones.hpp"
 #include "tests/support/temp_dir.hpp"

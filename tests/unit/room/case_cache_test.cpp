@@ -1,5 +1,5 @@
 // Cases that are in memory only as long as a room has them, and together within a limit.
-#include "server/net/case_shelf.hpp"
+#include "server/net/case_cache.hpp"
 
 #include <gtest/gtest.h>
 
@@ -26,61 +26,61 @@ class CaseShelfTest : public ::testing::Test {
 };
 
 TEST_F(CaseShelfTest, ACaseIsInMemoryAsLongAsSomebodyHasIt) {
-  CaseShelf shelf(kMostCaseMemory);
-  shelf.keep({given_, dir_ / "given"});
-  shelf.add(known(first_));
-  EXPECT_EQ(shelf.all().size(), 2u);
-  EXPECT_EQ(shelf.find(first_.hash())->title, first_.info().title);
-  EXPECT_FALSE(shelf.find(second_.hash()));
-  EXPECT_EQ(shelf.load(second_.hash()).error().code, ErrorCode::not_found);
-  EXPECT_EQ(shelf.loaded_bytes(), given_.memory_bytes()) << "the one that is kept";
+  CaseCache case_cache(kMostCaseMemory);
+  case_cache.keep({given_, dir_ / "given"});
+  case_cache.add(known(first_));
+  EXPECT_EQ(case_cache.all().size(), 2u);
+  EXPECT_EQ(case_cache.find(first_.hash())->title, first_.info().title);
+  EXPECT_FALSE(case_cache.find(second_.hash()));
+  EXPECT_EQ(case_cache.load(second_.hash()).error().code, ErrorCode::not_found);
+  EXPECT_EQ(case_cache.loaded_bytes(), given_.memory_bytes()) << "the one that is kept";
 
-  auto one = shelf.load(first_.hash()), another = shelf.load(first_.hash());
+  auto one = case_cache.load(first_.hash()), another = case_cache.load(first_.hash());
   ASSERT_TRUE(one.has_value()) << one.error().message;
   EXPECT_EQ(one->bone->hash(), first_.hash());
   EXPECT_EQ(one->bone, another->bone) << "read once";
-  EXPECT_EQ(shelf.loaded_bytes(), given_.memory_bytes() + first_.memory_bytes());
+  EXPECT_EQ(case_cache.loaded_bytes(), given_.memory_bytes() + first_.memory_bytes());
   const std::weak_ptr<const Case> read = one->bone;
   one->bone.reset();
   EXPECT_FALSE(read.expired());
   another->bone.reset();
   EXPECT_TRUE(read.expired());
-  EXPECT_EQ(shelf.loaded_bytes(), given_.memory_bytes());
-  EXPECT_TRUE(shelf.load(first_.hash()));
+  EXPECT_EQ(case_cache.loaded_bytes(), given_.memory_bytes());
+  EXPECT_TRUE(case_cache.load(first_.hash()));
 }
 
 TEST_F(CaseShelfTest, WhatWouldGoBeyondTheLimitIsRefusedUntilThereIsSpace) {
   // Whether its size was noted when it was uploaded or shows when it is read.
   for (const bool with_size : {true, false}) {
-    CaseShelf shelf(second_.memory_bytes() + first_.memory_bytes() - 1);
-    shelf.add(known(first_, with_size));
-    shelf.add(known(second_, with_size));
-    auto held = shelf.load(first_.hash());
+    CaseCache case_cache(second_.memory_bytes() + first_.memory_bytes() - 1);
+    case_cache.add(known(first_, with_size));
+    case_cache.add(known(second_, with_size));
+    auto held = case_cache.load(first_.hash());
     ASSERT_TRUE(held.has_value()) << held.error().message;
-    const auto refused = shelf.load(second_.hash());
+    const auto refused = case_cache.load(second_.hash());
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, ErrorCode::exhausted);
     EXPECT_NE(refused.error().message.find("--case-memory-mib"), std::string::npos) << refused.error().message;
-    EXPECT_EQ(shelf.loaded_bytes(), first_.memory_bytes());
+    EXPECT_EQ(case_cache.loaded_bytes(), first_.memory_bytes());
     held->bone.reset();
-    EXPECT_TRUE(shelf.load(second_.hash()));
+    EXPECT_TRUE(case_cache.load(second_.hash()));
   }
 }
 
 // One whose size is known to be too large is refused before a byte of it is read.
 TEST_F(CaseShelfTest, WhatIsTooLargeIsNotRead) {
-  CaseShelf shelf(first_.memory_bytes() - 1);
-  shelf.add(known(first_));
+  CaseCache case_cache(first_.memory_bytes() - 1);
+  case_cache.add(known(first_));
   fs::remove(dir_ / to_hex(first_.hash()) / "bone.vdb");
-  EXPECT_EQ(shelf.load(first_.hash()).error().code, ErrorCode::exhausted);
+  EXPECT_EQ(case_cache.load(first_.hash()).error().code, ErrorCode::exhausted);
 }
 
 TEST_F(CaseShelfTest, AFolderThatHoldsAnotherCaseIsRefused) {
-  CaseShelf shelf(kMostCaseMemory);
+  CaseCache case_cache(kMostCaseMemory);
   KnownCase wrong = known(first_);
   wrong.folder = dir_ / to_hex(second_.hash());
-  shelf.add(wrong);
-  EXPECT_EQ(shelf.load(first_.hash()).error().code, ErrorCode::invalid_input);
+  case_cache.add(wrong);
+  EXPECT_EQ(case_cache.load(first_.hash()).error().code, ErrorCode::invalid_input);
 }
 
 TEST_F(CaseShelfTest, RoomsHaveTheirCasesInMemoryAndNoOthers) {

@@ -1,4 +1,4 @@
-#include "server/intake/case_archive.hpp"
+#include "server/upload_validation/case_archive.hpp"
 
 #include <archive.h>
 #include <archive_entry.h>
@@ -42,7 +42,7 @@ std::string reason_of(archive* a) {
 // Takes an open archive apart, counting as it goes.
 class Unpacker {
  public:
-  Unpacker(archive* a, std::string name, std::uint64_t packed_bytes, const IntakeQuota& quota, const PutPiece& put)
+  Unpacker(archive* a, std::string name, std::uint64_t packed_bytes, const UploadQuota& quota, const PutPiece& put)
       : archive_(a), name_(std::move(name)), packed_bytes_(packed_bytes), quota_(quota), put_(put) {}
 
   Result<std::map<std::string, std::uint64_t>> run() {
@@ -115,7 +115,7 @@ class Unpacker {
   archive* const archive_;
   const std::string name_;
   const std::uint64_t packed_bytes_;
-  const IntakeQuota& quota_;
+  const UploadQuota& quota_;
   const PutPiece& put_;
   std::optional<std::string> folder_;
   std::map<std::string, std::uint64_t> files_;
@@ -124,7 +124,7 @@ class Unpacker {
 
 }  // namespace
 
-Result<std::map<std::string, std::uint64_t>> unpack_case(const fs::path& file, const IntakeQuota& quota, const PutPiece& put) {
+Result<std::map<std::string, std::uint64_t>> unpack_case(const fs::path& file, const UploadQuota& quota, const PutPiece& put) {
   std::error_code error;
   const std::uint64_t bytes = fs::file_size(file, error);
   if (error) return failure(ErrorCode::not_found, file.string() + " cannot be read: " + error.message());
@@ -138,7 +138,7 @@ Result<std::map<std::string, std::uint64_t>> unpack_case(const fs::path& file, c
 }
 
 Result<std::map<std::string, std::uint64_t>> unpack_case(std::span<const std::byte> bytes, const std::string& name,
-                                                         const IntakeQuota& quota, const PutPiece& put) {
+                                                         const UploadQuota& quota, const PutPiece& put) {
   const Reader a = zip_reader();
   if (archive_read_open_memory(a.get(), bytes.data(), bytes.size()) != ARCHIVE_OK)
     return failure(ErrorCode::invalid_input, name + " is no zip archive (" + reason_of(a.get()) + "); pack the case as one");

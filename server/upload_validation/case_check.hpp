@@ -10,7 +10,7 @@
 
 #include "common/core/digest.hpp"
 #include "common/core/result.hpp"
-#include "server/intake/case_archive.hpp"
+#include "server/upload_validation/case_archive.hpp"
 
 namespace osteon {
 
@@ -28,7 +28,7 @@ inline constexpr std::string_view kSoundCase = "sound";
 // Errors: what is wrong with the archive or the case in its words; invalid_input (it died, as over a damaged file), exhausted
 // (memory, time or disk beyond the quota), internal (disk; cannot be started), cancelled (`stop` returned true).
 [[nodiscard]] Result<CheckedCase> check_case(const std::filesystem::path& program, const std::filesystem::path& archive,
-                                             const std::filesystem::path& folder, const IntakeQuota& quota,
+                                             const std::filesystem::path& folder, const UploadQuota& quota,
                                              const std::function<bool()>& stop = {});
 
 // [main of that program, before other threads] Gives up what it does not need, does that, prints one line for the process that

@@ -38,10 +38,10 @@ struct LoadedCase {
 };
 
 // Any thread.
-class CaseShelf {
+class CaseCache {
  public:
   // `most_bytes`: of all that are in memory at once.
-  explicit CaseShelf(std::uint64_t most_bytes) : most_bytes_(most_bytes) {}
+  explicit CaseCache(std::uint64_t most_bytes) : most_bytes_(most_bytes) {}
 
   void keep(ServedCase served);  // in memory as long as this is
   void add(KnownCase known);     // one of a hash that is known stays as it is

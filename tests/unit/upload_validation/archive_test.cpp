@@ -1,4 +1,4 @@
-#include "server/intake/case_archive.hpp"
+#include "server/upload_validation/case_archive.hpp"
 
 #include <archive.h>
 #include <archive_entry.h>
@@ -56,7 +56,7 @@ struct Unpacked {
   std::size_t pieces_bytes = 0;
 };
 
-Result<Unpacked> unpack(const Bytes& bytes, const IntakeQuota& quota = {}) {
+Result<Unpacked> unpack(const Bytes& bytes, const UploadQuota& quota = {}) {
   Unpacked out;
   const auto done = unpack_case(bytes, "a.zip", quota, [&](std::string_view file, std::span<const std::byte> piece) {
     out.files[std::string(file)].append(reinterpret_cast<const char*>(piece.data()), piece.size());
@@ -136,7 +136,7 @@ TEST(CaseArchive, BombsStopAtTheQuota) {
   EXPECT_TRUE(unpack(bomb, {.ratio = 1e6}));
 
   std::size_t put = 0;
-  const IntakeQuota small{.unpacked_bytes = 1 << 20, .ratio = 1e6};
+  const UploadQuota small{.unpacked_bytes = 1 << 20, .ratio = 1e6};
   const auto bytes = unpack_case(bomb, "a.zip", small, [&](std::string_view, std::span<const std::byte> piece) {
     put += piece.size();
     return Result<void>{};

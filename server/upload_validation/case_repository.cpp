@@ -1,4 +1,4 @@
-#include "server/intake/case_store.hpp"
+#include "server/upload_validation/case_repository.hpp"
 
 #include <unistd.h>
 
@@ -8,7 +8,7 @@
 #include <system_error>
 #include <utility>
 
-#include "server/intake/case_check.hpp"
+#include "server/upload_validation/case_check.hpp"
 
 namespace osteon {
 namespace {
@@ -37,7 +37,7 @@ struct Upload::File {
   std::ofstream out;
 };
 
-Upload::Upload(fs::path folder, const IntakeQuota& quota, std::atomic<int>& open)
+Upload::Upload(fs::path folder, const UploadQuota& quota, std::atomic<int>& open)
     : folder_(std::move(folder)), quota_(quota), open_(open), file_(std::make_unique<File>()) {
   file_->out.open(folder_ / kArchive, std::ios::binary | std::ios::trunc);
 }
@@ -58,7 +58,7 @@ Result<void> Upload::add(std::string_view piece) {
   return file_->out ? Result<void>{} : Result<void>(disk(folder_ / kArchive, "the disk takes no more"));
 }
 
-Result<std::unique_ptr<CaseStore>> CaseStore::open(fs::path folder, fs::path program, IntakeQuota quota) {
+Result<std::unique_ptr<CaseRepository>> CaseRepository::open(fs::path folder, fs::path program, UploadQuota quota) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (!error && ::access(folder.c_str(), W_OK) != 0) error = std::error_code(errno, std::generic_category());
@@ -67,16 +67,16 @@ Result<std::unique_ptr<CaseStore>> CaseStore::open(fs::path folder, fs::path pro
   for (const auto& entry : fs::directory_iterator(folder, error))
     if (entry.path().filename().string().starts_with(kIncoming)) left.push_back(entry.path());
   for (const fs::path& one : left) fs::remove_all(one, error);
-  return std::unique_ptr<CaseStore>(new CaseStore(fs::absolute(folder), std::move(program), quota));
+  return std::unique_ptr<CaseRepository>(new CaseRepository(fs::absolute(folder), std::move(program), quota));
 }
 
-std::uint64_t CaseStore::case_bytes() const {
+std::uint64_t CaseRepository::case_bytes() const {
   std::uint64_t bytes = 0;
   for (const fs::path& one : folders()) bytes += bytes_in(one);
   return bytes;
 }
 
-Result<std::unique_ptr<Upload>> CaseStore::begin() {
+Result<std::unique_ptr<Upload>> CaseRepository::begin() {
   if (++open_ > kMostUploads) {
     --open_;
     return failure(ErrorCode::exhausted, std::to_string(kMostUploads) + " uploads are under way; try again later");
@@ -96,7 +96,7 @@ Result<std::unique_ptr<Upload>> CaseStore::begin() {
   return std::unique_ptr<Upload>(new Upload(place, quota_, open_));
 }
 
-Result<StoredCase> CaseStore::keep(std::unique_ptr<Upload> upload, const std::function<bool()>& stop) {
+Result<StoredCase> CaseRepository::keep(std::unique_ptr<Upload> upload, const std::function<bool()>& stop) {
   upload->file_->out.close();
   if (!upload->file_->out) return disk(upload->folder(), "the disk takes no more");
   const fs::path sound = upload->folder() / kSoundCase;
@@ -121,7 +121,7 @@ Result<StoredCase> CaseStore::keep(std::unique_ptr<Upload> upload, const std::fu
   return stored;
 }
 
-std::vector<fs::path> CaseStore::folders() const {
+std::vector<fs::path> CaseRepository::folders() const {
   std::vector<fs::path> found;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder_, error))
@@ -130,7 +130,7 @@ std::vector<fs::path> CaseStore::folders() const {
   return found;
 }
 
-Result<StoredCase> CaseStore::peek(const fs::path& folder) {
+Result<StoredCase> CaseRepository::peek(const fs::path& folder) {
   const Result<Digest> hash = digest_from_hex(folder.filename().string());
   if (!hash) return failure(ErrorCode::invalid_input, folder.string() + " is not called by the hash of a case");
   std::error_code none;

@@ -1,4 +1,4 @@
-#include "server/intake/confine.hpp"
+#include "server/upload_validation/confine.hpp"
 
 #include <fcntl.h>
 #include <linux/audit.h>

@@ -1,5 +1,5 @@
 // The process that looks a case through stays within its memory, and so does every program that opens a case.
-#include "server/intake/case_check.hpp"
+#include "server/upload_validation/case_check.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -40,7 +40,7 @@ class CheckTest : public ::testing::Test {
   }
   void put(const std::string& vdb) const { std::ofstream(temp_ / "case" / "bone.vdb", std::ios::binary) << vdb; }
   Result<CheckedCase> checked(const fs::path& reader = test::program("osteon-server"),
-                              const IntakeQuota& quota = {}) const {
+                              const UploadQuota& quota = {}) const {
     fs::remove_all(temp_ / "place");
     fs::create_directory(temp_ / "place");
     EXPECT_TRUE(pack_case(temp_ / "case", temp_ / "place" / "case.zip"));

@@ -1,4 +1,4 @@
-#include "server/intake/case_store.hpp"
+#include "server/upload_validation/case_repository.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "common/volume/case.hpp"
-#include "server/intake/case_check.hpp"
+#include "server/upload_validation/case_check.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/scenes/bones.hpp"
 #include "tests/support/temp_dir.hpp"
@@ -29,12 +29,12 @@ class StoreTest : public ::testing::Test {
     EXPECT_TRUE(pack_case(temp_ / "case", temp_ / "case.zip"));
     store_ = make_store({});
   }
-  std::unique_ptr<CaseStore> make_store(const IntakeQuota& quota, const fs::path& program = test::program("osteon-server")) {
-    auto store = CaseStore::open(temp_ / "cases", program, quota);
+  std::unique_ptr<CaseRepository> make_store(const UploadQuota& quota, const fs::path& program = test::program("osteon-server")) {
+    auto store = CaseRepository::open(temp_ / "cases", program, quota);
     EXPECT_TRUE(store) << store.error().message;
     return std::move(*store);
   }
-  static Result<StoredCase> keep(CaseStore& store, const std::string& archive) {
+  static Result<StoredCase> keep(CaseRepository& store, const std::string& archive) {
     auto upload = store.begin();
     if (!upload) return tl::unexpected(upload.error());
     if (Result<void> added = (*upload)->add(archive); !added) return tl::unexpected(added.error());
@@ -48,7 +48,7 @@ class StoreTest : public ::testing::Test {
 
   test::TempDir temp_;
   Case bone_;
-  std::unique_ptr<CaseStore> store_;
+  std::unique_ptr<CaseRepository> store_;
 };
 
 TEST_F(StoreTest, ACaseIsKeptUnderItsHashAndIsTheSameCase) {
@@ -62,7 +62,7 @@ TEST_F(StoreTest, ACaseIsKeptUnderItsHashAndIsTheSameCase) {
   EXPECT_EQ(again->hash(), bone_.hash());
   // What it takes in memory is known before it is read again.
   EXPECT_EQ(stored->memory_bytes, bone_.memory_bytes());
-  const auto peeked = CaseStore::peek(stored->folder);
+  const auto peeked = CaseRepository::peek(stored->folder);
   ASSERT_TRUE(peeked) << peeked.error().message;
   EXPECT_EQ(peeked->hash, bone_.hash());
   EXPECT_EQ(peeked->title, bone_.info().title);
@@ -120,7 +120,7 @@ TEST_F(StoreTest, QuotasHold) {
   EXPECT_EQ(no_more.error().code, ErrorCode::exhausted);
 
   std::vector<std::unique_ptr<Upload>> open;
-  for (int i = 0; i < CaseStore::kMostUploads; ++i) {
+  for (int i = 0; i < CaseRepository::kMostUploads; ++i) {
     auto one = store_->begin();
     ASSERT_TRUE(one);
     open.push_back(std::move(*one));
@@ -132,7 +132,7 @@ TEST_F(StoreTest, QuotasHold) {
 
 TEST_F(StoreTest, AReaderThatDiesOrHangsOrWantsTooMuchIsOneSentence) {
   const std::string archive = content_of(temp_ / "case.zip");
-  const auto with = [&](const std::string& script, const IntakeQuota& quota = {}) {
+  const auto with = [&](const std::string& script, const UploadQuota& quota = {}) {
     const fs::path program = temp_ / "reader";
     std::ofstream(program) << "#!/bin/sh\n" << script << "\n";
     fs::permissions(program, fs::perms::owner_all);
@@ -184,10 +184,10 @@ TEST_F(StoreTest, WhatAnEarlierProcessLeftHalfDoneGoes) {
   EXPECT_EQ(left_over(), 0U);
 }
 
-TEST(CaseStore, AFolderThatCannotBeMadeIsSaid) {
+TEST(CaseRepository, AFolderThatCannotBeMadeIsSaid) {
   const test::TempDir temp;
   std::ofstream(temp / "file") << "x";
-  const auto out = CaseStore::open(temp / "file" / "cases", "/bin/true");
+  const auto out = CaseRepository::open(temp / "file" / "cases", "/bin/true");
   ASSERT_FALSE(out);
   EXPECT_NE(out.error().message.find("--cases"), std::string::npos);
 }
