@@ -7,8 +7,8 @@
 #include "audio_client/output/audio_output.hpp"
 #include "audio_client/output/wav_recorder.hpp"
 #include "audio_client/synth/drill_synth.hpp"
-#include "common/runtime/event_queue.hpp"
-#include "common/runtime/latest_value.hpp"
+#include "common/runtime/spsc_queue.hpp"
+#include "common/runtime/triple_buffer.hpp"
 #include "common/runtime/tick_stats.hpp"
 
 namespace osteon::audio {
@@ -47,8 +47,8 @@ class SoundEngine final : public SoundSource {
   double rate_hz_;
   DrillSynth synth_;
   WavRecorder* recorder_ = nullptr;
-  LatestValue<SoundScene> scenes_;
-  EventQueue<Sounded, 1024> sounded_;
+  TripleBuffer<SoundScene> scenes_;
+  SpscQueue<Sounded, 1024> sounded_;
   SoundScene last_;  // what was noted last, to note each state once
   std::atomic<std::uint64_t> frames_{0};
   std::atomic<std::int64_t> first_frame_ns_{0};

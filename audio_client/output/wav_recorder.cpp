@@ -9,7 +9,7 @@
 #include <string>
 #include <thread>
 
-#include "common/runtime/event_queue.hpp"
+#include "common/runtime/spsc_queue.hpp"
 
 namespace osteon::audio {
 namespace {
@@ -24,7 +24,7 @@ struct Piece {
 struct WavRecorder::Impl {
   std::filesystem::path path;
   SNDFILE* file = nullptr;
-  EventQueue<Piece, 1024> queue;
+  SpscQueue<Piece, 1024> queue;
   std::atomic<std::uint64_t> written{0}, lost{0};
   std::atomic<bool> write_failed{false};
   std::jthread writer;

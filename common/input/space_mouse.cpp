@@ -6,7 +6,7 @@
 #include <mutex>
 #include <thread>
 
-#include "common/runtime/latest_value.hpp"
+#include "common/runtime/triple_buffer.hpp"
 
 namespace osteon {
 namespace {
@@ -70,7 +70,7 @@ Result<HidFound> SpaceMousePort::open(bool light, Calls calls) {
 
 struct SpaceMouseWatch::State {
   std::function<void(const std::string&)> say;
-  LatestValue<SpaceMouseState> states;
+  TripleBuffer<SpaceMouseState> states;
   SpaceMousePort port;
   std::mutex mutex;  // guards what follows
   std::condition_variable wake;

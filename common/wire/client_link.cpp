@@ -8,7 +8,7 @@ namespace osteon::wire {
 namespace {
 
 using namespace std::chrono_literals;
-using Time = LinkHalf::Time;
+using Time = LinkEndpoint::Time;
 
 // Packets that hold the answer to one challenge: at 30 % loss all are lost once in 15000 moves.
 constexpr int kEchoes = 8;

@@ -14,7 +14,7 @@
 #include "common/link/receive_window.hpp"
 #include "common/wire/bone_motion.hpp"
 #include "common/wire/cut_run.hpp"
-#include "common/wire/link_half.hpp"
+#include "common/wire/link_endpoint.hpp"
 #include "common/wire/tool_state.hpp"
 
 namespace osteon::wire {
@@ -22,7 +22,7 @@ namespace osteon::wire {
 // One thread. `now`: since any start, not before it, the same for all calls.
 class ClientLink {
  public:
-  using Time = LinkHalf::Time;
+  using Time = LinkEndpoint::Time;
   static constexpr std::size_t kMostPartners = 16;
 
   // The first cut to be pushed has `first_author_seq`, and the first row to come `first_index`.
@@ -75,7 +75,7 @@ class ClientLink {
   // The server's clock as seen from here, and the round trip.
   [[nodiscard]] std::optional<ClockReading> clock(Time now) const { return half_.clock(now); }
   [[nodiscard]] double loss() const { return half_.rate().loss(); }  // on the way up
-  [[nodiscard]] const LinkHalf& half() const { return half_; }
+  [[nodiscard]] const LinkEndpoint& half() const { return half_; }
 
  private:
   struct Partner {
@@ -88,7 +88,7 @@ class ClientLink {
   [[nodiscard]] v1::UpPacket state_part(Time now) const;
   void said_state(const v1::UpPacket& part, Time now);
 
-  LinkHalf half_;
+  LinkEndpoint half_;
   ToolNumbers tools_;
   std::optional<CutSender> sender_;  // codes each cut against the one before it; a new one where that is not in the window
   std::uint64_t coded_ = 0;          // the last cut that it coded

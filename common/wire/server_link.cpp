@@ -10,7 +10,7 @@ namespace osteon::wire {
 namespace {
 
 using namespace std::chrono_literals;
-using Time = LinkHalf::Time;
+using Time = LinkEndpoint::Time;
 
 constexpr Time kPartnerRefresh = 250ms;  // a state may be lost, and the tool rest
 

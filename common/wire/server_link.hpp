@@ -11,7 +11,7 @@
 #include "common/link/receive_window.hpp"
 #include "common/wire/bone_motion.hpp"
 #include "common/wire/cut_run.hpp"
-#include "common/wire/link_half.hpp"
+#include "common/wire/link_endpoint.hpp"
 #include "common/wire/tool_state.hpp"
 
 namespace osteon::wire {
@@ -19,7 +19,7 @@ namespace osteon::wire {
 // One thread. `now`: since any start, not before it, the same for all calls.
 class ServerLink {
  public:
-  using Time = LinkHalf::Time;
+  using Time = LinkEndpoint::Time;
   static constexpr std::size_t kMostPartners = 16;
 
   // The first cut to come has `first_author_seq`, and the first row to be pushed `first_index`. `random`: for the tokens of
@@ -81,7 +81,7 @@ class ServerLink {
   // The client's clock as seen from here, and the round trip.
   [[nodiscard]] std::optional<ClockReading> clock(Time now) const { return half_.clock(now); }
   [[nodiscard]] double loss() const { return half_.rate().loss(); }  // on the way down
-  [[nodiscard]] const LinkHalf& half() const { return half_; }
+  [[nodiscard]] const LinkEndpoint& half() const { return half_; }
 
  private:
   struct Partner {
@@ -94,7 +94,7 @@ class ServerLink {
   [[nodiscard]] std::optional<Out> challenge(Time now, std::span<std::uint8_t> into);
   void add_partners(PacketFiller<v1::DownPacket>& filler, Time now, std::size_t keep_free);
 
-  LinkHalf half_;
+  LinkEndpoint half_;
   ToolNumbers tools_;
   const AuthorId author_;
   PathWatch path_;

@@ -15,8 +15,8 @@
 #include <variant>
 
 #include "common/field/rejection.hpp"
-#include "common/runtime/event_queue.hpp"
-#include "common/runtime/latest_value.hpp"
+#include "common/runtime/spsc_queue.hpp"
+#include "common/runtime/triple_buffer.hpp"
 #include "common/runtime/log.hpp"
 #include "common/runtime/memory_reserve.hpp"
 #include "common/runtime/periodic.hpp"
@@ -723,23 +723,23 @@ class Client {
   MetalWatch metal_;           // reporter thread
   std::vector<std::string> tool_names_;  // never changes
 
-  LatestValue<Patch> patches_;     // replica → haptic
-  LatestValue<ToolPlace> places_;  // haptic → replica
-  LatestValue<std::vector<PlacedGuide>> guides_;  // all that stands in the room's scene, replica → haptic
+  TripleBuffer<Patch> patches_;     // replica → haptic
+  TripleBuffer<ToolPlace> places_;  // haptic → replica
+  TripleBuffer<std::vector<PlacedGuide>> guides_;  // all that stands in the room's scene, replica → haptic
   std::map<Digest, std::shared_ptr<const SolidLattice>> solids_;  // of its definitions; replica thread
-  LatestValue<Oversight> oversights_;             // what an instructor has decided, session → haptic
-  LatestValue<ToldPlace> places_of_bone_;         // session → haptic
+  TripleBuffer<Oversight> oversights_;             // what an instructor has decided, session → haptic
+  TripleBuffer<ToldPlace> places_of_bone_;         // session → haptic
   std::atomic<std::uint64_t> line_{1};            // which one this is
-  LatestValue<BonePush> pushes_;                  // haptic → reporter
+  TripleBuffer<BonePush> pushes_;                  // haptic → reporter
   std::atomic<std::uint64_t> stop_flag_{0};       // the newest datagram's word on it, likewise
-  LatestValue<Partners> partners_;                // others' tools, session → haptic
+  TripleBuffer<Partners> partners_;                // others' tools, session → haptic
   Partners heard_partners_;                       // of the session's, as the next
   std::set<std::string> named_tools_;
-  LatestValue<PartnerSolids> partner_solids_;     // replica → haptic
+  TripleBuffer<PartnerSolids> partner_solids_;     // replica → haptic
   PartnerSolids known_solids_;                    // replica thread
   std::atomic<double> line_lag_s_{0};             // how old a partner's state is when it comes: both lines taken to be alike
-  EventQueue<TickRow, 2048> rows_; // haptic → reporter
-  LatestValue<TickStats> live_;    // haptic → reporter, once a second
+  SpscQueue<TickRow, 2048> rows_; // haptic → reporter
+  TripleBuffer<TickStats> live_;    // haptic → reporter, once a second
   TickStats told_;                 // reporter: of the last line
   std::optional<Clock::time_point> stall_told_;  // watchdog
   std::array<std::atomic<std::int64_t>, kTickTimes> tick_times_;

@@ -1,5 +1,5 @@
 // The running haptic client: the 1 kHz thread, the thread of the replica and its patches, and the one that reports.
-// They share no lock with the haptic thread; data crosses by LatestValue and fixed queues.
+// They share no lock with the haptic thread; data crosses by TripleBuffer and fixed queues.
 #pragma once
 #include <filesystem>
 #include <memory>

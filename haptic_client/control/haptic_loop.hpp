@@ -11,7 +11,7 @@
 #include "common/core/id.hpp"
 #include "common/mechanics/cutting_state.hpp"
 #include "common/mechanics/spindle.hpp"
-#include "common/runtime/event_queue.hpp"
+#include "common/runtime/spsc_queue.hpp"
 #include "haptic_client/control/coupling.hpp"
 #include "haptic_client/control/cut_recorder.hpp"
 #include "haptic_client/control/guide_pull.hpp"
@@ -180,7 +180,7 @@ class HapticLoop {
   LoopParams params_;
   std::vector<ToolModel> tools_;
   std::vector<CuttingEffects> effects_;   // of each tool
-  EventQueue<CutPiece, 64> pieces_;
+  SpscQueue<CutPiece, 64> pieces_;
   WorkspaceMapping mapping_;
   Proxy proxy_;
   Guiding guiding_;

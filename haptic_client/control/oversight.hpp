@@ -15,7 +15,7 @@
 
 namespace osteon::haptic {
 
-// A Supervision of fixed size, so that it crosses to the haptic thread by LatestValue.
+// A Supervision of fixed size, so that it crosses to the haptic thread by TripleBuffer.
 struct Oversight {
   static constexpr std::size_t kMostTools = 256;
   RoomSeq room_seq;                  // since when it holds

@@ -4,7 +4,7 @@
 #include <atomic>
 #include <chrono>
 
-#include "common/runtime/latest_value.hpp"
+#include "common/runtime/triple_buffer.hpp"
 #include "haptic_client/device/haptic_device.hpp"
 
 namespace osteon::haptic {
@@ -66,8 +66,8 @@ class DeviceExchange {
     Time at{};
   };
 
-  LatestValue<DeviceReading> readings_;
-  LatestValue<Written> outputs_;
+  TripleBuffer<DeviceReading> readings_;
+  TripleBuffer<Written> outputs_;
   DeviceReading last_;             // I/O
   std::uint64_t samples_ = 0;      // I/O
   bool any_written_ = false;       // I/O

@@ -11,7 +11,7 @@
 #include <string>
 #include <thread>
 
-#include "common/runtime/latest_value.hpp"
+#include "common/runtime/triple_buffer.hpp"
 #include "common/runtime/periodic.hpp"
 #include "common/runtime/realtime.hpp"
 #include "haptic_client/control/room_watch.hpp"
@@ -196,8 +196,8 @@ class Blackout {
   ReadyPlan ready_;
   SimulatedSession session_;
   Replica replica_;
-  LatestValue<Patch> patches_;
-  LatestValue<std::pair<Pose, int>> places_;
+  TripleBuffer<Patch> patches_;
+  TripleBuffer<std::pair<Pose, int>> places_;
   std::array<TickStats, 3> stats_;
   long cutting_[3] = {}, held_[3] = {};
   std::atomic<bool> silent_{false}, follows_{true}, over_{false};

@@ -5,9 +5,9 @@
 #include <csignal>
 #include <thread>
 
-#include "common/runtime/event_queue.hpp"
+#include "common/runtime/spsc_queue.hpp"
 #include "common/runtime/files.hpp"
-#include "common/runtime/latest_value.hpp"
+#include "common/runtime/triple_buffer.hpp"
 #include "common/runtime/log.hpp"
 #include "common/runtime/periodic.hpp"
 #include "common/runtime/stop_signal.hpp"
@@ -22,8 +22,8 @@ struct Pair {
   std::uint64_t a = 0, b = 0;
 };
 
-TEST(LatestValue, TheReaderSeesOnlyWholeValuesAndAtLastTheNewest) {
-  LatestValue<Pair> latest;
+TEST(TripleBuffer, TheReaderSeesOnlyWholeValuesAndAtLastTheNewest) {
+  TripleBuffer<Pair> latest;
   constexpr std::uint64_t kLast = 200'000;
   std::jthread writer([&] {
     for (std::uint64_t i = 1; i <= kLast; ++i) latest.store({i, ~i});
@@ -39,8 +39,8 @@ TEST(LatestValue, TheReaderSeesOnlyWholeValuesAndAtLastTheNewest) {
   EXPECT_FALSE(latest.refresh());
 }
 
-TEST(EventQueue, KeepsOrderAndLosesNothingWhenPushIsTriedAgain) {
-  EventQueue<int, 64> queue;
+TEST(SpscQueue, KeepsOrderAndLosesNothingWhenPushIsTriedAgain) {
+  SpscQueue<int, 64> queue;
   constexpr int kLast = 200'000;
   std::jthread producer([&] {
     for (int i = 0; i < kLast;)
@@ -54,8 +54,8 @@ TEST(EventQueue, KeepsOrderAndLosesNothingWhenPushIsTriedAgain) {
   EXPECT_FALSE(queue.try_pop(value));
 }
 
-TEST(EventQueue, RefusesWhenFull) {
-  EventQueue<int, 4> queue;
+TEST(SpscQueue, RefusesWhenFull) {
+  SpscQueue<int, 4> queue;
   for (int i = 0; i < 4; ++i) EXPECT_TRUE(queue.try_push(i));
   EXPECT_FALSE(queue.try_push(9));
   EXPECT_EQ(queue.size(), 4u);

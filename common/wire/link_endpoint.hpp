@@ -45,14 +45,14 @@ struct LinkCounts {
 // Items are numbered one by one. Those that cannot go in packets come to the other end over the stream, under their number;
 // to the window they are items without bytes, which are acknowledged as all others are. One thread; times since any start,
 // not before it.
-class LinkHalf {
+class LinkEndpoint {
  public:
   using Time = std::chrono::nanoseconds;
 
   // `first`: number of the first item to go out.
-  LinkHalf(std::uint32_t session, const SealKey& out, const SealKey& in, std::uint64_t first, const LinkOptions& options);
-  LinkHalf(const LinkHalf&) = delete;
-  LinkHalf& operator=(const LinkHalf&) = delete;
+  LinkEndpoint(std::uint32_t session, const SealKey& out, const SealKey& in, std::uint64_t first, const LinkOptions& options);
+  LinkEndpoint(const LinkEndpoint&) = delete;
+  LinkEndpoint& operator=(const LinkEndpoint&) = delete;
 
   // --- what comes
   // The plain bytes of an authentic datagram that was not here before, within `into` (kMostDatagramBytes).

@@ -1,4 +1,4 @@
-#include "common/wire/link_half.hpp"
+#include "common/wire/link_endpoint.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@ namespace osteon::wire {
 namespace {
 
 using namespace std::chrono_literals;
-using Time = LinkHalf::Time;
+using Time = LinkEndpoint::Time;
 
 // What a packet holds beside items and states, at most: the seal, times, acknowledgement, a path token, epoch and frozen.
 constexpr std::size_t kFixedBytes = kSealBytes + 57 + 22 + 18 + 14;
@@ -32,7 +32,7 @@ LinkOptions server_link_options() {
   return options;
 }
 
-LinkHalf::LinkHalf(std::uint32_t session, const SealKey& out, const SealKey& in, std::uint64_t first, const LinkOptions& options)
+LinkEndpoint::LinkEndpoint(std::uint32_t session, const SealKey& out, const SealKey& in, std::uint64_t first, const LinkOptions& options)
     : options_(options),
       sealer_(session, out, options.seal),
       opener_(session, in, options.seal),
@@ -44,7 +44,7 @@ LinkHalf::LinkHalf(std::uint32_t session, const SealKey& out, const SealKey& in,
   OSTEON_CHECK(first > 0);
 }
 
-std::optional<Opened> LinkHalf::open(std::span<const std::uint8_t> datagram, Time now, std::span<std::uint8_t> into) {
+std::optional<Opened> LinkEndpoint::open(std::span<const std::uint8_t> datagram, Time now, std::span<std::uint8_t> into) {
   const auto opened = opener_.open(datagram, now, into);
   if (!opened) return {};
   ++counts_.packets_received;
@@ -53,7 +53,7 @@ std::optional<Opened> LinkHalf::open(std::span<const std::uint8_t> datagram, Tim
   return opened;
 }
 
-void LinkHalf::heard(const v1::PacketTimes& times, const Opened& opened, Time now) {
+void LinkEndpoint::heard(const v1::PacketTimes& times, const Opened& opened, Time now) {
   if (opened.newest) {
     peer_sent_us_ = times.sent_us();
     peer_came_ = now;
@@ -70,7 +70,7 @@ void LinkHalf::heard(const v1::PacketTimes& times, const Opened& opened, Time no
   rate_.set_round_trip(round_trip);
 }
 
-bool LinkHalf::acknowledge(std::uint64_t upto, std::uint64_t beyond) {
+bool LinkEndpoint::acknowledge(std::uint64_t upto, std::uint64_t beyond) {
   if (upto > last_) return false;
   acknowledged_ = std::max(acknowledged_, upto);
   if (upto <= sent_upto_) {
@@ -84,7 +84,7 @@ bool LinkHalf::acknowledge(std::uint64_t upto, std::uint64_t beyond) {
   return true;
 }
 
-bool LinkHalf::begin(std::uint64_t number) {
+bool LinkEndpoint::begin(std::uint64_t number) {
   OSTEON_CHECK(number > last_);
   last_ = number;
   if (window_.empty() && window_.next() != number) {
@@ -98,7 +98,7 @@ bool LinkHalf::begin(std::uint64_t number) {
   return true;
 }
 
-Time LinkHalf::keep_alive_interval() const {
+Time LinkEndpoint::keep_alive_interval() const {
   // The other end gives this one up when all packets of `alive_for` were lost: k of them, with loss^k <= 10^-4. One more, as
   // delays vary. Before anything is known of the path it is taken for a bad one, so that the first packet soon gets through.
   const double loss = heard_at_ ? std::clamp(rate_.loss(), 0.01, 0.5) : 0.5;
@@ -106,7 +106,7 @@ Time LinkHalf::keep_alive_interval() const {
   return options_.alive_for / packets;
 }
 
-Time LinkHalf::next(Time now, Time wanted) const {
+Time LinkEndpoint::next(Time now, Time wanted) const {
   if (!sent_at_) return now;
   if (answer_due_ || news_left_ > 0) wanted = now;
   if (const auto due = window_.next_due(now, rate_.repeats())) wanted = std::min(wanted, *due);
@@ -116,15 +116,15 @@ Time LinkHalf::next(Time now, Time wanted) const {
   return rate_.next(now, wanted, kFixedBytes + window_.least_room(now), fresh(now));
 }
 
-bool LinkHalf::fresh(Time now) const { return alive(now) && window_.holds_fresh(); }
+bool LinkEndpoint::fresh(Time now) const { return alive(now) && window_.holds_fresh(); }
 
-std::size_t LinkHalf::room(Time now) const {
+std::size_t LinkEndpoint::room(Time now) const {
   constexpr std::size_t kAsking = 280;  // where perhaps nobody hears it
   const std::size_t budget = rate_.budget(now, fresh(now));
   return (alive(now) ? budget : std::min(budget, kAsking)) - kSealBytes;
 }
 
-void LinkHalf::put_times(v1::PacketTimes& times, Time now) const {
+void LinkEndpoint::put_times(v1::PacketTimes& times, Time now) const {
   times.set_sent_us(in_us(now));
   times.set_heard_counter(newest_);
   times.set_heard_packets(counts_.packets_received);
@@ -133,7 +133,7 @@ void LinkHalf::put_times(v1::PacketTimes& times, Time now) const {
   times.set_echo_received_us(in_us(*peer_came_));
 }
 
-std::span<const std::uint8_t> LinkHalf::seal(std::string_view plain, Time now, std::span<std::uint8_t> into) {
+std::span<const std::uint8_t> LinkEndpoint::seal(std::string_view plain, Time now, std::span<std::uint8_t> into) {
   rate_.sent(now, plain.size() + kSealBytes);
   sent_at_ = now;
   answer_due_ = false;
@@ -141,7 +141,7 @@ std::span<const std::uint8_t> LinkHalf::seal(std::string_view plain, Time now, s
   return seal_beside(plain, now, into);
 }
 
-std::span<const std::uint8_t> LinkHalf::seal_beside(std::string_view plain, Time now, std::span<std::uint8_t> into) {
+std::span<const std::uint8_t> LinkEndpoint::seal_beside(std::string_view plain, Time now, std::span<std::uint8_t> into) {
   const auto datagram = sealer_.seal({reinterpret_cast<const std::uint8_t*>(plain.data()), plain.size()}, now, into);
   ++counts_.packets_sent;
   counts_.bytes_sent += datagram.size();

@@ -7,7 +7,7 @@
 namespace osteon {
 
 template <class T, std::size_t Capacity>
-class EventQueue {
+class SpscQueue {
   static_assert((Capacity & (Capacity - 1)) == 0, "a power of two");
 
  public:

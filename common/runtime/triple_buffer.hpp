@@ -8,10 +8,10 @@
 namespace osteon {
 
 template <class T>
-class LatestValue {
+class TripleBuffer {
  public:
-  LatestValue() = default;
-  explicit LatestValue(const T& initial) { slots_.fill(initial); }
+  TripleBuffer() = default;
+  explicit TripleBuffer(const T& initial) { slots_.fill(initial); }
 
   // [writer] The slot to fill, then publish(). The slot holds some older value.
   [[nodiscard]] T& writable() noexcept { return slots_[write_]; }
