@@ -11,7 +11,7 @@
 #include <string>
 #include <thread>
 
-#include "audio_client/net/cutting_watch.hpp"
+#include "audio_client/net/state_subscription.hpp"
 #include "audio_client/output/audio_output.hpp"
 #include "audio_client/output/sound_engine.hpp"
 #include "audio_client/output/wav_recorder.hpp"
@@ -158,7 +158,7 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   std::mutex delivering;
   std::optional<Clock::time_point> heard;  // guarded: when the last message came, none while all is at rest
   auto watch =
-      CuttingWatch::start(std::move(*room), [&](const std::vector<CuttingState>& tools, Clock::time_point received) {
+      StateSubscription::start(std::move(*room), [&](const std::vector<CuttingState>& tools, Clock::time_point received) {
         const audio::SoundScene scene = audio::sound_scene(tools, received.time_since_epoch().count());
         const std::lock_guard lock(delivering);
         engine.deliver(scene);

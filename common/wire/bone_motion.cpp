@@ -54,8 +54,8 @@ class Reading {
 
 }  // namespace
 
-v1::BonePush to_wire(const BonePush& push) {
-  v1::BonePush out;
+v1::MountLoad to_wire(const MountLoad& push) {
+  v1::MountLoad out;
   out.set_push_seq(push.push_seq);
   set(*out.mutable_force(), push.load.force_n, kPerNewton);
   set(*out.mutable_moment(), push.load.moment_nmm, kPerNewtonMillimetre);
@@ -64,8 +64,8 @@ v1::BonePush to_wire(const BonePush& push) {
   return out;
 }
 
-v1::BoneSeen to_wire(const BoneSeen& seen) {
-  v1::BoneSeen out;
+v1::MountPose to_wire(const MountPose& seen) {
+  v1::MountPose out;
   out.set_seen_seq(seen.seen_seq);
   set(*out.mutable_place(), seen.shift.place_mm, kPerMillimetre);
   set(*out.mutable_turn(), seen.shift.turn_rad, kPerRadian);
@@ -76,16 +76,16 @@ v1::BoneSeen to_wire(const BoneSeen& seen) {
   return out;
 }
 
-Result<BonePush> from_wire(const v1::BonePush& push) {
+Result<MountLoad> from_wire(const v1::MountLoad& push) {
   Reading read;
   read.expect(push.push_seq() > 0, "push.push_seq", "must be at least 1");
   const Vec3 force_n = read.vector(push.force(), kPerNewton, "push.force");
   const Vec3 moment_nmm = read.vector(push.moment(), kPerNewtonMillimetre, "push.moment");
   const double energy_mj = read.energy_mj(push.energy(), "push.energy");
-  return read.of(BonePush{push.push_seq(), {force_n, moment_nmm}, energy_mj, push.seen_seq()});
+  return read.of(MountLoad{push.push_seq(), {force_n, moment_nmm}, energy_mj, push.seen_seq()});
 }
 
-Result<BoneSeen> from_wire(const v1::BoneSeen& seen) {
+Result<MountPose> from_wire(const v1::MountPose& seen) {
   Reading read;
   read.expect(seen.seen_seq() > 0, "bone.seen_seq", "must be at least 1");
   const Vec3 place_mm = read.vector(seen.place(), kPerMillimetre, "bone.place");
@@ -93,7 +93,7 @@ Result<BoneSeen> from_wire(const v1::BoneSeen& seen) {
   read.expect(turn_rad.norm() <= std::numbers::pi, "bone.turn", "is more than half a turn");
   const double energy_mj = read.energy_mj(seen.energy(), "bone.energy");
   read.expect(seen.lag_ms() <= kMostLag_ms, "bone.lag_ms", "is " + std::to_string(seen.lag_ms()) + " and must be at most 60000");
-  return read.of(BoneSeen{seen.seen_seq(), {place_mm, turn_rad}, energy_mj, seen.push_seq(), 1e-3 * seen.lag_ms()});
+  return read.of(MountPose{seen.seen_seq(), {place_mm, turn_rad}, energy_mj, seen.push_seq(), 1e-3 * seen.lag_ms()});
 }
 
 }  // namespace osteon::wire

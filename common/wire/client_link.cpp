@@ -69,7 +69,7 @@ void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
     if (!newer) return half_.malformed();
     if (*newer) states.push_back(std::move(state));
   }
-  std::optional<BoneSeen> bone;
+  std::optional<MountPose> bone;
   if (packet.has_bone()) {
     const auto seen = from_wire(packet.bone());
     if (!seen) return half_.malformed();

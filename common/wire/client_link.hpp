@@ -42,7 +42,7 @@ class ClientLink {
   // more than the deadband, some 30 times a second while it is at the bone, and now and then in any case.
   void set_state(const CuttingState& state, std::uint32_t buttons);
   // Newest push on a bone on its mount: it goes once, soon, where none newer comes before.
-  void set_push(const BonePush& push) { push_ = push; }
+  void set_push(const MountLoad& push) { push_ = push; }
 
   // Anything may come.
   void receive(std::span<const std::uint8_t> datagram, Time now);
@@ -71,7 +71,7 @@ class ClientLink {
   // Tools that were heard of within the last two seconds.
   [[nodiscard]] std::vector<HeardState> partners(Time now) const;
   // The newest place of the bone on its mount, once; nothing where it stands on none.
-  [[nodiscard]] std::optional<BoneSeen> take_bone() { return std::exchange(bone_, std::nullopt); }
+  [[nodiscard]] std::optional<MountPose> take_bone() { return std::exchange(bone_, std::nullopt); }
   // The server's clock as seen from here, and the round trip.
   [[nodiscard]] std::optional<ClockReading> clock(Time now) const { return half_.clock(now); }
   [[nodiscard]] double loss() const { return half_.rate().loss(); }  // on the way up
@@ -101,9 +101,9 @@ class ClientLink {
   std::optional<HeardState> state_, said_;  // newest, and last sent
   bool moved_ = false;                      // from the one to the other, by more than the deadband
   Time said_at_ = -std::chrono::hours(1), effort_at_ = said_at_;
-  std::optional<BonePush> push_;            // newest that has not gone
+  std::optional<MountLoad> push_;            // newest that has not gone
   Time pushed_at_ = -std::chrono::hours(1);
-  std::optional<BoneSeen> bone_;            // newest that was not taken
+  std::optional<MountPose> bone_;            // newest that was not taken
   std::uint64_t bone_seq_ = 0;
   PathToken echo_{};
   int echoes_left_ = 0;

@@ -305,8 +305,8 @@ Result<Tool> from_wire(const v1::ToolDefinition& tool) {
   return parsed;
 }
 
-v1::Supervision to_wire(const Supervision& supervision) {
-  v1::Supervision out;
+v1::Restrictions to_wire(const Restrictions& supervision) {
+  v1::Restrictions out;
   out.set_stopped(supervision.stopped);
   out.set_taken_by(supervision.taken_by.value);
   out.set_guide(supervision.guide.value);
@@ -321,8 +321,8 @@ v1::Supervision to_wire(const Supervision& supervision) {
   return out;
 }
 
-Result<Supervision> from_wire(const v1::Supervision& supervision) {
-  Supervision out;
+Result<Restrictions> from_wire(const v1::Restrictions& supervision) {
+  Restrictions out;
   out.stopped = supervision.stopped();
   out.taken_by = {supervision.taken_by()};
   out.guide = {supervision.guide()};

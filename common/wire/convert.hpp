@@ -5,7 +5,7 @@
 #include "common/core/result.hpp"
 #include "common/field/cut.hpp"
 #include "common/field/field_hash.hpp"
-#include "common/field/supervision.hpp"
+#include "common/field/restrictions.hpp"
 #include "common/surface/view_frustum.hpp"
 #include "common/mechanics/cutting_state.hpp"
 #include "common/tools/annotation.hpp"
@@ -29,7 +29,7 @@ namespace osteon::wire {
 [[nodiscard]] v1::SceneItem to_wire(const SceneItem& item);
 [[nodiscard]] v1::ToolDefinition to_wire(const Tool& tool);
 [[nodiscard]] v1::ViewFrustum to_wire(const ViewFrustum& look);
-[[nodiscard]] v1::Supervision to_wire(const Supervision& supervision);
+[[nodiscard]] v1::Restrictions to_wire(const Restrictions& supervision);
 [[nodiscard]] v1::Annotation to_wire(const Annotation& annotation);
 [[nodiscard]] std::string to_wire(const Digest& digest);
 
@@ -44,7 +44,7 @@ namespace osteon::wire {
 [[nodiscard]] Result<Tool> from_wire(const v1::ToolDefinition& tool);  // by the rules of tool files
 [[nodiscard]] Result<BlockKey> key_from_wire(const v1::MeshBlock& block);
 [[nodiscard]] Result<ViewFrustum> from_wire(const v1::ViewFrustum& look);
-[[nodiscard]] Result<Supervision> from_wire(const v1::Supervision& supervision);  // by check(); tools in any order
+[[nodiscard]] Result<Restrictions> from_wire(const v1::Restrictions& supervision);  // by check(); tools in any order
 [[nodiscard]] Result<Annotation> from_wire(const v1::Annotation& annotation);     // by check()
 [[nodiscard]] Result<Digest> digest_from_wire(const std::string& bytes);
 

@@ -357,7 +357,7 @@ Result<std::vector<IndexedRow>> rows_of(const v1::DownPacket& packet, const Tool
                                   .reason = row.reason(), .lease_epoch = row.lease_epoch()}});
   }
   for (const v1::SupervisedRow& row : packet.supervised()) {
-    Result<Supervision> supervision = from_wire(row.supervision());
+    Result<Restrictions> supervision = from_wire(row.supervision());
     if (!supervision) return tl::unexpected(supervision.error());
     rows.push_back({row.index(), {.room_seq = {row.room_seq()}, .kind = SessionRowKind::supervised,
                                   .lease_epoch = row.lease_epoch(), .supervision = std::move(*supervision),

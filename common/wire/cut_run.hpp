@@ -21,7 +21,7 @@
 
 #include "common/core/result.hpp"
 #include "common/field/cut.hpp"
-#include "common/field/supervision.hpp"
+#include "common/field/restrictions.hpp"
 #include "common/link/send_window.hpp"
 #include "osteon/v1/link.pb.h"
 
@@ -74,7 +74,7 @@ struct SessionRow {
   std::uint64_t author_seq = 0;                    // rejected: of the session's own cut
   std::uint32_t reason = 0;                        // rejected: as the room numbers its reasons
   std::uint64_t lease_epoch = 0;                   // rejected, supervised: of the session, from now on
-  Supervision supervision{};                       // supervised: of the session's own hand, from now on
+  Restrictions supervision{};                       // supervised: of the session's own hand, from now on
   Decider by{};                                    // supervised: whose decision
   friend bool operator==(const SessionRow&, const SessionRow&) = default;
 };

@@ -48,7 +48,7 @@ void ServerLink::receive(const Endpoint& from, std::span<const std::uint8_t> dat
   HeardState state = state_;
   const auto newer = packet.has_state() ? take_over(packet.state(), state) : false;
   if (!newer) return half_.malformed();
-  std::optional<BonePush> push;
+  std::optional<MountLoad> push;
   if (packet.has_push()) {
     const auto read = from_wire(packet.push());
     if (!read) return half_.malformed();

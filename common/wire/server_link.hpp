@@ -42,7 +42,7 @@ class ServerLink {
   // Newest state of the tool, once.
   [[nodiscard]] std::optional<HeardState> take_state();
   // Newest push on the bone, once.
-  [[nodiscard]] std::optional<BonePush> take_push() { return std::exchange(push_, std::nullopt); }
+  [[nodiscard]] std::optional<MountLoad> take_push() { return std::exchange(push_, std::nullopt); }
 
   // Every row of the session, in order of its index. False: the client gets it over the stream only, since it is of kind
   // streamed or too long for a packet, or since too much is unacknowledged. While the link is not alive(), every row above
@@ -58,7 +58,7 @@ class ServerLink {
   // Newest states of others' tools; at most kMostPartners count. Who is not among them is not spoken of any more.
   void set_partners(std::span<const HeardState> partners);
   // Newest place of the bone on its mount: it goes once, soon, where none newer comes before.
-  void set_bone(const BoneSeen& bone) { bone_ = bone; }
+  void set_bone(const MountPose& bone) { bone_ = bone; }
   void set_lease_epoch(std::uint64_t epoch);
   void set_frozen(bool frozen);
 
@@ -102,9 +102,9 @@ class ServerLink {
   std::uint64_t decided_;
   HeardState state_;
   bool state_is_new_ = false;
-  std::optional<BonePush> push_;   // newest that was not taken
+  std::optional<MountLoad> push_;   // newest that was not taken
   std::uint64_t push_seq_ = 0;
-  std::optional<BoneSeen> bone_;   // newest that has not gone
+  std::optional<MountPose> bone_;   // newest that has not gone
   Time bone_at_ = -std::chrono::hours(1);
 
   RowSender sender_;

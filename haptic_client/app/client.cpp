@@ -23,10 +23,10 @@
 #include "common/runtime/watchdog.hpp"
 #include "haptic_client/app/cut_log.hpp"
 #include "haptic_client/control/guiding.hpp"
-#include "haptic_client/control/mounted_bone.hpp"
+#include "haptic_client/control/felt_mount.hpp"
 #include "haptic_client/control/patch_builder.hpp"
 #include "haptic_client/control/replica.hpp"
-#include "haptic_client/control/room_watch.hpp"
+#include "haptic_client/control/confirmation_monitor.hpp"
 
 namespace osteon::haptic {
 namespace {
@@ -111,7 +111,7 @@ GuideSeen guide_among(const Partners& partners, AuthorId guide) {
 // Where the bone stands on its mount; lines to the room are counted from 1.
 struct ToldPlace {
   std::uint64_t line = 0;
-  BoneSeen seen;
+  MountPose seen;
 };
 
 // Where the tool is, for the replica's thread.
@@ -153,7 +153,7 @@ class Client {
     all_over_ = true;
     reporter.join();
     outcome_.fast_path = room_.fast_path();
-    const ShownBone& shown = mounted_.shown();
+    const MountFollower& shown = mounted_.shown();
     outcome_.mount = {mounted_.there(), mounted_.most_mm(), mounted_.most_rad(), shown.put_in_mj(), shown.released_mj(),
                       shown.given_mj(), shown.granted_mj(), shown.low_pass_s()};
     room_.close();
@@ -217,7 +217,7 @@ class Client {
       heard_ns_ = ns(Clock::now());
       wake_.notify_one();
     };
-    RoomEvents events;
+    RoomCallbacks events;
     events.leaf = [pass](const FieldLeaf& leaf) { pass(leaf); };
     events.complete = [pass](const RoomAtJoin& room) { pass(room); };
     events.change = [pass](BonePart&& part) { pass(std::move(part)); };
@@ -229,7 +229,7 @@ class Client {
     };
     events.supervised = [this, pass](const HandSupervised& decided) {
       // At once to the loop, which may not wait for what the replica has to do before.
-      oversights_.store(oversight_of(decided.supervision, decided.place, decided.lease_epoch, session_.plan().tools));
+      oversights_.store(haptic_restrictions(decided.supervision, decided.place, decided.lease_epoch, session_.plan().tools));
       pass(decided);
     };
     events.stop_flag = [this](std::uint64_t lease_epoch, bool frozen) { stop_flag_ = packed(StopFlag{lease_epoch, frozen}); };
@@ -239,7 +239,7 @@ class Client {
       if (!state.tool_name.empty() && named_tools_.size() < PartnerSolids::kMost && named_tools_.insert(state.tool_name).second)
         pass(ToolNamed{state.tool_name});
     };
-    events.bone = [this](const BoneSeen& seen) { places_of_bone_.store(ToldPlace{line_, seen}); };
+    events.bone = [this](const MountPose& seen) { places_of_bone_.store(ToldPlace{line_, seen}); };
     events.interrupted = [this, pass](const Error& why) {
       ++line_;
       pass(Interrupted{why.message});
@@ -287,7 +287,7 @@ class Client {
   void move_bone() {
     if (places_of_bone_.refresh()) mounted_.see(places_of_bone_.value().line, places_of_bone_.value().seen);
     mounted_.step(session_.loop(), last_);
-    if (const std::optional<BonePush> push = mounted_.push()) pushes_.store(*push);
+    if (const std::optional<MountLoad> push = mounted_.push()) pushes_.store(*push);
   }
 
   // Spindle and force run down and the client ends with this.
@@ -713,7 +713,7 @@ class Client {
   const ClientOptions& options_;
   const StopSignal& stop_;
   Session& session_;           // haptic thread; its queue of cuts is emptied by the replica's thread
-  MountedBone mounted_;        // haptic thread
+  FeltMount mounted_;        // haptic thread
   Replica replica_;            // replica thread, until it is joined
   PatchBuilder builder_;       // replica thread
   CutLog cut_log_;             // replica thread, until it is joined
@@ -727,10 +727,10 @@ class Client {
   TripleBuffer<ToolPlace> places_;  // haptic → replica
   TripleBuffer<std::vector<PlacedGuide>> guides_;  // all that stands in the room's scene, replica → haptic
   std::map<Digest, std::shared_ptr<const SolidLattice>> solids_;  // of its definitions; replica thread
-  TripleBuffer<Oversight> oversights_;             // what an instructor has decided, session → haptic
+  TripleBuffer<HapticRestrictions> oversights_;             // what an instructor has decided, session → haptic
   TripleBuffer<ToldPlace> places_of_bone_;         // session → haptic
   std::atomic<std::uint64_t> line_{1};            // which one this is
-  TripleBuffer<BonePush> pushes_;                  // haptic → reporter
+  TripleBuffer<MountLoad> pushes_;                  // haptic → reporter
   std::atomic<std::uint64_t> stop_flag_{0};       // the newest datagram's word on it, likewise
   TripleBuffer<Partners> partners_;                // others' tools, session → haptic
   Partners heard_partners_;                       // of the session's, as the next
@@ -761,7 +761,7 @@ class Client {
   TickRow row_;
   LoopReport last_;
   std::array<PartnerTool, Partners::kMost> felt_partners_;
-  const Site* site_ = nullptr;
+  const EntrySite* site_ = nullptr;
   bool taken_up_ = false;
   // Reporter thread.
   Clock::time_point lag_asked_{};
@@ -779,7 +779,7 @@ class Client {
   bool changing_ = false;             // a change of the bone has come in part
   bool interrupted_ = false;          // since then leaves are gathered here
   std::vector<FieldLeaf> renewed_;
-  RoomWatch watch_;
+  ConfirmationMonitor watch_;
   std::size_t noted_steps_ = 0;
   double noted_mm3_ = 0;
   DurationHistogram patch_times_;

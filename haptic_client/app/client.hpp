@@ -41,7 +41,7 @@ struct ClientOutcome {
   std::optional<Error> lost;             // why it ended before its time: the room, or a log on a full disk
   std::vector<StepResult> steps;
   std::vector<double> removed_mm3;       // of each step, by the cut field
-  std::vector<CutRow> cuts;
+  std::vector<RecordedCut> cuts;
   TickStats ticks;
   bool realtime = false;                 // the haptic thread had SCHED_FIFO
   std::uint64_t stalls = 0;              // times that it did not run for more than three periods, as its watchdog saw
@@ -63,7 +63,7 @@ struct ClientOutcome {
   struct MountReport {
     bool there = false;                    // the room's bone stands on one, as far as the hand was told
     double most_mm = 0, most_rad = 0;      // that the bone was away from where it rests, as the hand felt it
-    double put_in_mj = 0, released_mj = 0, given_mj = 0, granted_mj = 0;  // see ShownBone
+    double put_in_mj = 0, released_mj = 0, given_mj = 0, granted_mj = 0;  // see MountFollower
     double low_pass_s = 0;
   } mount;
   FastPathHealth fast_path;

@@ -5,7 +5,7 @@
 
 #include "common/core/id.hpp"
 #include "haptic_client/app/record.hpp"
-#include "haptic_client/net/room_events.hpp"
+#include "haptic_client/net/room_callbacks.hpp"
 
 namespace osteon::haptic {
 
@@ -19,10 +19,10 @@ class CutLog {
   // After the line was down: those that the room has decided meanwhile. Gives how many of them were rejected. Where the
   // room does not say the place of a cut, as one of an earlier version, the cut stays as it is.
   std::uint64_t confirm(const RoomAtJoin& room, std::int64_t at_ns);
-  [[nodiscard]] const std::vector<CutRow>& rows() const { return rows_; }
+  [[nodiscard]] const std::vector<RecordedCut>& rows() const { return rows_; }
 
  private:
-  std::vector<CutRow> rows_;
+  std::vector<RecordedCut> rows_;
 };
 
 }  // namespace osteon::haptic

@@ -16,7 +16,7 @@
 #include "haptic_client/app/check_command.hpp"
 #include "haptic_client/app/client.hpp"
 #include "haptic_client/app/devices_command.hpp"
-#include "haptic_client/app/hand.hpp"
+#include "haptic_client/app/tool_operator.hpp"
 #include "haptic_client/app/laws_command.hpp"
 
 namespace {
@@ -32,7 +32,7 @@ struct Options {
   double patience_s = 5.0;
   std::optional<double> force_scale;
   std::filesystem::path cut_log, summary;
-  HandOptions hand;
+  ToolOperatorOptions hand;
   ClientOptions client;
 };
 
@@ -94,7 +94,7 @@ json step_summary(const ReadyStep& step, const std::vector<ToolModel>& tools, co
 }
 
 // What an instructor decided about the hand, and what became of it. Times: from the loop's first tick on.
-json oversight_of(const ClientOutcome& outcome) {
+json haptic_restrictions(const ClientOutcome& outcome) {
   const auto seconds = [&](std::int64_t mono_ns) { return 1e-9 * static_cast<double>(mono_ns - outcome.began_ns); };
   json notes = json::array(), words = json::array();
   for (const OversightNote& note : outcome.oversight) {
@@ -185,7 +185,7 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string
           {"room_seq", outcome.room_seq.value},
           {"stopped", outcome.stopped},
           {"lost", outcome.lost ? json(outcome.lost->message) : json(nullptr)}};
-  summary.update(oversight_of(outcome));
+  summary.update(haptic_restrictions(outcome));
   return summary;
 }
 
@@ -239,7 +239,7 @@ Result<void> run(Options& options, const StopSignal& stop) {
   if (!credentials) return tl::unexpected(credentials.error());
   options.room.credentials = *credentials;
   if (Result<void> usable = check_outputs(options); !usable) return usable;
-  Result<HandChoice> hand = HandChoice::make(options.hand, tell);
+  Result<ToolOperator> hand = ToolOperator::make(options.hand, tell);
   if (!hand) return tl::unexpected(hand.error());
 
   options.room.patience = std::chrono::milliseconds(std::llround(1e3 * options.patience_s));

@@ -97,10 +97,10 @@ Result<void> SessionLog::finish() {
   return {};
 }
 
-Result<void> write_cut_log(const std::filesystem::path& file, const std::vector<CutRow>& rows) {
+Result<void> write_cut_log(const std::filesystem::path& file, const std::vector<RecordedCut>& rows) {
   if (file.empty()) return {};
   std::string text = "author_seq,room_seq,closed_mono_ns,confirmed_mono_ns\n";
-  for (const CutRow& row : rows)
+  for (const RecordedCut& row : rows)
     text += std::to_string(row.author_seq) + ',' + std::to_string(row.room_seq) + ',' + std::to_string(row.closed_mono_ns) + ',' +
             std::to_string(row.confirmed_mono_ns) + '\n';
   return write_file(file, text);

@@ -29,7 +29,7 @@ struct TickRow {
   WorkspaceMapping mapping;
 };
 
-struct CutRow {
+struct RecordedCut {
   std::uint64_t author_seq = 0, room_seq = 0;              // room_seq 0: rejected, or not confirmed
   std::int64_t closed_mono_ns = 0, confirmed_mono_ns = 0;  // confirmed_mono_ns 0: the room never said what became of it
 };
@@ -95,6 +95,6 @@ class SessionLog {
   std::int64_t first_mono_ns_ = 0;  // of the first row; 0: none yet
 };
 
-[[nodiscard]] Result<void> write_cut_log(const std::filesystem::path& file, const std::vector<CutRow>& rows);
+[[nodiscard]] Result<void> write_cut_log(const std::filesystem::path& file, const std::vector<RecordedCut>& rows);
 
 }  // namespace osteon::haptic

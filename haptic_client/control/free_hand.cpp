@@ -89,7 +89,7 @@ Result<ReadyPlan> make_free_hand(const FreeHandOptions& options, const Case& bon
   if (!tool) return tl::unexpected(tool.error());
   if (const Result<void> held = check_held(*tool); !held) return tl::unexpected(held.error());
   const Vec3 toward = options.toward.normalized();
-  const Result<Site> site = options.at_mm ? find_site_at(bone, *options.at_mm, toward) : find_site_toward(bone, -toward);
+  const Result<EntrySite> site = options.at_mm ? find_site_at(bone, *options.at_mm, toward) : find_site_toward(bone, -toward);
   if (!site) return tl::unexpected(site.error());
   ReadyPlan ready;
   ReadyStep step;

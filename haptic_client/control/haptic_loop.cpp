@@ -325,7 +325,7 @@ HapticLoop::Left HapticLoop::meet(const LoopInput& input, const Left& left, Loop
   // a hand of another number. And whoever leads this hand is where it is.
   std::array<PartnerTool, PartnerContact::kMost> others;
   std::size_t count = 0;
-  const Oversight& oversight = overseer_.now();
+  const HapticRestrictions& oversight = overseer_.now();
   for (const PartnerTool& partner : partners_)
     if (count < others.size() && !oversight.taken_by && partner.author != oversight.guide.value) others[count++] = partner;
   const PartnerForce felt = partner_contact_.step(touch_points_[static_cast<std::size_t>(tool_)], report.pose_bone_proxy,
@@ -339,7 +339,7 @@ HapticLoop::Left HapticLoop::meet(const LoopInput& input, const Left& left, Loop
 }
 
 void HapticLoop::lead(const LoopInput& input, const Left& left, LoopReport& report) noexcept {
-  const Oversight& oversight = overseer_.now();
+  const HapticRestrictions& oversight = overseer_.now();
   GuideSeen seen = guide_seen_;
   seen.there &= static_cast<bool>(oversight.guide);
   guide_pull_.see(seen);

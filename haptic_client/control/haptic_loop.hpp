@@ -14,10 +14,10 @@
 #include "common/runtime/spsc_queue.hpp"
 #include "haptic_client/control/coupling.hpp"
 #include "haptic_client/control/cut_recorder.hpp"
-#include "haptic_client/control/guide_pull.hpp"
+#include "haptic_client/control/guidance_spring.hpp"
 #include "haptic_client/control/guiding.hpp"
 #include "haptic_client/control/motor_port.hpp"
-#include "haptic_client/control/oversight.hpp"
+#include "haptic_client/control/supervision_guard.hpp"
 #include "haptic_client/control/partner_contact.hpp"
 #include "haptic_client/control/proxy.hpp"
 #include "haptic_client/control/workspace_mapping.hpp"
@@ -123,7 +123,7 @@ class HapticLoop {
   // [haptic] Takes up a tool in free air, with the handle at a place of the device; by the bone as it rests.
   void take_up(int tool, const Pose& pose_rest_tool, const WorkspaceMapping& mapping) noexcept;
   // [haptic] What holds from the next tick on, until told otherwise.
-  void oversee(const Oversight& oversight) noexcept { overseer_.set(oversight); }
+  void oversee(const HapticRestrictions& oversight) noexcept { overseer_.set(oversight); }
   void oversee(const StopFlag& flag) noexcept { overseer_.set(flag); }
   void see_guide(const GuideSeen& seen) noexcept { guide_seen_ = seen; }  // of whom the oversight names
   // Where the bone is on its mount, seen from where it rests: there by its own frame. As it rests unless this was called. The
@@ -144,7 +144,7 @@ class HapticLoop {
   [[nodiscard]] const WorkspaceMapping& mapping() const noexcept { return mapping_; }
   [[nodiscard]] std::uint64_t cuts_closed() const noexcept { return cuts_closed_; }
   // [haptic]
-  [[nodiscard]] const Overseer& overseer() const noexcept { return overseer_; }
+  [[nodiscard]] const SupervisionGuard& overseer() const noexcept { return overseer_; }
   [[nodiscard]] const EnergyReport& guide_energy() const noexcept { return guide_pull_.energy(); }
   // [haptic] K_c of the tool in hand, physical: where the tool moves m mm for each mm of the handle, the device shows
   // m · s · K_c, which its k limits.
@@ -196,8 +196,8 @@ class HapticLoop {
   Coupling coupling_;
   EnergyLedger ledger_;
   MotorPort motor_;
-  Overseer overseer_;
-  GuidePull guide_pull_;
+  SupervisionGuard overseer_;
+  GuidanceSpring guide_pull_;
   GuideSeen guide_seen_;
   std::vector<TouchPoints> touch_points_; // of each tool; none: partners are not felt
   PartnerContact partner_contact_;

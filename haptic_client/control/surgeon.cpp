@@ -25,7 +25,7 @@ double depth_mm(const ReadyStep& step, const Vec3& tip_mm) { return (tip_mm - st
 
 std::string at_step(std::size_t index) { return "step " + std::to_string(index + 1) + ": "; }
 
-Result<Site> find_site(const Case& bone, const PlanEntry& entry, const Site* last) {
+Result<EntrySite> find_site(const Case& bone, const PlanEntry& entry, const EntrySite* last) {
   if (entry.toward) return find_site_toward(bone, *entry.toward);
   if (entry.point_mm && entry.axis) return find_site_at(bone, *entry.point_mm, *entry.axis);
   if (entry.beside_last_mm) {
@@ -74,7 +74,7 @@ double most_s(const ReadyStep& step, SurgeonPhase phase) {
 
 // Back and forth over the window, pass below pass, following the imported surface.
 void plan_sweep(const Case& bone, const Tool& tool, ReadyStep& step) {
-  const Site& site = step.site;
+  const EntrySite& site = step.site;
   const double radius = 0.5 * tool.diameter_mm;
   // Tilted about v, so that the flank cuts; the sphere stays where it is.
   const Eigen::Quaterniond upright = pose_along(Vec3::Zero(), site.axis).rotation;
@@ -133,7 +133,7 @@ Result<void> suits(const Tool& tool, Action action) {
 }
 
 // A guide with its face on the bone at a site, its z axis into the bone, x and y along the site's.
-PlacedGuide stand(const Tool& guide, const Site& site, std::uint32_t id) {
+PlacedGuide stand(const Tool& guide, const EntrySite& site, std::uint32_t id) {
   Eigen::Matrix3d axes;
   axes << site.across_u, site.across_v, site.axis;
   return placed_guide(id, guide, {site.entry_mm, Eigen::Quaterniond(axes).normalized()});
@@ -148,7 +148,7 @@ const GuideBore* hole_for(const PlacedGuide& guide, const Tool& tool) {
 }
 
 // Where a tool that goes through the guide meets the bone.
-Result<Site> find_site_through(const Case& bone, const std::vector<PlacedGuide>& guides, const Tool& tool, double& length_mm) {
+Result<EntrySite> find_site_through(const Case& bone, const std::vector<PlacedGuide>& guides, const Tool& tool, double& length_mm) {
   if (guides.empty()) return failure(ErrorCode::invalid_input, "\"guide\" needs a step before it that places a guide");
   const GuideBore* hole = hole_for(guides.back(), tool);
   if (!hole) return failure(ErrorCode::invalid_input, sentence(tool, "does not go through the guide placed last; choose one that fits its hole"));
@@ -158,7 +158,7 @@ Result<Site> find_site_through(const Case& bone, const std::vector<PlacedGuide>&
 }
 
 // One step with its site found. `last`: the site of the step before, or null.
-Result<ReadyStep> make_ready(const PlanStep& plan, const Case& bone, const ToolFinder& find, const Site* last, ReadyPlan& ready) {
+Result<ReadyStep> make_ready(const PlanStep& plan, const Case& bone, const ToolFinder& find, const EntrySite* last, ReadyPlan& ready) {
   ReadyStep step;
   step.plan = plan;
   if (plan.action == Action::wait) return step;
@@ -166,7 +166,7 @@ Result<ReadyStep> make_ready(const PlanStep& plan, const Case& bone, const ToolF
   if (!tool) return tl::unexpected(tool.error());
   if (const Result<void> suited = suits(*tool, plan.action); !suited) return tl::unexpected(suited.error());
   double guide_length_mm = 0.0;
-  const Result<Site> site = plan.through_guide ? find_site_through(bone, ready.guides, *tool, guide_length_mm) : find_site(bone, plan.entry, last);
+  const Result<EntrySite> site = plan.through_guide ? find_site_through(bone, ready.guides, *tool, guide_length_mm) : find_site(bone, plan.entry, last);
   if (!site) return tl::unexpected(site.error());
   step.site = *site;
   step.stand_off_mm = kStandOff_mm + guide_length_mm;
@@ -208,7 +208,7 @@ Result<ReadyStep> make_ready(const PlanStep& plan, const Case& bone, const ToolF
 
 Result<ReadyPlan> make_ready(const std::vector<PlanStep>& plan, const Case& bone, const ToolFinder& find) {
   ReadyPlan ready;
-  const Site* last = nullptr;
+  const EntrySite* last = nullptr;
   ready.steps.reserve(plan.size());  // `last` points into it
   for (std::size_t i = 0; i < plan.size(); ++i) {
     Result<ReadyStep> step = make_ready(plan[i], bone, find, last, ready);
@@ -307,7 +307,7 @@ HandParams Surgeon::hand_for(const PlanStep& plan) {
 }
 
 WorkspaceMapping Surgeon::mapping_for(const ReadyStep& step, double workspace_radius_mm, double stiff_enough) {
-  const Site& site = step.site;
+  const EntrySite& site = step.site;
   // The view looks along the tool: the device's z comes out of the bone.
   Eigen::Matrix3d view;
   view.col(0) = site.across_u;
@@ -506,7 +506,7 @@ bool Surgeon::give_up(const ReadyStep& step, const LoopReport& report) noexcept 
 }
 
 void Surgeon::tremble(const ReadyStep& step, SurgeonOrder& order) const noexcept {
-  const Site& site = step.site;
+  const EntrySite& site = step.site;
   const Stray place = stray(time_s_, 0.0), tilt = stray(time_s_, 1.3);
   order.hand.target_mm += step.plan.tremor_mm * (place.u * site.across_u + place.v * site.across_v);
   const Vec3 turn_rad = (step.plan.tremor_mm / kTremorArm_mm) * (tilt.u * site.across_u + tilt.v * site.across_v);

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "common/core/digest.hpp"
-#include "common/mechanics/hand.hpp"
+#include "common/mechanics/simulated_hand.hpp"
 #include "haptic_client/control/haptic_loop.hpp"
-#include "haptic_client/control/site.hpp"
+#include "haptic_client/control/entry_site.hpp"
 
 namespace osteon::haptic {
 
@@ -49,7 +49,7 @@ struct PlanStep {
 // A step with its place on the bone found and its path worked out.
 struct ReadyStep {
   PlanStep plan;
-  Site site;
+  EntrySite site;
   int tool = 0;                       // place in the loop's tools
   double spindle_rpm = 0;
   double stand_off_mm = 0;            // where the tool is taken up, above the surface

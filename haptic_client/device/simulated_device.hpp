@@ -3,7 +3,7 @@
 #include <string>
 
 #include "common/core/result.hpp"
-#include "common/mechanics/hand.hpp"
+#include "common/mechanics/simulated_hand.hpp"
 #include "haptic_client/device/haptic_device.hpp"
 
 namespace osteon::haptic {

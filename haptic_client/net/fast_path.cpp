@@ -70,7 +70,7 @@ bool FastPath::send(const CuttingState& state) {
   return link_.alive(now_of_links());
 }
 
-bool FastPath::send(const BonePush& push) {
+bool FastPath::send(const MountLoad& push) {
   bool goes = false;
   {
     const std::lock_guard lock(mutex_);
@@ -127,7 +127,7 @@ void FastPath::run() {
     Time wait = kLongestWait;
     bool died = false, frozen = false, came = false;
     std::uint64_t epoch = 0;
-    std::optional<BoneSeen> bone;
+    std::optional<MountPose> bone;
     {
       const std::lock_guard lock(mutex_);
       if (end_) return;

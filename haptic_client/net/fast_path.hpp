@@ -24,7 +24,7 @@ struct FastPathEvents {
   // Datagrams do not get through any more, so that what went only in them has to go over the stream.
   std::function<void()> dead;
   std::function<void(const CuttingState&)> partner{};  // a newer state of another's tool
-  std::function<void(const BoneSeen&)> bone{};         // a newer place of the bone on its mount
+  std::function<void(const MountPose&)> bone{};         // a newer place of the bone on its mount
   // Whether the newest datagram says that the hand may not cut, where that has changed or the lease's epoch has.
   std::function<void(std::uint64_t lease_epoch, bool frozen)> stop_flag{};
 };
@@ -44,7 +44,7 @@ class FastPath {
   // Every cut in order, and again where it was not decided. False: it has to go over the stream.
   [[nodiscard]] bool send(const Cut& cut);
   [[nodiscard]] bool send(const CuttingState& state);
-  [[nodiscard]] bool send(const BonePush& push);
+  [[nodiscard]] bool send(const MountLoad& push);
   // What came over the stream: a row, and the newest own cut that is decided.
   void heard(std::uint64_t index);
   void decided(std::uint64_t author_seq);

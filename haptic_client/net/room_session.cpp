@@ -196,7 +196,7 @@ struct RoomSession::Impl {
   Case bone;
   const RoomSessionOptions options;
   std::shared_ptr<ToolBox> tools = builtin_tool_box();  // shared with the replica's fields
-  RoomEvents events;
+  RoomCallbacks events;
 
   std::unique_ptr<v1::CuttingService::Stub> stub;
   std::thread thread;
@@ -219,7 +219,7 @@ struct RoomSession::Impl {
   std::condition_variable wake;
   Line* line = nullptr;                       // the open one
   CutsUnderway underway{kMaxWaitingCuts};
-  std::optional<BonePush> push;               // for the stream
+  std::optional<MountLoad> push;               // for the stream
   std::chrono::steady_clock::time_point next_push{};
   std::optional<std::chrono::milliseconds> redial;  // the server stops in good order: when to come again
   bool closing = false, over = false;
@@ -234,7 +234,7 @@ void RoomSession::Impl::write(Line& open) {
   bool written = open.stream->Write(request);
   std::optional<Cut> cut;
   std::optional<CuttingState> state;
-  std::optional<BonePush> push_now;
+  std::optional<MountLoad> push_now;
   std::uint64_t told = 0;
   auto tell_at = std::chrono::steady_clock::now();
   while (written) {
@@ -500,12 +500,12 @@ Result<std::uint32_t> RoomSession::set_item(const SceneItem& item) {
                  "the server does not set the item: " + status.error_message());
 }
 
-void RoomSession::open(RoomEvents events) {
+void RoomSession::open(RoomCallbacks events) {
   OSTEON_CHECK(!impl_->stub);
   Impl& impl = *impl_;
   // By datagram and by stream: one at a time.
   if (events.bone)
-    events.bone = [this_one = std::make_shared<std::mutex>(), tell = std::move(events.bone)](const BoneSeen& seen) {
+    events.bone = [this_one = std::make_shared<std::mutex>(), tell = std::move(events.bone)](const MountPose& seen) {
       const std::lock_guard lock(*this_one);
       tell(seen);
     };
@@ -539,7 +539,7 @@ void RoomSession::send(const CuttingState& state) {
   impl_->wake.notify_all();
 }
 
-void RoomSession::send(const BonePush& push) {
+void RoomSession::send(const MountLoad& push) {
   if (const std::shared_ptr<FastPath> path = impl_->fast_path(); path && path->send(push)) return;
   const auto now = std::chrono::steady_clock::now();
   const std::lock_guard lock(impl_->mutex);

@@ -17,7 +17,7 @@
 #include "common/tools/tool_box.hpp"
 #include "common/volume/case.hpp"
 #include "common/wire/room_client.hpp"
-#include "haptic_client/net/room_events.hpp"
+#include "haptic_client/net/room_callbacks.hpp"
 
 namespace osteon {
 
@@ -62,14 +62,14 @@ class RoomSession {
   [[nodiscard]] Result<std::uint32_t> set_item(const SceneItem& item);
 
   // Opens the stream; once. From now on `events` are called.
-  void open(RoomEvents events);
+  void open(RoomCallbacks events);
   // Any thread but the haptic and audio ones: these lock and allocate.
   // In order of the calls. False when kMaxWaitingCuts are not decided yet or the session is lost; the cut is then not taken.
   [[nodiscard]] bool send(const Cut& cut);
   // Newest wins: a state that is still waiting is replaced. Cuts that are waiting go first.
   void send(const CuttingState& state);
   // Newest wins; of a room without a mount nothing comes of it. Where datagrams do not get through, 30 a second go.
-  void send(const BonePush& push);
+  void send(const MountLoad& push);
   [[nodiscard]] FastPathHealth fast_path() const;
   // Ends the stream after what is waiting was sent, at most a second, and joins the thread. Again: does nothing.
   void close();

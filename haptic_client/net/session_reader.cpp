@@ -19,7 +19,7 @@ std::vector<BodyId> bodies_of(const google::protobuf::RepeatedField<std::uint32_
 
 }  // namespace
 
-SessionReader::SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomEvents events,
+SessionReader::SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomCallbacks events,
                              std::function<void(std::uint64_t)> decided, std::function<void(std::uint64_t)> complete)
     : own_(own), tools_(std::move(tools)), events_(std::move(events)), decided_(std::move(decided)), complete_(std::move(complete)) {}
 
@@ -175,7 +175,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       return {};
     case v1::SessionResponse::kSupervised: {
       const v1::Supervised& row = response.supervised();
-      const Result<Supervision> supervision = wire::from_wire(row.supervision());
+      const Result<Restrictions> supervision = wire::from_wire(row.supervision());
       if (!supervision) return tl::unexpected(supervision.error());
       supervised({RoomSeq{row.room_seq()}, *supervision, row.lease_epoch(), {AuthorId{row.decided_by()}, row.decided_by_name()}});
       return {};
@@ -193,7 +193,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       return {};
     }
     case v1::SessionResponse::kBone: {
-      const Result<BoneSeen> seen = wire::from_wire(response.bone());
+      const Result<MountPose> seen = wire::from_wire(response.bone());
       if (!seen) return tl::unexpected(seen.error());
       if (events_.bone) events_.bone(*seen);
       return {};

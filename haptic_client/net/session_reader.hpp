@@ -11,7 +11,7 @@
 #include "common/tools/tool_box.hpp"
 #include "common/wire/cut_run.hpp"
 #include "common/wire/room_client.hpp"
-#include "haptic_client/net/room_events.hpp"
+#include "haptic_client/net/room_callbacks.hpp"
 #include "osteon/v1/cutting.pb.h"
 
 namespace osteon {
@@ -22,7 +22,7 @@ class SessionReader {
  public:
   // `decided`: own cuts up to a number are decided; `complete`: the same, and from here on cuts may be sent. Both are called
   // before the event itself.
-  SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomEvents events, std::function<void(std::uint64_t)> decided,
+  SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomCallbacks events, std::function<void(std::uint64_t)> decided,
                 std::function<void(std::uint64_t)> complete);
 
   // A stream begins: its leaves and rows count anew, and so does place(), as the server may have lost the end of what an
@@ -53,7 +53,7 @@ class SessionReader {
 
   const AuthorId own_;
   const std::shared_ptr<ToolBox> tools_;  // shared with the replica's fields
-  const RoomEvents events_;
+  const RoomCallbacks events_;
   const std::function<void(std::uint64_t)> decided_, complete_;
   ReceiveWindow<Row> rows_;
   std::optional<wire::DurableSeq> kept_;

@@ -12,7 +12,7 @@
 namespace osteon {
 
 CLI::App* add_asking_command(CLI::App& parent, const char* name, const char* what, std::function<Result<void>()>& chosen,
-                             std::function<Result<void>(RoomsClient&)> run) {
+                             std::function<Result<void>(RoomAdminClient&)> run) {
   struct Arguments {
     std::string server;
     wire::CredentialArguments credentials;
@@ -26,7 +26,7 @@ CLI::App* add_asking_command(CLI::App& parent, const char* name, const char* wha
       // What the server is asked may take long: Ctrl-C ends this program, and the server goes on.
       const Result<wire::ClientCredentials> credentials = wire::client_credentials(given->credentials);
       if (!credentials) return tl::unexpected(credentials.error());
-      Result<RoomsClient> client = RoomsClient::reach(given->server, std::chrono::seconds(5), {}, *credentials);
+      Result<RoomAdminClient> client = RoomAdminClient::reach(given->server, std::chrono::seconds(5), {}, *credentials);
       if (!client) return tl::unexpected(client.error());
       return run(*client);
     };

@@ -20,20 +20,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void print(const RoomsClient::CaseLine& one) {
+void print(const RoomAdminClient::CaseLine& one) {
   std::printf("%s  %8.1f MB  [%s]%s\n", to_hex(one.hash).c_str(), static_cast<double>(one.bytes) / 1e6, one.title.c_str(),
               one.known ? "  was here before" : "");
 }
 
-Result<void> list(RoomsClient& client) {
+Result<void> list(RoomAdminClient& client) {
   const auto all = client.cases();
   if (!all) return tl::unexpected(all.error());
-  for (const RoomsClient::CaseLine& one : *all) print(one);
+  for (const RoomAdminClient::CaseLine& one : *all) print(one);
   return {};
 }
 
 // A folder is packed first, into a file that is gone afterwards.
-Result<void> upload(RoomsClient& client, const fs::path& from) {
+Result<void> upload(RoomAdminClient& client, const fs::path& from) {
   fs::path archive = from;
   std::error_code error;
   struct Packed {
@@ -65,7 +65,7 @@ void add_case_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
   add_asking_command(*cases, "list", "Lists them all", chosen, list);
   const auto from = std::make_shared<fs::path>();  // shared by the option and by what runs
   add_asking_command(*cases, "upload", "Sends a case to the server, which looks it through and keeps it", chosen,
-                     [from](RoomsClient& client) { return upload(client, *from); })
+                     [from](RoomAdminClient& client) { return upload(client, *from); })
       ->add_option("case", *from, "Folder of a case, as osteon-import writes it, or a zip archive of one")
       ->required();
 }

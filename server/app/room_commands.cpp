@@ -37,7 +37,7 @@ Result<void> print(const Result<RoomLine>& room) {
   return {};
 }
 
-Result<void> list(RoomsClient& rooms, const Arguments&) {
+Result<void> list(RoomAdminClient& rooms, const Arguments&) {
   const Result<std::vector<RoomLine>> all = rooms.list();
   if (!all) return tl::unexpected(all.error());
   for (const RoomLine& room : *all) print(room);
@@ -45,8 +45,8 @@ Result<void> list(RoomsClient& rooms, const Arguments&) {
   return {};
 }
 
-Result<void> verify(RoomsClient& rooms, const Arguments& given) {
-  const Result<RoomsClient::Checked> checked = rooms.verify(given.name);
+Result<void> verify(RoomAdminClient& rooms, const Arguments& given) {
+  const Result<RoomAdminClient::Checked> checked = rooms.verify(given.name);
   if (!checked) return tl::unexpected(checked.error());
   std::printf("events:      %llu\nchain:       %s\nfield hash:  %s\ncheckpoints: %u\n",
               static_cast<unsigned long long>(checked->room_seq.value), to_hex(checked->chain).c_str(),
@@ -59,14 +59,14 @@ Result<void> verify(RoomsClient& rooms, const Arguments& given) {
   return {};
 }
 
-Result<void> back_up(RoomsClient& rooms, const Arguments& given) {
-  const Result<RoomsClient::Copied> copied = rooms.back_up(given.name, given.file_name);
+Result<void> back_up(RoomAdminClient& rooms, const Arguments& given) {
+  const Result<RoomAdminClient::Copied> copied = rooms.back_up(given.name, given.file_name);
   if (!copied) return tl::unexpected(copied.error());
   std::printf("%s: %llu events\n", copied->file.c_str(), static_cast<unsigned long long>(copied->room_seq.value));
   return {};
 }
 
-Result<void> remove(RoomsClient& rooms, const Arguments& given) {
+Result<void> remove(RoomAdminClient& rooms, const Arguments& given) {
   const Result<std::vector<std::string>> gone = rooms.remove(given.name, given.with_branches);
   if (!gone) return tl::unexpected(gone.error());
   for (const std::string& name : *gone) std::printf("deleted: %s\n", name.c_str());
@@ -79,9 +79,9 @@ void add_room_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
   const auto given = std::make_shared<Arguments>();  // shared by the options and by what runs
   CLI::App* rooms = app.add_subcommand("rooms", "Makes, lists, closes, branches, shows again, checks, copies and deletes the rooms of a server that runs");
   rooms->require_subcommand(1);
-  using Run = Result<void> (*)(RoomsClient&, const Arguments&);
+  using Run = Result<void> (*)(RoomAdminClient&, const Arguments&);
   const auto command = [&](const char* name, const char* what, Run run) {
-    return add_asking_command(*rooms, name, what, chosen, [given, run](RoomsClient& client) { return run(client, *given); });
+    return add_asking_command(*rooms, name, what, chosen, [given, run](RoomAdminClient& client) { return run(client, *given); });
   };
   const auto of_room = [&](const char* name, const char* what, Run run) {
     CLI::App* sub = command(name, what, run);
@@ -89,15 +89,15 @@ void add_room_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
     return sub;
   };
   command("list", "Lists them all", list);
-  of_room("create", "Makes a room and opens it", [](RoomsClient& c, const Arguments& a) { return print(c.create(a.name, a.case_hash)); })
+  of_room("create", "Makes a room and opens it", [](RoomAdminClient& c, const Arguments& a) { return print(c.create(a.name, a.case_hash)); })
       ->add_option("--case-hash", given->case_hash, "Which of the server's cases, where it has several; as its log says it");
-  of_room("close", "Ends a room for those in it; what it keeps stays", [](RoomsClient& c, const Arguments& a) { return print(c.close(a.name)); });
-  of_room("resume", "Opens a closed room where it was left", [](RoomsClient& c, const Arguments& a) { return print(c.resume(a.name)); });
+  of_room("close", "Ends a room for those in it; what it keeps stays", [](RoomAdminClient& c, const Arguments& a) { return print(c.close(a.name)); });
+  of_room("resume", "Opens a closed room where it was left", [](RoomAdminClient& c, const Arguments& a) { return print(c.resume(a.name)); });
   CLI::App* branch = of_room("branch", "Makes a room of its own from what another was at an event",
-                             [](RoomsClient& c, const Arguments& a) { return print(c.branch(a.name, a.new_name, RoomSeq{a.to})); });
+                             [](RoomAdminClient& c, const Arguments& a) { return print(c.branch(a.name, a.new_name, RoomSeq{a.to})); });
   branch->add_option("new", given->new_name, "Name of the branch")->required();
   branch->add_option("--at", given->to, "room_seq of the last event that it takes over; all by default");
-  CLI::App* replay = of_room("replay", "Opens a room in which what happened in another happens again, for viewers", [](RoomsClient& c, const Arguments& a) {
+  CLI::App* replay = of_room("replay", "Opens a room in which what happened in another happens again, for viewers", [](RoomAdminClient& c, const Arguments& a) {
     return print(c.replay(a.name, a.new_name, RoomSeq{a.from}, RoomSeq{a.to}, a.speed));
   });
   replay->add_option("new", given->new_name, "Name of the room that shows it")->required();

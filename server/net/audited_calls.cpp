@@ -58,7 +58,7 @@ void describe_joined(const void* message, AuditEvent& event) {
 // What holds from now on. Not the words: they are in the journal, from which they can be erased.
 void describe_supervision(const void* message, AuditEvent& event) {
   const auto& request = *static_cast<const v1::SuperviseRequest*>(message);
-  const v1::Supervision& all = request.supervision();
+  const v1::Restrictions& all = request.supervision();
   event.detail = request.subject() == 0 ? "all hands:" : "author " + std::to_string(request.subject()) + ":";
   if (all.stopped()) event.detail += " stopped";
   if (all.taken_by() != 0) event.detail += " tool taken";

@@ -23,7 +23,7 @@ void BoneMount::leave(AuthorId author) {
   bone_.leave(author.value);
 }
 
-void BoneMount::push(AuthorId author, const BonePush& push) {
+void BoneMount::push(AuthorId author, const MountLoad& push) {
   const std::lock_guard lock(mutex_);
   (void)bone_.receive(author.value, push);
 }
@@ -38,7 +38,7 @@ bool BoneMount::step(std::chrono::nanoseconds now) {
   return true;
 }
 
-BoneSeen BoneMount::seen(AuthorId author) {
+MountPose BoneMount::seen(AuthorId author) {
   const std::lock_guard lock(mutex_);
   return bone_.seen(author.value);
 }

@@ -191,7 +191,7 @@ Result<What> read(const v1::ToolDefinition& row) {
 }
 
 Result<What> read(const v1::JournalSupervision& row) {
-  Result<Supervision> set = wire::from_wire(row.supervision());
+  Result<Restrictions> set = wire::from_wire(row.supervision());
   if (!set) return tl::unexpected(set.error());
   return SuperviseRow{AuthorId{row.subject()}, std::move(*set)};
 }

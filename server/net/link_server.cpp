@@ -83,7 +83,7 @@ bool SessionLink::set_partners(std::span<const CuttingState> partners) {
   return true;
 }
 
-bool SessionLink::set_bone(const BoneSeen& seen) {
+bool SessionLink::set_bone(const MountPose& seen) {
   {
     const std::lock_guard lock(mutex_);
     if (!link_.alive(now_of_links())) return false;

@@ -29,7 +29,7 @@ class SessionLink {
     // Cuts in order of their author_seq, whichever way they came: over the link, or by offer().
     virtual void take(Cut cut) = 0;
     virtual void take(CuttingState state) = 0;
-    virtual void pushed(const BonePush& /*push*/) {}  // on the bone on its mount, the newest
+    virtual void pushed(const MountLoad& /*push*/) {}  // on the bone on its mount, the newest
     // The client has rows up to this one.
     virtual void arrived(std::uint64_t index) = 0;
   };
@@ -46,7 +46,7 @@ class SessionLink {
   // Newest states of others' tools. False: nothing gets through now, so they are for the stream to tell.
   bool set_partners(std::span<const CuttingState> partners);
   // Where the bone stands on its mount. False as above.
-  bool set_bone(const BoneSeen& seen);
+  bool set_bone(const MountPose& seen);
   // Nothing is told to the sink any more once this returns.
   void close();
 
@@ -56,7 +56,7 @@ class SessionLink {
   struct News {
     std::vector<Cut> cuts;
     std::optional<CuttingState> state;
-    std::optional<BonePush> push;
+    std::optional<MountLoad> push;
     std::uint64_t arrived = 0;
   };
   [[nodiscard]] News news();  // under mutex_

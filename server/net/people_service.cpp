@@ -86,7 +86,7 @@ class PeopleServiceImpl final : public PeopleBase {
                                       v1::SuperviseResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     if (!admitted<v1::SuperviseRequest>(rooms_, *context, reactor)) return reactor;
-    const Result<Supervision> word = wire::from_wire(request->supervision());
+    const Result<Restrictions> word = wire::from_wire(request->supervision());
     if (!word) return refuse(reactor, invalid(word.error().message));
     const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;

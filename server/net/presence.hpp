@@ -80,7 +80,7 @@ class Presence {
     Role role = Role::none;
     bool hand = false;
     int streams = 0;
-    Supervision supervision;
+    Restrictions supervision;
     RoomSeq decided, heard;
     AuthorId decided_by;
     std::optional<ViewFrustum> look;

@@ -90,7 +90,7 @@ Bytes scene_row(RoomSeq place, const std::vector<SceneItem>& items) {
   return serialised(response);
 }
 
-Bytes supervised_row(RoomSeq place, const Supervision& supervision, std::uint64_t lease_epoch, const Decider& by) {
+Bytes supervised_row(RoomSeq place, const Restrictions& supervision, std::uint64_t lease_epoch, const Decider& by) {
   v1::SessionResponse response;
   response.mutable_supervised()->set_room_seq(place.value);
   *response.mutable_supervised()->mutable_supervision() = wire::to_wire(supervision);
@@ -115,7 +115,7 @@ Bytes partner_row(const CuttingState& state) {
   return serialised(response);
 }
 
-Bytes bone_row(const BoneSeen& seen) {
+Bytes bone_row(const MountPose& seen) {
   v1::SessionResponse row;
   *row.mutable_bone() = wire::to_wire(seen);
   return serialised(row);

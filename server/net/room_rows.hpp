@@ -7,7 +7,7 @@
 
 #include "common/link/sealed.hpp"
 #include "common/mechanics/cutting_state.hpp"
-#include "common/mechanics/passivity.hpp"
+#include "common/mechanics/compliant_mount.hpp"
 #include "server/journal/chain.hpp"
 #include "server/net/send_queue.hpp"
 #include "server/room/room.hpp"
@@ -26,10 +26,10 @@ namespace osteon {
 [[nodiscard]] Bytes tool_row(RoomSeq place, const Tool& tool, std::uint32_t number);
 [[nodiscard]] Bytes scene_row(RoomSeq place, const std::vector<SceneItem>& items);
 // What an instructor has decided; `place` null: what held before. `by`: who, as far as it is known.
-[[nodiscard]] Bytes supervised_row(RoomSeq place, const Supervision& supervision, std::uint64_t lease_epoch, const Decider& by);
+[[nodiscard]] Bytes supervised_row(RoomSeq place, const Restrictions& supervision, std::uint64_t lease_epoch, const Decider& by);
 [[nodiscard]] Bytes said_row(RoomSeq place, AuthorId from, const WordsRow& words);
 [[nodiscard]] Bytes partner_row(const CuttingState& state);
-[[nodiscard]] Bytes bone_row(const BoneSeen& seen);
+[[nodiscard]] Bytes bone_row(const MountPose& seen);
 [[nodiscard]] Bytes noted_row(RoomSeq place, const std::string& mark);
 [[nodiscard]] MessageParts change_rows(const RoomEvent& event);  // at least one; each of a bounded size
 

@@ -10,7 +10,7 @@
 
 #include "common/core/result.hpp"
 #include "common/mechanics/cutting_state.hpp"
-#include "common/mechanics/passivity.hpp"
+#include "common/mechanics/compliant_mount.hpp"
 #include "common/runtime/tick_stats.hpp"
 #include "common/surface/view_frustum.hpp"
 #include "common/wire/cut_run.hpp"
@@ -44,7 +44,7 @@ class SessionSubscriber : public Subscriber {
   // Whether it pushes the bone on its mount and is pushed by it: whoever is not takes nothing of what others put into it.
   [[nodiscard]] virtual bool feels_bone() const { return true; }
   // [tick] Where the bone stands on its mount, to this one.
-  virtual void show_bone(const BoneSeen& /*seen*/) {}
+  virtual void show_bone(const MountPose& /*seen*/) {}
   // What holds for the hand from the beginning, as a row that has no number: after begin().
   virtual void hold(const wire::SessionRow& /*supervised*/) {}
   // A tool's number in few bytes: after begin() for those of the room, and before the row that adds another.
@@ -163,7 +163,7 @@ class RoomRuntime {
   // Queued until the next tick. The sink, kept alive until then, hears the outcome.
   void queue_cut(std::shared_ptr<SessionSubscriber> sink, Cut cut, Clock::time_point arrived);
   void offer_state(CuttingState state);  // newest of its author wins
-  void push_bone(AuthorId author, const BonePush& push);  // likewise; of no effect where there is no mount
+  void push_bone(AuthorId author, const MountLoad& push);  // likewise; of no effect where there is no mount
   // Queued until the next tick too, behind the cuts that came before. `answer` is called there and must return at once;
   // by then every session has been told. Error unavailable: the room has stopped.
   void queue_event(std::function<Result<RoomEvent>(Room&)> change, std::function<void(const Result<RoomEvent>&)> answer);

@@ -18,7 +18,7 @@
 #include "server/net/job_thread.hpp"
 #include "server/net/mesh_publisher.hpp"
 #include "server/net/presence.hpp"
-#include "server/net/piece_watch.hpp"
+#include "server/net/fragment_detector.hpp"
 #include "server/net/room_runtime.hpp"
 #include "server/net/room_rows.hpp"
 #include "server/net/state_publisher.hpp"
@@ -45,7 +45,7 @@ struct RoomRuntime::Impl {
         committer(k ? [k](std::span<const RoomRow> rows) { return k->write(rows); } : Committer::Write{},
                   [this](const Error& why) { close_room(why); }, !driven()) {
     authors = room.authors();
-    if (rates_.mount && !p) mount.emplace(SharedBoneParams{.mount = mount_about(room.bone().bounds().centre_mm())});
+    if (rates_.mount && !p) mount.emplace(MountServerParams{.mount = mount_about(room.bone().bounds().centre_mm())});
     if (p) player.emplace(std::move(*p), room.time());
     board.tell_hands([this](const std::vector<CuttingState>& states) { return tell_hands(states); });
   }
@@ -138,7 +138,7 @@ struct RoomRuntime::Impl {
   bool pieces_due = true, pieces_end = false;
   std::uint64_t looks_begun = 0, looks_done = 0;  // under pieces_mutex
   bool look_wanted = false;                       // someone waits for the next one
-  PieceWatch pieces{room, room_mutex, [this](std::vector<FieldLeaf>& leaves) { read_leaves(leaves); }};  // of the piece thread
+  FragmentDetector pieces{room, room_mutex, [this](std::vector<FieldLeaf>& leaves) { read_leaves(leaves); }};  // of the piece thread
 
   JobThread jobs;
 

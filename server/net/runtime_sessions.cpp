@@ -329,7 +329,7 @@ void RoomRuntime::leave(StateSubscriber& sink) {
 }
 Presence& RoomRuntime::people() { return impl_->people; }
 void RoomRuntime::offer_state(CuttingState state) { impl_->board.offer(std::move(state)); }
-void RoomRuntime::push_bone(AuthorId author, const BonePush& push) {
+void RoomRuntime::push_bone(AuthorId author, const MountLoad& push) {
   if (impl_->mount) impl_->mount->push(author, push);
 }
 

@@ -98,7 +98,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     pump();
     return partners_.waits();
   }
-  void show_bone(const BoneSeen& seen) override {
+  void show_bone(const MountPose& seen) override {
     if (is_closing() || !may_carry(DatagramContent::bone_seen)) return;
     const bool by_link = link_ && link_->set_bone(seen);
     const std::lock_guard lock(mutex_);
@@ -211,7 +211,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   void take(CuttingState state) override {
     if (may_carry(DatagramContent::tool_state)) runtime_.offer_state(std::move(state));
   }
-  void pushed(const BonePush& push) override {
+  void pushed(const MountLoad& push) override {
     if (may_carry(DatagramContent::bone_push)) runtime_.push_bone(author_, push);
   }
   void arrived(std::uint64_t index) override {
@@ -237,8 +237,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     read_on();
   }
 
-  void push(const v1::BonePush& message) {
-    const Result<BonePush> push = wire::from_wire(message);
+  void push(const v1::MountLoad& message) {
+    const Result<MountLoad> push = wire::from_wire(message);
     if (!push) return close(invalid(push.error().message));
     if (!may_carry(DatagramContent::bone_push)) return close(not_allowed());
     runtime_.push_bone(author_, *push);
@@ -355,7 +355,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   bool opened_ = false;       // only reactions to reads use it, and these come one by one
   SessionSendQueue send_queue_;
   PartnerSendQueue partners_;
-  std::optional<BoneSeen> bone_;                // newest place of the bone that the stream is to tell
+  std::optional<MountPose> bone_;                // newest place of the bone that the stream is to tell
   PartnerSendQueue::Clock::time_point next_bone_{};
   int queued_ = 0;            // cuts between reading and deciding
   std::uint64_t taken_ = 0;   // newest author_seq that was queued, here or in an earlier session

@@ -42,7 +42,7 @@ AuthorId People::newest_hand(std::uint32_t person) const {
   return {};
 }
 
-std::array<const Supervision*, 2> People::binding(AuthorId author) const {
+std::array<const Restrictions*, 2> People::binding(AuthorId author) const {
   const AuthorId hand = oversees(author) ? author : newest_hand(person(author));
   return {&supervised(author).supervision, &supervised(hand).supervision};
 }
@@ -70,7 +70,7 @@ void People::add_to(Hasher& hasher) const {
   }
   const auto whole = [&](std::int64_t value) { hasher.integer(static_cast<std::uint64_t>(value)); };
   for (const auto& [author, supervised] : supervised_) {
-    const Supervision& one = supervised.supervision;
+    const Restrictions& one = supervised.supervision;
     hasher.text("supervision");
     hasher.integer(author.value);
     hasher.integer(supervised.place.value);

@@ -8,7 +8,7 @@
 
 #include "common/access/role.hpp"
 #include "common/core/digest.hpp"
-#include "common/field/supervision.hpp"
+#include "common/field/restrictions.hpp"
 #include "common/tools/annotation.hpp"
 #include "server/room/room_row.hpp"
 
@@ -19,7 +19,7 @@ inline constexpr std::size_t kMostWordsBytes = 1024;
 class People {
  public:
   struct Supervised {
-    Supervision supervision;
+    Restrictions supervision;
     RoomSeq place;  // of the row that set it
     AuthorId by;    // who did
   };
@@ -44,7 +44,7 @@ class People {
   [[nodiscard]] const Supervised& supervised(AuthorId author) const;
   // What an author keeps to: what holds for it as a hand, then what holds for the newest hand of its person, unless it may
   // oversee others.
-  [[nodiscard]] std::array<const Supervision*, 2> binding(AuthorId author) const;
+  [[nodiscard]] std::array<const Restrictions*, 2> binding(AuthorId author) const;
   [[nodiscard]] const std::map<std::uint32_t, Annotation>& annotations() const { return annotations_; }
   [[nodiscard]] std::uint32_t last_annotation() const { return last_annotation_; }
   // The one that a new drawing of this kind takes the place of; 0: none.

@@ -81,7 +81,7 @@ RoomEvent Room::admit(MemberKind kind, std::uint32_t person, const Digest& secre
   const AuthorId author{authors_ + 1};
   const People::Supervised before = people_.supervised(people_.newest_hand(person));
   RoomEvent event = decide(author, JoinRow{author, kind, person, secret, role});
-  if (kind == MemberKind::surgeon && secret != Digest{} && before.supervision != Supervision{})
+  if (kind == MemberKind::surgeon && secret != Digest{} && before.supervision != Restrictions{})
     event.further.push_back(decide(before.by, SuperviseRow{author, before.supervision}));
   return event;
 }

@@ -121,7 +121,7 @@ class Room {
   Result<RoomEvent> split(Separation found);
   // What people decide about each other, draw and say: room_people.cpp. A trainee takes back and does again what is their
   // own; errors as above, and denied where the author's role, or what was decided about their hand, does not allow it.
-  Result<RoomEvent> supervise(AuthorId by, AuthorId subject, Supervision supervision);
+  Result<RoomEvent> supervise(AuthorId by, AuthorId subject, Restrictions supervision);
   Result<RoomEvent> annotate(AuthorId by, Annotation drawn);        // id 0: a new one; an author has one pointer
   Result<RoomEvent> wipe_off(AuthorId by, std::uint32_t annotation);  // an own one, or anyone's for an instructor
   Result<RoomEvent> say(AuthorId by, AuthorId to, std::string words);

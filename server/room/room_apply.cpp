@@ -138,7 +138,7 @@ Result<void> Room::can_follow(const RoomRow& row) const {
       return require(!mark.label.empty() && mark.label.size() <= kMostLabelBytes, "the mark has no label");
     }
     Result<void> operator()(const SuperviseRow& one) const {
-      const Supervision& set = one.supervision;
+      const Restrictions& set = one.supervision;
       bool all = room.surgeons_.contains(one.subject) && check(set).has_value();
       for (const AuthorId named : {set.taken_by, set.guide}) all = all && (!named || (room.knows(named) && named != one.subject));
       for (const Digest& tool : set.tools) all = all && room.tools_->find(tool);

@@ -14,7 +14,7 @@ std::string author_name(AuthorId author) { return "author " + std::to_string(aut
 
 }  // namespace
 
-Result<RoomEvent> Room::supervise(AuthorId by, AuthorId subject, Supervision supervision) {
+Result<RoomEvent> Room::supervise(AuthorId by, AuthorId subject, Restrictions supervision) {
   if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
   if (!people_.oversees(by)) return deny(author_name(by) + " is no instructor here");
   if (!surgeons_.contains(subject)) return failure(ErrorCode::not_found, author_name(subject) + " has no hand in this room");
@@ -27,7 +27,7 @@ Result<RoomEvent> Room::supervise(AuthorId by, AuthorId subject, Supervision sup
   for (const Digest& tool : supervision.tools)
     if (!tools_->find(tool)) return refuse("supervision.tools names " + to_hex(tool) + ", which this room does not know; add it first");
   // Who decided it may not know yet that the person has come again: what held for both alike goes on doing so.
-  const Supervision before = people_.supervised(subject).supervision;
+  const Restrictions before = people_.supervised(subject).supervision;
   const AuthorId newest = people_.role(subject) == Role::none ? subject : people_.newest_hand(people_.person(subject));
   const bool follows = newest && newest != subject && newest != supervision.taken_by && newest != supervision.guide &&
                        people_.supervised(newest).supervision == before && before != supervision;
@@ -75,7 +75,7 @@ Result<RoomEvent> Room::say(AuthorId by, AuthorId to, std::string words) {
 
 Result<void> Room::may_change(AuthorId by) const {
   if (Result<void> member = check_member(by); !member) return member;
-  for (const Supervision* held : people_.binding(by))
+  for (const Restrictions* held : people_.binding(by))
     if (!held->may_cut())
       return deny(std::string(held->stopped ? "your hand is stopped" : "your tool is taken") +
                   "; until an instructor lets you go on, you take nothing back, do nothing again, place and take away nothing");
@@ -90,7 +90,7 @@ Result<void> Room::may_cut_again(AuthorId by, const std::set<RoomSeq>& places) c
     for (auto body = bodies_.begin(); body != bodies_.end() && cut == nullptr; ++body) cut = body->second.history.find_cut(place);
     if (cut == nullptr) continue;
     const auto forbidden = [&](AuthorId whose) -> Result<void> {
-      for (const Supervision* held : people_.binding(whose))
+      for (const Restrictions* held : people_.binding(whose))
         if (const Rejection why = breach(*held, *cut); why != Rejection::none)
           return deny("event " + std::to_string(place.value) + " is a cut that " + author_name(whose) + " may not make now: " +
                       std::string(sentence(why)));
@@ -140,7 +140,7 @@ void Room::apply(const RoomRow& row, const SuperviseRow& supervise, RoomEvent& e
   event.kind = EventKind::supervise;
   event.people = supervise;
   Surgeon& surgeon = surgeons_.at(supervise.subject);
-  const Supervision& before = people_.supervised(supervise.subject).supervision;
+  const Restrictions& before = people_.supervised(supervise.subject).supervision;
   if (before.stopped != supervise.supervision.stopped || before.taken_by != supervise.supervision.taken_by) grant(surgeon);
   people_.supervise(row.place, row.author, supervise);
   event.lease_epoch = surgeon.epoch;

@@ -13,7 +13,7 @@
 #include "common/core/digest.hpp"
 #include "common/field/cut.hpp"
 #include "common/field/rejection.hpp"
-#include "common/field/supervision.hpp"
+#include "common/field/restrictions.hpp"
 #include "common/tools/annotation.hpp"
 #include "common/tools/scene_item.hpp"
 #include "common/volume/cut_history.hpp"
@@ -76,7 +76,7 @@ struct MarkRow {
 // What holds for a hand from now on. Who stops a hand or frees it, takes its tool or gives it back, ends its lease.
 struct SuperviseRow {
   AuthorId subject;
-  Supervision supervision;
+  Restrictions supervision;
 };
 // An annotation as it is from now on.
 struct AnnotationRow {

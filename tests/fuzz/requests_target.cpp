@@ -56,10 +56,10 @@ void note(const Result<Value>& value) {
 
 void look_through(const Message& message) {
   if (converts<v1::Cut>(message) || converts<v1::CuttingState>(message) || converts<v1::SceneItem>(message) ||
-      converts<v1::ToolDefinition>(message) || converts<v1::Supervision>(message) || converts<v1::Annotation>(message) ||
+      converts<v1::ToolDefinition>(message) || converts<v1::Restrictions>(message) || converts<v1::Annotation>(message) ||
       converts<v1::ViewFrustum>(message))
     return;
-  if (is<v1::BonePush>(message)) note(wire::from_wire(static_cast<const v1::BonePush&>(message)));
+  if (is<v1::MountLoad>(message)) note(wire::from_wire(static_cast<const v1::MountLoad&>(message)));
   if (is<v1::SetSceneItemRequest>(message)) note(wire::placing_from_wire(static_cast<const v1::SetSceneItemRequest&>(message)));
   if (is<v1::JoinRequest>(message)) note(wire::check_protocol_version(static_cast<const v1::JoinRequest&>(message).protocol_version()));
   const auto& reflect = *message.GetReflection();

@@ -148,7 +148,7 @@ class Changes {
     else words.clear();
   }
   void change(SuperviseRow& row) {
-    Supervision& set = row.supervision;
+    Restrictions& set = row.supervision;
     switch (below(9)) {
       case 0: number(row.subject.value); break;
       case 1: set.stopped = !set.stopped; break;

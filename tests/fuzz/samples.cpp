@@ -17,7 +17,7 @@ SceneItem an_item() {
   return item;
 }
 
-Supervision a_supervision() {
+Restrictions a_supervision() {
   return {.stopped = true, .taken_by = {2}, .guide = {3}, .guide_share = 500, .force_limit = 300, .zone = ZoneLimit{{1, 2, 3}, 1000},
           .tools = {builtin_tools()[0].hash()}, .words = "wait"};
 }

@@ -1,7 +1,7 @@
 // Sound values of what travels, for targets to begin with.
 #pragma once
 #include "common/field/cut.hpp"
-#include "common/field/supervision.hpp"
+#include "common/field/restrictions.hpp"
 #include "common/mechanics/cutting_state.hpp"
 #include "common/surface/view_frustum.hpp"
 #include "common/tools/annotation.hpp"
@@ -11,7 +11,7 @@ namespace osteon::fuzz {
 
 [[nodiscard]] Cut a_cut();  // of author 1, the first, with a drill
 [[nodiscard]] SceneItem an_item();
-[[nodiscard]] Supervision a_supervision();
+[[nodiscard]] Restrictions a_supervision();
 [[nodiscard]] Annotation an_annotation();
 [[nodiscard]] CuttingState a_state();
 [[nodiscard]] ViewFrustum a_look();

@@ -217,7 +217,7 @@ std::vector<Target> targets() {
           evaluated_rows_target(),
           genesis_target(),
           journal_file_target(),
-          {"supervision", parse_and_convert<v1::Supervision>, {bytes_of(wire::to_wire(a_supervision()).SerializeAsString())}},
+          {"supervision", parse_and_convert<v1::Restrictions>, {bytes_of(wire::to_wire(a_supervision()).SerializeAsString())}},
           {"annotation", parse_and_convert<v1::Annotation>, {bytes_of(wire::to_wire(an_annotation()).SerializeAsString())}},
           requests_target(),
           calls_target(),

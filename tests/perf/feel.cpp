@@ -183,7 +183,7 @@ json profile(const PlanStep& step) {
   bench.run([&](const SessionTick& tick) {
     time_s += 1e-3;
     if (tick.order.phase != SurgeonPhase::sweep || tick.report.state_seq % 4 != 0) return;
-    const Site& site = bench.session().surgeon().plan().steps[0].site;
+    const EntrySite& site = bench.session().surgeon().plan().steps[0].site;
     const auto turned = [&](const Vec3& v) { return Vec3(v.dot(site.across_u), v.dot(site.across_v), v.dot(site.axis)); };
     const Vec3 f = turned(tick.report.force_physical_n), tip = turned(tick.report.pose_bone_proxy.position_mm - site.entry_mm);
     out["time_s"].push_back(rounded(time_s));

@@ -14,7 +14,7 @@
 #include "common/runtime/triple_buffer.hpp"
 #include "common/runtime/periodic.hpp"
 #include "common/runtime/realtime.hpp"
-#include "haptic_client/control/room_watch.hpp"
+#include "haptic_client/control/confirmation_monitor.hpp"
 #include "tests/unit/haptic_client/bench.hpp"
 
 namespace osteon::haptic::test {
@@ -162,7 +162,7 @@ class Blackout {
     };
     std::deque<OnTheWay> way;
     PatchBuilder builder;
-    RoomWatch watch;
+    RoomSubscription watch;
     std::uint64_t place = 0;
     while (!over_) {
       std::this_thread::sleep_for(std::chrono::milliseconds(2));

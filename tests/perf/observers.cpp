@@ -71,7 +71,7 @@ class Author {
     auto joined = RoomSession::join({.address = address, .name = "author", .patience = 20s, .cache = cache}, {});
     OSTEON_CHECK(joined.has_value());
     session_.emplace(std::move(*joined));
-    RoomEvents events;
+    RoomCallbacks events;
     events.leaf = [](const FieldLeaf&) {};
     events.complete = [this](const RoomAtJoin&) { complete_ = true; };
     events.committed = [this](RoomSeq place, const Cut& cut) {

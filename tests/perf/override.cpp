@@ -53,7 +53,7 @@ class Instructor {
     room_ = std::move(*joined);
     stub_ = v1::PeopleService::NewStub(room_.channel);
   }
-  void decide(AuthorId about, const Supervision& supervision) {
+  void decide(AuthorId about, const Restrictions& supervision) {
     v1::SuperviseRequest request;
     v1::SuperviseResponse response;
     request.set_author(room_.author.value);
@@ -97,7 +97,7 @@ json run_line(const Line& line, int times) {
   const AuthorId hand = client.room().room().author;
   const auto pause = [&] { std::this_thread::sleep_for(rest + std::chrono::microseconds(random.index(17'000))); };
   for (int i = 0; i < times && !client.over(); ++i) {
-    Supervision stopped;
+    Restrictions stopped;
     stopped.stopped = true;
     const std::int64_t asked_ns = now_ns();
     instructor.decide(hand, stopped);
@@ -140,7 +140,7 @@ Crossed run_touch(const OverseenRun& run, std::uint64_t seed, int seconds) {
   const bool drills = std::string_view(run.tool) == "drill-3.2";
   hand.pedal = true;
   hand.run(400);
-  Supervision now;
+  Restrictions now;
   constexpr double kThrough_mm = 11.0, kOut_mm = -4.0;  // of bone from 0 to 12
   Vec3 place_mm(0, 0, -3), from_mm = place_mm;  // where it drills, and where it is drawn out
   std::uint64_t seq = 0;
@@ -228,7 +228,7 @@ json run_touches(bool mount, int delay_ms, int seconds) {
           {"led_mj", worst.led_mj},
           {"budget_mj", kBudget_mj},
           {"made_mj", worst.made_mj},
-          {"allowance_mj", 2.0 * ShownBoneParams{}.allowance_mj},
+          {"allowance_mj", 2.0 * MountFollowerParams{}.allowance_mj},
           {"carried_mm", rounded(worst.carried_mm)},
           {"touching_s", 1e-3 * static_cast<double>(worst.touching)},
           {"cutting_s", 1e-3 * static_cast<double>(worst.cutting)},

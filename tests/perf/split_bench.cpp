@@ -12,7 +12,7 @@
 
 #include "common/core/check.hpp"
 #include "common/field/kernel.hpp"
-#include "server/net/piece_watch.hpp"
+#include "server/net/fragment_detector.hpp"
 #include "server/net/room_rows.hpp"
 #include "tests/support/scenes/bones.hpp"
 
@@ -44,7 +44,7 @@ int run(int samples) {
   const Case built = large_ball(radius_mm, kPitch_mm);
   Room room(built);
   std::shared_mutex mutex;
-  PieceWatch watch(room, mutex, [&](std::vector<FieldLeaf>& leaves) {
+  FragmentDetector watch(room, mutex, [&](std::vector<FieldLeaf>& leaves) {
     for (FieldLeaf& leaf : leaves) room.find_field(leaf.body)->read(leaf);
   });
   auto start = std::chrono::steady_clock::now();

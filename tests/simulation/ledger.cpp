@@ -45,12 +45,12 @@ std::optional<EventKind> kind_of(const RoomRow& row) {
 // Who has come with a hand, what holds for it, and what was cut.
 struct Ledger::Hands {
   std::map<AuthorId, std::uint32_t> persons;  // of those that cut, in the order in which they came
-  std::map<AuthorId, Supervision> held;
+  std::map<AuthorId, Restrictions> held;
   std::map<RoomSeq, const Cut*> cuts;
 
-  [[nodiscard]] Supervision of(AuthorId author) const {
+  [[nodiscard]] Restrictions of(AuthorId author) const {
     const auto found = held.find(author);
-    return found == held.end() ? Supervision{} : found->second;
+    return found == held.end() ? Restrictions{} : found->second;
   }
 };
 
@@ -137,7 +137,7 @@ void Ledger::check_author(const RoomRow& row, AuthorId author, std::uint64_t aut
 void Ledger::check_held(const RoomRow& row, const Hands& hands) {
   const bool changes = std::holds_alternative<UndoRow>(row.what) || std::holds_alternative<RedoRow>(row.what) ||
                        std::holds_alternative<ItemRow>(row.what) || std::holds_alternative<RemoveBodyRow>(row.what);
-  const Supervision now = hands.of(row.author);
+  const Restrictions now = hands.of(row.author);
   check(!changes || (!now.stopped && now.taken_by == AuthorId{}), Invariant::overseen,
         "row " + number(row.place) + " is what author " + std::to_string(row.author.value) + " did while held");
   const auto* redo = std::get_if<RedoRow>(&row.what);
@@ -147,7 +147,7 @@ void Ledger::check_held(const RoomRow& row, const Hands& hands) {
 }
 
 void Ledger::check_cut(const RoomRow& row, const Hands& hands, AuthorId by, const Cut& cut) {
-  const Supervision now = hands.of(by);
+  const Restrictions now = hands.of(by);
   const auto forbidden = [&](const std::string& why) {
     fault(Invariant::overseen, "row " + number(row.place) + " has " + whose(cut.author, cut.author_seq) + ", and author " +
                                    std::to_string(by.value) + " " + why);
@@ -163,11 +163,11 @@ void Ledger::check_cut(const RoomRow& row, const Hands& hands, AuthorId by, cons
 // Whoever starts their program again is held as they were, from the next row on.
 void Ledger::check_carried(std::span<const RoomRow> rows, std::size_t join, Hands& hands) {
   const auto& joined = std::get<JoinRow>(rows[join].what);
-  Supervision before;
+  Restrictions before;
   for (const auto& [author, person] : hands.persons)
     if (person != 0 && person == joined.person) before = hands.of(author);
   hands.persons[joined.author] = joined.person;
-  if (before == Supervision{}) return;
+  if (before == Restrictions{}) return;
   const auto* next = join + 1 < rows.size() ? std::get_if<SuperviseRow>(&rows[join + 1].what) : nullptr;
   check(next != nullptr && next->subject == joined.author && next->supervision == before, Invariant::overseen,
         "row " + number(rows[join].place) + " lets a person's new hand go, author " + std::to_string(joined.author.value));
@@ -220,8 +220,8 @@ void Ledger::check_rows(std::span<const RoomRow> rows) {
       lease[join->author] = 1;
       if (join->kind == MemberKind::surgeon) check_carried(rows, i, hands);
     } else if (const auto* decided = std::get_if<SuperviseRow>(&row.what)) {
-      Supervision& before = hands.held[decided->subject];
-      const Supervision& now = decided->supervision;
+      Restrictions& before = hands.held[decided->subject];
+      const Restrictions& now = decided->supervision;
       if (before.stopped != now.stopped || before.taken_by != now.taken_by) lease[decided->subject] = row.place.value + 1;
       before = now;
     } else if (const auto* undo = std::get_if<UndoRow>(&row.what)) {
@@ -242,8 +242,8 @@ void Ledger::check_rows(std::span<const RoomRow> rows) {
           whose(author, author_seq) + " was said to be decided, and is not kept");
 }
 
-std::map<AuthorId, Supervision> Ledger::held(std::span<const RoomRow> rows) {
-  std::map<AuthorId, Supervision> held;
+std::map<AuthorId, Restrictions> Ledger::held(std::span<const RoomRow> rows) {
+  std::map<AuthorId, Restrictions> held;
   for (const RoomRow& row : rows)
     if (const auto* decided = std::get_if<SuperviseRow>(&row.what)) held[decided->subject] = decided->supervision;
   return held;

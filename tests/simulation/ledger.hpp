@@ -61,7 +61,7 @@ class Ledger {
   // Everything that the rows of a journal can be held against.
   void check_rows(std::span<const RoomRow> rows);
   // What holds for each hand of whom anything was decided.
-  [[nodiscard]] static std::map<AuthorId, Supervision> held(std::span<const RoomRow> rows);
+  [[nodiscard]] static std::map<AuthorId, Restrictions> held(std::span<const RoomRow> rows);
   // Cuts that no undo has taken back; nothing when pieces came apart.
   [[nodiscard]] static std::optional<std::vector<Cut>> standing(std::span<const RoomRow> rows);
 

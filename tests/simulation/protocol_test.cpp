@@ -85,7 +85,7 @@ struct Rows {
   void join(std::uint64_t author, std::uint32_t person) {
     add(author, JoinRow{.author = AuthorId{author}, .kind = MemberKind::surgeon, .person = person});
   }
-  void hold(std::uint64_t subject, const Supervision& word) { add(1, SuperviseRow{AuthorId{subject}, word}); }
+  void hold(std::uint64_t subject, const Restrictions& word) { add(1, SuperviseRow{AuthorId{subject}, word}); }
   void cut(std::uint64_t author, std::uint64_t lease = 1) {
     Cut one = straight_cut(find_tool("burr-round-3.2").value(), {1, 0, 0}, {2, 0, 0}, {0, 0, -1}, ++cuts[author]);
     one.author = AuthorId{author};
@@ -107,7 +107,7 @@ struct Rows {
 const Digest kBurr = find_tool("burr-round-3.2").value().hash(), kDrill = find_tool("drill-3.2").value().hash();
 
 TEST(Ledger, FindsCutsThatWereForbidden) {
-  const auto found = [](const Supervision& word) {
+  const auto found = [](const Restrictions& word) {
     Rows all;
     all.hold(2, word);
     all.cut(2, word.may_cut() ? 1 : 4);
@@ -124,7 +124,7 @@ TEST(Ledger, FindsCutsThatWereForbidden) {
 }
 
 TEST(Ledger, FindsWhatAHeldHandTookBackOrDidAgain) {
-  const auto found = [](std::uint64_t by, const Supervision& word, bool again) {
+  const auto found = [](std::uint64_t by, const Restrictions& word, bool again) {
     Rows all;
     all.cut(2);
     if (again) all.add(1, UndoRow{{RoomSeq{3}}});
@@ -146,7 +146,7 @@ TEST(Ledger, FindsWhatAHeldHandTookBackOrDidAgain) {
 }
 
 TEST(Ledger, FindsAHandThatIsLetGoByComingAgain) {
-  const auto found = [](std::uint32_t person, std::optional<Supervision> carried) {
+  const auto found = [](std::uint32_t person, std::optional<Restrictions> carried) {
     Rows all;
     all.hold(2, {.stopped = true});
     all.join(3, person);
@@ -154,8 +154,8 @@ TEST(Ledger, FindsAHandThatIsLetGoByComingAgain) {
     return all.overseen();
   };
   EXPECT_EQ(found(8, {}), 1u);
-  EXPECT_EQ(found(8, Supervision{.stopped = true}), 0u);
-  EXPECT_EQ(found(8, Supervision{.force_limit = 1}), 1u);
+  EXPECT_EQ(found(8, Restrictions{.stopped = true}), 0u);
+  EXPECT_EQ(found(8, Restrictions{.force_limit = 1}), 1u);
   EXPECT_EQ(found(7, {}), 0u) << "whose hand is free";
   EXPECT_EQ(found(0, {}), 0u) << "nobody knows who that is";
 }

@@ -294,7 +294,7 @@ void SimClient::compare(const v1::SessionResponse& response) {
       return row.kind == wire::SessionRowKind::rejected && row.room_seq.value == response.rejected().room_seq() &&
              row.author_seq == response.rejected().author_seq() && row.lease_epoch == response.rejected().lease_epoch();
     if (response.has_supervised()) {
-      const Result<Supervision> decided = wire::from_wire(response.supervised().supervision());
+      const Result<Restrictions> decided = wire::from_wire(response.supervised().supervision());
       return row.kind == wire::SessionRowKind::supervised && row.room_seq.value == response.supervised().room_seq() &&
              row.lease_epoch == response.supervised().lease_epoch() && decided && *decided == row.supervision &&
              row.by == Decider{AuthorId{response.supervised().decided_by()}, response.supervised().decided_by_name()};
@@ -546,7 +546,7 @@ void SimClient::do_something_else() {
 
 // Everybody is an instructor here, and nobody heeds what they are told: their cuts go on, for the room to refuse.
 void SimClient::oversee() {
-  Supervision word;
+  Restrictions word;
   const double which = random_.unit();
   word.stopped = which < 0.2;
   if (which >= 0.2 && which < 0.3) word.taken_by = room_->author;
@@ -557,7 +557,7 @@ void SimClient::oversee() {
   change([word, pick](Room& room, AuthorId by) -> Result<RoomEvent> {
     // Of those who came last: others may have gone.
     const AuthorId subject{room.authors() - pick % std::min<std::uint64_t>(room.authors(), 4)};
-    Supervision said = word;
+    Restrictions said = word;
     if (said.taken_by == subject) said.taken_by = {};
     return room.supervise(by, subject, said);
   });

@@ -13,7 +13,7 @@
 
 #include "common/link/backoff.hpp"
 #include "haptic_client/control/replica.hpp"
-#include "haptic_client/control/room_watch.hpp"
+#include "haptic_client/control/confirmation_monitor.hpp"
 #include "haptic_client/net/cuts_underway.hpp"
 #include "haptic_client/net/session_reader.hpp"
 #include "tests/simulation/ledger.hpp"
@@ -71,7 +71,7 @@ class SimClient {
   [[nodiscard]] bool connected() const;
   [[nodiscard]] std::string standing() const;        // for messages
   [[nodiscard]] AuthorId author() const { return room_ ? room_->author : AuthorId{}; }
-  [[nodiscard]] const Supervision& held() const { return held_; }  // for its hand, as it was told
+  [[nodiscard]] const Restrictions& held() const { return held_; }  // for its hand, as it was told
   [[nodiscard]] Digest hash() const { return replica_->hash(); }
   [[nodiscard]] RoomSeq room_seq() const { return replica_->room_seq(); }
   [[nodiscard]] std::uint64_t cuts() const { return cuts_made_; }
@@ -180,7 +180,7 @@ class SimClient {
   std::vector<Cut> own_;
   bool work_planned_ = false, bone_is_here_ = false, interrupted_ = false, heard_ = false;
   std::uint64_t lease_epoch_ = 0;
-  Supervision held_;
+  Restrictions held_;
   std::map<std::uint64_t, std::uint64_t> felt_;      // own cuts that must be predicted: their leases
   QuantisedPose at_;
 };

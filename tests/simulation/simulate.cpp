@@ -284,11 +284,11 @@ class Simulation {
     rows_ = server_.rows();
     ledger_.check(rows_.size() == status.room_seq.value, Invariant::replay, "the journal ends elsewhere than the room");
     ledger_.check(server_.replayed() == live, Invariant::replay, "the journal's rows make another room");
-    const std::map<AuthorId, Supervision> held = Ledger::held(rows_);
+    const std::map<AuthorId, Restrictions> held = Ledger::held(rows_);
     for (const auto& client : clients_) {
       if (!client->here() || !client->settled()) continue;
       const auto own = held.find(client->author());
-      ledger_.check(client->held() == (own == held.end() ? Supervision{} : own->second), Invariant::overseen,
+      ledger_.check(client->held() == (own == held.end() ? Restrictions{} : own->second), Invariant::overseen,
                     "a hand does not know what holds for it: " + client->standing());
     }
     if (const auto standing = Ledger::standing(rows_)) check_set(*standing, status.field_hash);

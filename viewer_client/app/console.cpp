@@ -216,7 +216,7 @@ std::string Console::text_of(const PersonSeen& person) const {
   out += person.here ? " here" : " away";
   if (person.author == room_.self()) out += " you";
   if (person.hand) out += " hand";
-  const Supervision& word = person.supervision;
+  const Restrictions& word = person.supervision;
   if (word.stopped) out += " frozen";
   if (word.taken_by) out += " taken by #" + std::to_string(word.taken_by.value);
   if (word.guide)
@@ -244,7 +244,7 @@ Console::Answer Console::people(const Words& words) {
   return out;
 }
 
-Console::Answer Console::supervise(const std::string& name, const std::function<void(Supervision&)>& change) {
+Console::Answer Console::supervise(const std::string& name, const std::function<void(Restrictions&)>& change) {
   // Later commands go out from what this one has made.
   const auto said = [&](RoomSeq place) {
     const auto seen = [&] {
@@ -256,7 +256,7 @@ Console::Answer Console::supervise(const std::string& name, const std::function<
   if (name != "all") {
     const Result<PersonSeen> person = find(name);
     if (!person) return tl::unexpected(person.error());
-    Supervision word = person->supervision;
+    Restrictions word = person->supervision;
     change(word);
     const Result<RoomSeq> place = room_.supervise(person->author, word);
     if (!place) return tl::unexpected(place.error());
@@ -268,14 +268,14 @@ Console::Answer Console::supervise(const std::string& name, const std::function<
     return !one.hand || one.role == Role::instructor || one.author == room_.self();
   });
   const auto changed = [&](const PersonSeen& one) {
-    Supervision word = one.supervision;
+    Restrictions word = one.supervision;
     change(word);
     return word;
   };
   const bool same =
       std::ranges::all_of(hands, [&](const PersonSeen& one) { return changed(one) == changed(hands.front()); });
   if (hands.empty() || same) {
-    const Result<RoomSeq> place = room_.supervise({}, hands.empty() ? Supervision{} : changed(hands.front()));
+    const Result<RoomSeq> place = room_.supervise({}, hands.empty() ? Restrictions{} : changed(hands.front()));
     if (!place) return tl::unexpected(place.error());
     return said(*place);
   }
@@ -290,7 +290,7 @@ Console::Answer Console::supervise(const std::string& name, const std::function<
 
 Console::Answer Console::freeze(const Words& words) {
   if (words.size() < 2) return bad("");
-  return supervise(words[1], [&](Supervision& word) {
+  return supervise(words[1], [&](Restrictions& word) {
     word.stopped = true;
     word.words = joined(words, 2);
   });
@@ -298,7 +298,7 @@ Console::Answer Console::freeze(const Words& words) {
 
 Console::Answer Console::free(const Words& words) {
   if (words.size() != 2) return bad("");
-  return supervise(words[1], [](Supervision& word) {
+  return supervise(words[1], [](Restrictions& word) {
     word.stopped = false;
     word.words.clear();
   });
@@ -315,7 +315,7 @@ Console::Answer Console::take(const Words& words) {
     if (self != all.end() && !one.name.empty() && one.name == self->name && one.role == self->role && one.hand && one.here &&
         (!subject || one.author != subject->author))
       holder = one.author;
-  return supervise(words[1], [&](Supervision& word) {
+  return supervise(words[1], [&](Restrictions& word) {
     word.taken_by = holder;
     word.words = joined(words, 2);
   });
@@ -323,7 +323,7 @@ Console::Answer Console::take(const Words& words) {
 
 Console::Answer Console::give_back(const Words& words) {
   if (words.size() != 2) return bad("");
-  return supervise(words[1], [](Supervision& word) {
+  return supervise(words[1], [](Restrictions& word) {
     word.taken_by = {};
     word.words.clear();
   });
@@ -336,7 +336,7 @@ Console::Answer Console::guide(const Words& words) {
   if (!share || *share < 0 || *share > 1) return bad("the share is a number from 0 to 1");
   const Result<PersonSeen> leader = find(words[3]);
   if (!leader) return tl::unexpected(leader.error());
-  return supervise(words[1], [&](Supervision& word) {
+  return supervise(words[1], [&](Restrictions& word) {
     word.guide = leader->author;
     word.guide_share = static_cast<int>(std::lround(*share * kWholeShare));
   });
@@ -344,7 +344,7 @@ Console::Answer Console::guide(const Words& words) {
 
 Console::Answer Console::unguide(const Words& words) {
   if (words.size() != 2) return bad("");
-  return supervise(words[1], [](Supervision& word) {
+  return supervise(words[1], [](Restrictions& word) {
     word.guide = {};
     word.guide_share = 0;
   });
@@ -361,17 +361,17 @@ Console::Answer Console::limit(const Words& words) {
       return bad("the most that can be said is " + osteon::text_of(0.01 * kMostForceLimit) + " N");
     // Not even nothing is no limit.
     const int hundredths = none ? 0 : std::max(1, static_cast<int>(std::lround(100 * *newtons)));
-    return supervise(name, [&](Supervision& word) { word.force_limit = hundredths; });
+    return supervise(name, [&](Restrictions& word) { word.force_limit = hundredths; });
   }
   if (what == "zone") {
-    if (none) return supervise(name, [](Supervision& word) { word.zone.reset(); });
+    if (none) return supervise(name, [](Restrictions& word) { word.zone.reset(); });
     const auto radius_mm = words.size() == 7 ? number<double>(words[6]) : std::nullopt;
     if (!radius_mm) return bad("");
     const auto centre = point_at(words, 3);
     if (!centre) return tl::unexpected(centre.error());
     const Result<std::int32_t> radius = steps(*radius_mm);
     if (!radius) return tl::unexpected(radius.error());
-    return supervise(name, [&](Supervision& word) { word.zone = ZoneLimit{*centre, *radius}; });
+    return supervise(name, [&](Restrictions& word) { word.zone = ZoneLimit{*centre, *radius}; });
   }
   if (what != "tools" || words.size() != 4) return bad("");
   std::vector<Digest> allowed;
@@ -390,7 +390,7 @@ Console::Answer Console::limit(const Words& words) {
     std::ranges::sort(allowed);
     allowed.erase(std::unique(allowed.begin(), allowed.end()), allowed.end());
   }
-  return supervise(name, [&](Supervision& word) { word.tools = allowed; });
+  return supervise(name, [&](Restrictions& word) { word.tools = allowed; });
 }
 
 Console::Answer Console::undo(const Words& words) {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "common/core/result.hpp"
-#include "viewer_client/scene/room_desk.hpp"
+#include "viewer_client/scene/supervision_client.hpp"
 
 namespace osteon {
 
@@ -21,7 +21,7 @@ namespace osteon {
 class Console {
  public:
   // The room must outlive it.
-  explicit Console(RoomDesk& room) : room_(room) {}
+  explicit Console(SupervisionClient& room) : room_(room) {}
 
   // What there is to say to a line, "ok ..." or "error ...", without its end; nothing for an empty line and for one
   // that begins with #. May wait for the room.
@@ -41,7 +41,7 @@ class Console {
   [[nodiscard]] std::string tool_name(const Digest& tool) const;
   [[nodiscard]] std::string text_of(const PersonSeen& person) const;
   // Changes what holds for one hand, or for all, and waits until the room has said so.
-  [[nodiscard]] Answer supervise(const std::string& name, const std::function<void(Supervision&)>& change);
+  [[nodiscard]] Answer supervise(const std::string& name, const std::function<void(Restrictions&)>& change);
   [[nodiscard]] Answer draw(AnnotationKind kind, const Words& words, std::size_t first);
 
   [[nodiscard]] Answer people(const Words& words);
@@ -69,7 +69,7 @@ class Console {
   [[nodiscard]] Answer status(const Words& words);
   [[nodiscard]] Answer quit(const Words& words);
 
-  RoomDesk& room_;
+  SupervisionClient& room_;
   mutable std::vector<std::pair<std::string, Digest>> tools_;  // that the room was last known to have
   bool over_ = false;
 };

@@ -14,7 +14,7 @@
 #include "viewer_client/app/console.hpp"
 #include "viewer_client/app/viewer.hpp"
 #include "viewer_client/net/people_client.hpp"
-#include "viewer_client/net/room_watch.hpp"
+#include "viewer_client/net/room_subscription.hpp"
 #include "viewer_client/render/window.hpp"
 
 namespace {
@@ -134,7 +134,7 @@ Result<void> run(const Arguments& arguments) {
   if (!window) return tl::unexpected(window.error());
 
   RenderQueue render_queue;
-  RoomWatchOptions watch_options;
+  RoomSubscriptionOptions watch_options;
   watch_options.address = arguments.server;
   watch_options.room = arguments.room;
   watch_options.credentials = *credentials;
@@ -143,7 +143,7 @@ Result<void> run(const Arguments& arguments) {
   watch_options.keep_trying = !scripted;
   const auto seen_from = [size = *window_size](const CameraView& view) { return look_of(view, size.width_px, size.height_px); };
   watch_options.first_look = [seen_from](const Box& bone) { return seen_from(overview(bone)); };
-  auto watch = RoomWatch::start(watch_options, render_queue, [&stop] { return stop.requested(); });
+  auto watch = RoomSubscription::start(watch_options, render_queue, [&stop] { return stop.requested(); });
   if (!watch) {
     if (stop.requested()) return {};
     return tl::unexpected(watch.error());

@@ -144,7 +144,7 @@ void Viewer::meet_people() {
   const auto now = Clock::now();
   if (options_.people == nullptr || now < next_meeting_) return;
   next_meeting_ = now + kMeetings;
-  const RoomDesk& room = *options_.people;
+  const SupervisionClient& room = *options_.people;
   people_.take({room.people(), room.annotations(), room.words()}, room.self(), now);
   show_people(now);
   if (followed_.empty()) return;

@@ -32,7 +32,7 @@ struct ViewerOptions {
   std::function<SpaceMouseState()> cap;           // moves the camera; its first button shows the whole, its second the tool
   // Asks the room and waits for its answer.
   std::function<Result<RoomAnswer>(const RoomRequest&)> ask;
-  RoomDesk* people = nullptr;  // of the room, must outlive the viewer; null: neither seen nor drawn for
+  SupervisionClient* people = nullptr;  // of the room, must outlive the viewer; null: neither seen nor drawn for
   std::string hand;            // who sits before this window with a hand, a name or #NUMBER; empty: nobody
 };
 

@@ -55,7 +55,7 @@ Result<PersonSeen> person_of(const v1::Person& sent) {
   person.here = sent.here();
   person.hand = sent.hand();
   if (sent.has_supervision()) {
-    Result<Supervision> supervision = wire::from_wire(sent.supervision());
+    Result<Restrictions> supervision = wire::from_wire(sent.supervision());
     if (!supervision) return tl::unexpected(supervision.error());
     person.supervision = std::move(*supervision);
   }
@@ -283,7 +283,7 @@ bool PeopleClient::wait(const std::function<bool()>& done, std::chrono::millisec
   }
 }
 
-Result<RoomSeq> PeopleClient::supervise(AuthorId subject, const Supervision& supervision) {
+Result<RoomSeq> PeopleClient::supervise(AuthorId subject, const Restrictions& supervision) {
   v1::SuperviseRequest request;
   request.set_author(impl_->author());
   request.set_subject(subject.value);

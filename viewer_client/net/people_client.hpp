@@ -9,7 +9,7 @@
 #include "common/core/result.hpp"
 #include "common/wire/credentials.hpp"
 #include "common/wire/room_client.hpp"
-#include "viewer_client/scene/room_desk.hpp"
+#include "viewer_client/scene/supervision_client.hpp"
 
 namespace osteon {
 
@@ -25,7 +25,7 @@ struct PeopleClientOptions {
 };
 
 // Any thread. It has one thread, which reads; a lost connection is made again until the room refuses it.
-class PeopleClient final : public RoomDesk {
+class PeopleClient final : public SupervisionClient {
  public:
   // Joins, and waits for the first news. Errors: those of wire::join_room.
   [[nodiscard]] static Result<std::unique_ptr<PeopleClient>> start(const PeopleClientOptions& options,
@@ -39,7 +39,7 @@ class PeopleClient final : public RoomDesk {
   std::vector<Annotation> annotations() const override;
   std::vector<WordsSeen> words() const override;
   bool wait(const std::function<bool()>& done, std::chrono::milliseconds patience) const override;
-  Result<RoomSeq> supervise(AuthorId subject, const Supervision& supervision) override;
+  Result<RoomSeq> supervise(AuthorId subject, const Restrictions& supervision) override;
   Result<std::pair<RoomSeq, std::size_t>> undo(const WhatToUndo& what) override;
   Result<std::pair<RoomSeq, std::size_t>> redo(std::uint32_t count) override;
   Result<RoomSeq> mark(const std::string& label) override;

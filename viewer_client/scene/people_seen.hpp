@@ -2,7 +2,7 @@
 #pragma once
 #include <vector>
 
-#include "viewer_client/scene/room_desk.hpp"
+#include "viewer_client/scene/supervision_client.hpp"
 
 namespace osteon {
 

@@ -117,8 +117,8 @@ std::string PeopleView::overseer(const PersonSeen& person) const {
   return names.size() == 1 ? *names.begin() : "An instructor";
 }
 
-void PeopleView::notice_decision(const PersonSeen& person, const Supervision& was, Clock::time_point now) {
-  const Supervision& is = person.supervision;
+void PeopleView::notice_decision(const PersonSeen& person, const Restrictions& was, Clock::time_point now) {
+  const Restrictions& is = person.supervision;
   if (is == was) return;
   const bool ours = is_hand(person);
   const std::string whom = ours ? "you" : name_of(person.author), whose = ours ? "your" : name_of(person.author) + "'s";
@@ -188,7 +188,7 @@ std::string PeopleView::holding() const {
   if (hand_.empty()) return {};
   const Result<PersonSeen> ours = find(hand_, Fit::hand);
   if (!ours) return {};
-  const Supervision& holds = ours->supervision;
+  const Restrictions& holds = ours->supervision;
   std::string text;
   const auto line = [&](const std::string& one) { text += (text.empty() ? "" : "\n") + one; };
   if (holds.stopped) line("Your hand is stopped");

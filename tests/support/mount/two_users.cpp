@@ -5,7 +5,7 @@
 #include <deque>
 #include <random>
 
-#include "common/mechanics/hand.hpp"
+#include "common/mechanics/simulated_hand.hpp"
 
 namespace osteon::test {
 namespace {
@@ -18,12 +18,12 @@ double whole(double value, double step) { return step * std::round(value / step)
 Vec3 whole(const Vec3& v, double step) { return {whole(v.x(), step), whole(v.y(), step), whole(v.z(), step)}; }
 
 // As the wire rounds them; totals down.
-BonePush rounded(BonePush push) {
+MountLoad rounded(MountLoad push) {
   push.load = {whole(push.load.force_n, 1e-3), whole(push.load.moment_nmm, 1e-2)};
   push.energy_mj = 1e-3 * std::floor(push.energy_mj / 1e-3);
   return push;
 }
-BoneSeen rounded(BoneSeen seen) {
+MountPose rounded(MountPose seen) {
   seen.shift = {whole(seen.shift.place_mm, 0x1p-16), whole(seen.shift.turn_rad, 0x1p-20)};
   seen.energy_mj = 1e-3 * std::floor(seen.energy_mj / 1e-3);
   seen.lag_s = whole(seen.lag_s, 1e-3);
@@ -55,13 +55,13 @@ class Line {
 };
 
 struct User {
-  User(const ShownBoneParams& client, const HandParams& params) : bone(client), hand(params, {-kApart_mm, 0, 0}) {}
+  User(const MountFollowerParams& client, const HandParams& params) : bone(client), hand(params, {-kApart_mm, 0, 0}) {}
   static constexpr double kApart_mm = 2.0;  // of a hand that does not push
 
-  ShownBone bone;
+  MountFollower bone;
   Hand hand;                  // its x: how far the tip is beyond the face of the unloaded bone, into it
-  Line<BonePush> up;
-  Line<BoneSeen> down;
+  Line<MountLoad> up;
+  Line<MountPose> down;
   double side = 1.0;          // it pushes along x or against it
   Vec3 face_mm;               // where it touches, bone frame
   double push_mm = 0, from_s = 0, ramp_s = 0;
@@ -111,7 +111,7 @@ TwoUsersResult push_each_other(const TwoUsersRun& run) {
   HandParams hand = expert_hand();
   hand.stiffness_n_per_mm *= run.hand_stiffness;
   User users[2] = {User(run.client, hand), User(run.client, hand)};
-  SharedBone server(run.server);
+  MountServer server(run.server);
   server.join(1);
   server.join(2);
   const double k = 1.0 / (1.0 / hand.stiffness_n_per_mm + 1.0 / kCoupling);
@@ -136,7 +136,7 @@ TwoUsersResult push_each_other(const TwoUsersRun& run) {
 
     for (std::size_t i = 0; i < 2; ++i) {
       User& user = users[i];
-      user.down.deliver(now_s, [&](const BoneSeen& seen) { user.bone.see(seen); });
+      user.down.deliver(now_s, [&](const MountPose& seen) { user.bone.see(seen); });
       const Shift before = user.bone.shift();
       user.bone.step(user.load, kDt);
       const Shift after = user.bone.shift();
@@ -164,7 +164,7 @@ TwoUsersResult push_each_other(const TwoUsersRun& run) {
       double& most_n = result.most_force_n[2 * tick >= run.ticks];
       most_n = std::max(most_n, user.force_n);
       if (tick % 8 == static_cast<long>(3 * i)) {
-        const BonePush push = rounded(user.bone.push());
+        const MountLoad push = rounded(user.bone.push());
         if (uniform(0.0, 1.0) >= run.loss) user.up.send(push, now_s, travel_s(static_cast<int>(i)));
       }
     }
@@ -173,10 +173,10 @@ TwoUsersResult push_each_other(const TwoUsersRun& run) {
     if (now_s >= server_s) {
       server_s += kServerDt;
       for (std::size_t i = 0; i < 2; ++i)
-        users[i].up.deliver(now_s, [&](const BonePush& push) { static_cast<void>(server.receive(i + 1, push)); });
+        users[i].up.deliver(now_s, [&](const MountLoad& push) { static_cast<void>(server.receive(i + 1, push)); });
       server.step(kServerDt);
       for (std::size_t i = 0; i < 2; ++i) {
-        const BoneSeen seen = rounded(server.seen(i + 1));
+        const MountPose seen = rounded(server.seen(i + 1));
         if (uniform(0.0, 1.0) >= run.loss) users[i].down.send(seen, now_s, travel_s(static_cast<int>(i)));
       }
     }

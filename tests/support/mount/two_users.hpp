@@ -3,7 +3,7 @@
 #pragma once
 #include <cstdint>
 
-#include "common/mechanics/passivity.hpp"
+#include "common/mechanics/compliant_mount.hpp"
 
 namespace osteon::test {
 
@@ -18,8 +18,8 @@ struct TwoUsersRun {
   double arm_mm = 30.0;             // the line of push passes the centre at this distance
   double least_push_mm = 3.0, most_push_mm = 7.0;
   bool shaken = false;              // the hands never rest
-  SharedBoneParams server;
-  ShownBoneParams client;
+  MountServerParams server;
+  MountFollowerParams client;
 };
 
 struct TwoUsersResult {

@@ -60,7 +60,7 @@ OverseenHand::OverseenHand(const OverseenRun& run)
   for (const std::uint64_t author : {1, 2}) yielding_->server.join(author);
 }
 
-void OverseenHand::decide(const Supervision& supervision) {
+void OverseenHand::decide(const Restrictions& supervision) {
   // As the room does: a lease is granted anew where the hand may cut from now on, or may no more.
   if (now_.stopped != supervision.stopped || now_.taken_by != supervision.taken_by) room_.undo(0), ++epoch_;
   now_ = supervision;
@@ -77,8 +77,8 @@ void OverseenHand::hear() {
   InContact none, &count = touches(last_) ? crossed_.in_contact : none;
   for (; !decided_.empty() && decided_.front().due <= ticks_; decided_.pop_front()) {
     const ToolModel tools[] = {loop_->tool(0)};
-    const Supervision& now = decided_.front().supervision;
-    loop_->oversee(oversight_of(now, RoomSeq{++decisions_}, decided_.front().epoch, tools));
+    const Restrictions& now = decided_.front().supervision;
+    loop_->oversee(haptic_restrictions(now, RoomSeq{++decisions_}, decided_.front().epoch, tools));
     count.stopped += now.stopped && !heard_.stopped;
     count.taken += now.taken_by && !heard_.taken_by;
     count.given_back += (!now.taken_by && heard_.taken_by) || (!now.stopped && heard_.stopped);
@@ -124,7 +124,7 @@ void OverseenHand::move_bone() {
                     other.moment_nmm.dot(to.turn_rad - from.turn_rad);
   crossed_.made_mj = std::max(crossed_.made_mj, -bone.put_in_mj);
 
-  if (const std::optional<BonePush> push = bone.mine.push()) bone.up.push_back({ticks_ + run_.delay_ms, 1, *push});
+  if (const std::optional<MountLoad> push = bone.mine.push()) bone.up.push_back({ticks_ + run_.delay_ms, 1, *push});
   if (ticks_ % kServerTicks == 0) bone.up.push_back({ticks_ + run_.delay_ms, 2, bone.other.push()});
 }
 

@@ -8,9 +8,9 @@
 #include <memory>
 #include <vector>
 
-#include "common/mechanics/passivity.hpp"
+#include "common/mechanics/compliant_mount.hpp"
 #include "haptic_client/control/haptic_loop.hpp"
-#include "haptic_client/control/mounted_bone.hpp"
+#include "haptic_client/control/felt_mount.hpp"
 #include "haptic_client/control/patch_builder.hpp"
 #include "haptic_client/device/simulated_device.hpp"
 #include "tests/support/stability/delayed_room.hpp"
@@ -48,7 +48,7 @@ class OverseenHand {
   explicit OverseenHand(const OverseenRun& run);
 
   // The room decides; the hand hears of it after the delay, and so late its cuts come to be refused.
-  void decide(const Supervision& supervision);
+  void decide(const Restrictions& supervision);
   void undo(int count);
 
   // A millisecond. Command, place and force in the bone's frame, as everything here.
@@ -78,17 +78,17 @@ class OverseenHand {
   // A bone that yields: the server's, as this hand is shown it and as the other user is, and the lines between.
   struct Yielding {
     explicit Yielding(const MountParams& params) : mine(params), other({.mount = params}), server({.mount = params}) {}
-    haptic::MountedBone mine;
-    ShownBone other;
-    SharedBone server;
+    haptic::FeltMount mine;
+    MountFollower other;
+    MountServer server;
     struct Push {
       std::int64_t due;
       std::uint64_t author;
-      BonePush push;
+      MountLoad push;
     };
     struct Seen {
       std::int64_t due;
-      BoneSeen to[2];
+      MountPose to[2];
     };
     std::deque<Push> up;
     std::deque<Seen> down;
@@ -108,13 +108,13 @@ class OverseenHand {
   std::vector<Cut> cuts_;
   struct Decided {
     std::int64_t due;
-    Supervision supervision;
+    Restrictions supervision;
     std::uint64_t epoch;
   };
   std::deque<Decided> decided_;
   std::deque<std::int64_t> undone_due_;
   std::unique_ptr<Yielding> yielding_;  // null: the bone stands
-  Supervision now_, heard_;     // as the room has decided, and as the hand knows it
+  Restrictions now_, heard_;     // as the room has decided, and as the hand knows it
   std::uint64_t decisions_ = 0, epoch_ = 0;
   std::int64_t ticks_ = 0;
   Eigen::Quaterniond rotation_;

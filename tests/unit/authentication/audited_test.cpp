@@ -16,7 +16,7 @@
 #include "common/wire/room_client.hpp"
 #include "server/net/audited_calls.hpp"
 #include "server/net/person_certificate.hpp"
-#include "server/net/rooms_client.hpp"
+#include "server/net/room_admin_client.hpp"
 #include "tests/support/authentication/people.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/wait.hpp"
@@ -68,7 +68,7 @@ class Audited : public ::testing::Test {
     one.ticket = to_hex(open_ticket(text, check_key_of(people_.key())).value().id);
     return one;
   }
-  RoomsClient as(const Someone& one) { return RoomsClient::reach(address_, 5s, {}, one.credentials).value(); }
+  RoomAdminClient as(const Someone& one) { return RoomAdminClient::reach(address_, 5s, {}, one.credentials).value(); }
 
   test::RunResult audit(const std::vector<std::string>& arguments) {
     std::vector<std::string> all{"audit"};
@@ -156,7 +156,7 @@ TEST_F(Audited, SaysWhoMadeDeletedJoinedAndWasRefused) {
   json revoked;
   ASSERT_TRUE(test::wait_until(
       [&] {
-        auto line = RoomsClient::reach(address_, 1s, {}, mallory.credentials);
+        auto line = RoomAdminClient::reach(address_, 1s, {}, mallory.credentials);
         if (line) (void)line->list();
         for (const json& one : shown({"--person", "mallory"}))
           if (one["detail"] == "revoked") revoked = one;
@@ -168,7 +168,7 @@ TEST_F(Audited, SaysWhoMadeDeletedJoinedAndWasRefused) {
   EXPECT_THAT(revoked.value("address", ""), HasSubstr("ipv4:127.0.0.1"));
 
   // Without a certificate there is an address alone.
-  EXPECT_FALSE(RoomsClient::reach(address_, 1s, {}, {}));
+  EXPECT_FALSE(RoomAdminClient::reach(address_, 1s, {}, {}));
   EXPECT_THAT(find("handshake", "refused", "").value("address", ""), HasSubstr("ipv4:127.0.0.1"));
 
   ASSERT_EQ(server_->terminate(30s), 0) << server_->err();

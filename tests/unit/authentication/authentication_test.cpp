@@ -28,7 +28,7 @@
 #include "osteon/v1/room.grpc.pb.h"
 #include "osteon/v1/rooms.grpc.pb.h"
 #include "server/net/room_server.hpp"
-#include "server/net/rooms_client.hpp"
+#include "server/net/room_admin_client.hpp"
 #include "tests/architecture/proto_rules.hpp"
 #include "tests/support/authentication/people.hpp"
 #include "tests/support/authentication/proxy.hpp"
@@ -395,7 +395,7 @@ TEST_F(Authentication, KeepRoomsApart) {
   ASSERT_TRUE(in_theatre.has_value()) << in_theatre.error().message;
   EXPECT_EQ(in_theatre->name, "theatre");
   // An instructor of one room sees, checks and branches that one.
-  auto rooms = RoomsClient::reach(address(), 5s, {}, people_.credentials("ina", Role::instructor, "ward"));
+  auto rooms = RoomAdminClient::reach(address(), 5s, {}, people_.credentials("ina", Role::instructor, "ward"));
   ASSERT_TRUE(rooms.has_value());
   const auto list = rooms->list();
   ASSERT_TRUE(list.has_value()) << list.error().message;
@@ -419,7 +419,7 @@ TEST_F(Authentication, KeepRoomsApart) {
   const grpc::Status status = v1::PeopleService::NewStub(ina->channel)->Demonstrate(&context, shown, &response);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::PERMISSION_DENIED) << status.error_message();
   EXPECT_THAT(status.error_message(), HasSubstr("theatre"));
-  auto all = RoomsClient::reach(address(), 5s, {}, people_.credentials("otto", Role::operator_, "*"));
+  auto all = RoomAdminClient::reach(address(), 5s, {}, people_.credentials("otto", Role::operator_, "*"));
   EXPECT_EQ(all->list()->size(), 2u);
   EXPECT_TRUE(all->create("third", ""));
   EXPECT_TRUE(all->remove("third", false));
@@ -451,7 +451,7 @@ TEST_F(Authentication, JudgeCallsAboutRoomsByTheRoomsThatTheyName) {
   const wire::ClientCredentials otto = people_.credentials("otto", Role::operator_, "*");
   for (const char* in : {"", "ward", "theatre"}) EXPECT_EQ(asked(otto, in, "ward").error_code(), StatusCode::PERMISSION_DENIED) << in;
   EXPECT_TRUE(is_there("ward"));
-  auto rooms = RoomsClient::reach(address(), 5s, {}, otto);
+  auto rooms = RoomAdminClient::reach(address(), 5s, {}, otto);
   ASSERT_TRUE(rooms.has_value());
   EXPECT_EQ(rooms->close("ward").error().code, ErrorCode::denied);
   // Such a room is not in the list either.
@@ -466,14 +466,14 @@ TEST_F(Authentication, JudgeCallsAboutRoomsByTheRoomsThatTheyName) {
 
 TEST_F(Authentication, DeleteNoBranchThatATicketIsNotFor) {
   ASSERT_TRUE(server_->rooms().branch("ward", "annex", RoomSeq{0}));
-  auto own = RoomsClient::reach(address(), 5s, {}, people_.credentials("otto", Role::operator_, "ward"));
+  auto own = RoomAdminClient::reach(address(), 5s, {}, people_.credentials("otto", Role::operator_, "ward"));
   ASSERT_TRUE(own.has_value());
   const auto refused = own->remove("ward", true);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::denied) << refused.error().message;
   EXPECT_THAT(refused.error().message, HasSubstr("annex"));
   for (const char* name : {"ward", "annex"}) EXPECT_TRUE(server_->rooms().find(name)) << name;
-  auto any = RoomsClient::reach(address(), 5s, {}, people_.credentials("olga", Role::operator_, "*"));
+  auto any = RoomAdminClient::reach(address(), 5s, {}, people_.credentials("olga", Role::operator_, "*"));
   ASSERT_TRUE(any.has_value());
   EXPECT_EQ(any->remove("ward", true).value_or(std::vector<std::string>()).size(), 2u);
 }

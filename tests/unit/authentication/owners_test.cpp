@@ -11,7 +11,7 @@
 
 #include "server/net/room_owners.hpp"
 #include "server/net/room_server.hpp"
-#include "server/net/rooms_client.hpp"
+#include "server/net/room_admin_client.hpp"
 #include "tests/support/authentication/people.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/support/wait.hpp"
@@ -44,10 +44,10 @@ class Owners : public ::testing::Test {
     ASSERT_TRUE(started.has_value()) << started.error().message;
     server_ = std::move(*started);
   }
-  RoomsClient as(const std::string& name, Role role, const std::string& room) {
-    return RoomsClient::reach(server_->address(), 5s, {}, people_.credentials(name, role, room)).value();
+  RoomAdminClient as(const std::string& name, Role role, const std::string& room) {
+    return RoomAdminClient::reach(server_->address(), 5s, {}, people_.credentials(name, role, room)).value();
   }
-  static std::set<std::string> names(RoomsClient client) {
+  static std::set<std::string> names(RoomAdminClient client) {
     std::set<std::string> names;
     const auto listed = client.list();
     for (const RoomLine& room : listed.value()) names.insert(room.name);
@@ -68,7 +68,7 @@ class Owners : public ::testing::Test {
 };
 
 TEST_F(Owners, HaveNoMoreRoomsThanOnePersonMay) {
-  RoomsClient ina = as("ina", Role::instructor, "ward");
+  RoomAdminClient ina = as("ina", Role::instructor, "ward");
   ASSERT_TRUE(ina.branch("ward", "first", RoomSeq{}));
   ASSERT_TRUE(ina.branch("ward", "second", RoomSeq{}));
   const std::string third = refusal(ina.branch("ward", "third", RoomSeq{}), ErrorCode::exhausted);
@@ -87,7 +87,7 @@ TEST_F(Owners, HaveNoMoreRoomsThanOnePersonMay) {
 }
 
 TEST_F(Owners, OfPlaybacksAreCountedToo) {
-  RoomsClient ina = as("ina", Role::instructor, "ward");
+  RoomAdminClient ina = as("ina", Role::instructor, "ward");
   ASSERT_TRUE(ina.replay("ward", "film", RoomSeq{}, RoomSeq{}, 1));
   ASSERT_TRUE(ina.branch("ward", "branch", RoomSeq{}));
   EXPECT_THAT(refusal(ina.branch("ward", "third", RoomSeq{}), ErrorCode::exhausted), HasSubstr("(branch, film)"));

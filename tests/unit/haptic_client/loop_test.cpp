@@ -9,7 +9,7 @@
 
 #include "common/volume/cut_field.hpp"
 #include "haptic_client/control/patch_builder.hpp"
-#include "haptic_client/control/room_watch.hpp"
+#include "haptic_client/control/confirmation_monitor.hpp"
 #include "tests/unit/haptic_client/bench.hpp"
 
 namespace osteon::haptic::test {
@@ -262,8 +262,8 @@ TEST(ToolModel, CutsNoFinerThanTheCase) {
 }
 
 // Bone that only this client has seen go stays little when the room does not answer.
-TEST(RoomWatch, HoldsTheSpindleWhileTheRoomDoesNotFollow) {
-  RoomWatch watch;
+TEST(ConfirmationMonitor, HoldsTheSpindleWhileTheRoomDoesNotFollow) {
+  ConfirmationMonitor watch;
   EXPECT_EQ(watch.update(100.0, false, 0), RoomHealth::follows);
   EXPECT_EQ(watch.update(200.0, false, 0), RoomHealth::follows);  // nobody cuts, nothing need come
   EXPECT_EQ(watch.update(201.9, false, 1), RoomHealth::follows);

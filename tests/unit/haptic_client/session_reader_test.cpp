@@ -70,7 +70,7 @@ struct Heard {
                         },
                         .scene = [this](RoomSeq place, const std::vector<SceneItem>&) { events.push_back("scene " + std::to_string(place.value)); },
                         .supervised = [this](const HandSupervised& now) {
-                          if (now.place.value == 0 && now.supervision == Supervision{}) return ++free;
+                          if (now.place.value == 0 && now.supervision == Restrictions{}) return ++free;
                           events.push_back(std::to_string(now.place.value) + (now.supervision.stopped ? " stops" : " frees") + " until " +
                                            std::to_string(now.lease_epoch) + now.supervision.words);
                           return free;
@@ -81,7 +81,7 @@ struct Heard {
                         .partner = [this](const CuttingState& state) {
                           partners.push_back(100 * state.author.value + state.state_seq);
                         },
-                        .bone = [this](const BoneSeen& seen) { places.push_back(seen.seen_seq); }},
+                        .bone = [this](const MountPose& seen) { places.push_back(seen.seen_seq); }},
                        [this](std::uint64_t seq) { decided.push_back(seq); }, [this](std::uint64_t seq) { decided.push_back(seq); }};
 };
 
@@ -220,7 +220,7 @@ TEST(SessionReader, PassesOnWhereTheBoneStandsOnItsMount) {
   Heard heard;
   heard.reader.begin();
   v1::SessionResponse place;
-  *place.mutable_bone() = wire::to_wire(BoneSeen{4, {Vec3(1, 2, 3), Vec3::Zero()}, 0, 0, 0});
+  *place.mutable_bone() = wire::to_wire(MountPose{4, {Vec3(1, 2, 3), Vec3::Zero()}, 0, 0, 0});
   ASSERT_TRUE(heard.reader.take(place));
   EXPECT_EQ(heard.places, (std::vector<std::uint64_t>{4}));
   place.mutable_bone()->clear_turn();

@@ -70,11 +70,11 @@ class MountedHand final : public SessionSubscriber {
   void decided() override {}
   void end(const std::string&) override {}
   std::size_t waiting() const override { return 0; }
-  void show_bone(const BoneSeen& seen) override {
+  void show_bone(const MountPose& seen) override {
     const std::lock_guard lock(mutex_);
     seen_ = seen;
   }
-  BoneSeen seen() const {
+  MountPose seen() const {
     const std::lock_guard lock(mutex_);
     return seen_;
   }
@@ -82,7 +82,7 @@ class MountedHand final : public SessionSubscriber {
  private:
   const AuthorId author_;
   mutable std::mutex mutex_;
-  BoneSeen seen_;
+  MountPose seen_;
 };
 
 // A server with the rooms "ward", open, and "shown" and "other", closed, each with a recording of 240 cuts in 2.4 s.
@@ -121,7 +121,7 @@ class DemonstrationTest : public ::testing::Test {
     const WhatToShow what{.room = of, .of = {}, .from = {}, .to = {}, .speed = speed};
     return room_->demonstrations().begin(server_->rooms(), *room_, instructor_, {}, what);
   }
-  void decide(AuthorId about, const Supervision& word) {
+  void decide(AuthorId about, const Restrictions& word) {
     std::promise<Result<RoomEvent>> answer;
     room_->runtime().queue_event([&](Room& room) { return room.supervise(instructor_, about, word); },
                               [&](const Result<RoomEvent>& decided) { answer.set_value(decided); });
@@ -142,7 +142,7 @@ TEST_F(DemonstrationTest, IsSeenAtRestWhileItIsStoppedOrWithoutItsTool) {
   const Result<Shown> shown = show(0.06);
   ASSERT_TRUE(shown) << shown.error().message;
   const AuthorId who = shown->demonstrator;
-  for (const Supervision& word : {Supervision{.stopped = true}, Supervision{.taken_by = instructor_}}) {
+  for (const Restrictions& word : {Restrictions{.stopped = true}, Restrictions{.taken_by = instructor_}}) {
     ASSERT_TRUE(wait_until([&] { return seen_.at_work(who); }, kPatience));
     decide(who, word);
     ASSERT_TRUE(wait_until([&] { return seen_.at_rest(who); }, kPatience)) << "everybody goes on hearing it";

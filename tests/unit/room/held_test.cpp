@@ -42,7 +42,7 @@ struct Held {
     room.set_time(room.time() + 8ms);
     return room.submit(next).value();
   }
-  void decide(AuthorId subject, const Supervision& word) {
+  void decide(AuthorId subject, const Restrictions& word) {
     const auto decided = room.supervise(ada, subject, word);
     ASSERT_TRUE(decided) << decided.error().message;
   }
@@ -63,7 +63,7 @@ struct Held {
 
 TEST(CarriedOver, AHandThatJoinsAnewIsHeldAsItWas) {
   Held all;
-  const Supervision word{.stopped = true, .force_limit = 300, .words = "wait"};
+  const Restrictions word{.stopped = true, .force_limit = 300, .words = "wait"};
   all.decide(all.ben, word);
   const RoomSeq before = all.room.room_seq();
   const AuthorId again = all.again(kBen, Role::trainee);
@@ -102,7 +102,7 @@ TEST(CarriedOver, AWordAboutAnOlderHandHoldsForTheNewestToo) {
   // But not where something else was decided about the newer.
   all.decide(again, {.force_limit = 100});
   all.decide(all.ben, {});
-  EXPECT_EQ(all.room.people().supervised(again).supervision, (Supervision{.force_limit = 100}));
+  EXPECT_EQ(all.room.people().supervised(again).supervision, (Restrictions{.force_limit = 100}));
   // Without roles anybody may be called the same: only who is named is meant.
   Room plain(test_block());
   const AuthorId one = plain.join(MemberKind::surgeon, kBen, kSecret), other = plain.join(MemberKind::surgeon, kBen, kSecret);
@@ -153,7 +153,7 @@ TEST(Held, TakesNothingBackAndPlacesNothing) {
     ASSERT_TRUE(all.room.undo_last(all.ben, 1, {}));
     const auto placed = all.room.set_item(all.ben, guide());
     ASSERT_TRUE(placed) << placed.error().message;
-    all.decide(all.ben, taken ? Supervision{.taken_by = all.cy} : Supervision{.stopped = true});
+    all.decide(all.ben, taken ? Restrictions{.taken_by = all.cy} : Restrictions{.stopped = true});
     const RoomSeq place = all.room.room_seq();
     const Digest bone = all.room.field_hash();
     const RoomSeq first[] = {RoomSeq{5}};
@@ -264,8 +264,8 @@ class Placed final : public SessionSubscriber {
   std::size_t waiting() const override { return 0; }
 
   std::vector<std::uint64_t> places;
-  std::vector<Supervision> told;
-  std::optional<Supervision> held;
+  std::vector<Restrictions> told;
+  std::optional<Restrictions> held;
 
  private:
   const AuthorId author_;
@@ -279,7 +279,7 @@ struct HeldRuntime {
     runtime.tick(now += 8ms);
     return author.value();
   }
-  void supervise(AuthorId by, AuthorId subject, const Supervision& word) {
+  void supervise(AuthorId by, AuthorId subject, const Restrictions& word) {
     runtime.queue_event([=](Room& room) { return room.supervise(by, subject, word); },
                      [](const Result<RoomEvent>& decided) { EXPECT_TRUE(decided); });
     runtime.tick(now += 8ms);
@@ -302,7 +302,7 @@ void expect_held(HeldRuntime& lesson) {
   const AuthorId ben = lesson.join(MemberKind::surgeon, "Ben", Role::trainee);
   const AuthorId cy = lesson.join(MemberKind::surgeon, "Cy", Role::trainee);
   const auto session = lesson.session(cy);
-  const Supervision word{.stopped = true, .words = "wait"};
+  const Restrictions word{.stopped = true, .words = "wait"};
   lesson.supervise(ada, ben, word);
   const AuthorId again = lesson.join(MemberKind::surgeon, "Ben", Role::trainee);
   EXPECT_EQ(lesson.session(again)->held, word);
@@ -323,7 +323,7 @@ void expect_held(HeldRuntime& lesson) {
   const auto own = lesson.session(third);
   lesson.supervise(ada, again, {});
   ASSERT_EQ(own->told.size(), 1u);
-  EXPECT_EQ(own->told.front(), Supervision{});
+  EXPECT_EQ(own->told.front(), Restrictions{});
   EXPECT_EQ(session->places.back(), lesson.runtime.room_seq().value);
 }
 

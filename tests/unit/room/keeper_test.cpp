@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "haptic_client/control/cut_recorder.hpp"
-#include "haptic_client/control/room_watch.hpp"
+#include "haptic_client/control/confirmation_monitor.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/room/kept_room.hpp"

@@ -25,9 +25,9 @@ class HeardBone final : public SessionSubscriber {
   void decided() override {}
   void end(const std::string&) override {}
   std::size_t waiting() const override { return 0; }
-  void show_bone(const BoneSeen& seen) override { seen_.push_back(seen); }
+  void show_bone(const MountPose& seen) override { seen_.push_back(seen); }
 
-  std::vector<BoneSeen> seen_;
+  std::vector<MountPose> seen_;
 
  private:
   const AuthorId author_;

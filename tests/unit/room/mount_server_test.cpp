@@ -23,7 +23,7 @@ class Pusher {
     EXPECT_TRUE(joined.has_value()) << joined.error().message;
     session_.emplace(std::move(*joined));
     RoomEvents events;
-    events.bone = [this](const BoneSeen& seen) {
+    events.bone = [this](const MountPose& seen) {
       const std::lock_guard lock(mutex_);
       first_ = first_.value_or(seen.seen_seq);
       newest_ = seen;
@@ -42,12 +42,12 @@ class Pusher {
   bool push_until(double force_n, const std::function<bool()>& holds) {
     return wait_until(
         [&] {
-          session_->send(BonePush{++pushes_, {{force_n, 0, 0}, Vec3::Zero()}, 0.0, newest().seen_seq});
+          session_->send(MountLoad{++pushes_, {{force_n, 0, 0}, Vec3::Zero()}, 0.0, newest().seen_seq});
           return holds();
         },
         test::kPatience);
   }
-  BoneSeen newest() const {
+  MountPose newest() const {
     const std::lock_guard lock(mutex_);
     return newest_;
   }
@@ -68,7 +68,7 @@ class Pusher {
 
  private:
   mutable std::mutex mutex_;
-  BoneSeen newest_;
+  MountPose newest_;
   std::optional<std::uint64_t> first_;
   int told_ = 0, interruptions_ = 0;
   std::uint64_t pushes_ = 0;

@@ -114,7 +114,7 @@ struct Lesson {
     tick();
     return answer.value();
   }
-  Result<RoomEvent> supervise(AuthorId subject, const Supervision& word) {
+  Result<RoomEvent> supervise(AuthorId subject, const Restrictions& word) {
     return ask([&](Room& room) { return room.supervise(instructor, subject, word); });
   }
   v1::WatchPeopleResponse news(PresenceCursor& cursor, AuthorId reader, const PeopleRights& rights = {}) {

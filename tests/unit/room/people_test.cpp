@@ -116,7 +116,7 @@ TEST(Supervise, OnlyAnInstructorDoesAndOnlyAboutAHand) {
   EXPECT_EQ(all.refused(all.room.supervise(AuthorId{99}, all.other, {})), ErrorCode::invalid_input);
   EXPECT_EQ(all.refused(all.room.supervise(all.instructor, all.observer, {.stopped = true})), ErrorCode::not_found);
   EXPECT_EQ(all.refused(all.room.supervise(all.instructor, AuthorId{99}, {})), ErrorCode::not_found);
-  const auto bad = [&](Supervision supervision) {
+  const auto bad = [&](Restrictions supervision) {
     return all.refused(all.room.supervise(all.instructor, all.trainee, supervision));
   };
   EXPECT_EQ(bad({.taken_by = AuthorId{99}}), ErrorCode::invalid_input) << "who has not joined";
@@ -310,7 +310,7 @@ TEST(PeopleRows, ReplayedMakeTheSameRoom) {
       all.room.set_time(all.room.time() + 8ms);
       switch (random() % 8) {
         case 0: {
-          Supervision word{
+          Restrictions word{
               .stopped = random() % 3 == 0, .force_limit = static_cast<int>(random() % 900), .words = "words"};
           if (random() % 3 == 0) word.taken_by = all.instructor;
           if (random() % 3 == 0) word.guide = all.instructor, word.guide_share = 500;
@@ -359,7 +359,7 @@ TEST(PeopleRows, EveryOneOfThemIsInTheHash) {
   const auto changed = [&](const char* what) {
     EXPECT_TRUE(hashes.insert(to_hex(all.room.room_hash())).second) << what;
   };
-  const auto decide = [&](const char* what, const Supervision& word) {
+  const auto decide = [&](const char* what, const Restrictions& word) {
     // At the same place of the order each time: beside the others, not after them.
     all = Class();
     EXPECT_TRUE(all.room.supervise(all.instructor, all.trainee, word)) << what;

@@ -6,7 +6,7 @@
 
 #include "server/journal/maintenance.hpp"
 #include "server/net/room_server.hpp"
-#include "server/net/rooms_client.hpp"
+#include "server/net/room_admin_client.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/room/cuts.hpp"
 #include "tests/unit/room/members.hpp"
@@ -33,7 +33,7 @@ class RoomsTest : public ::testing::Test {
     auto started = RoomServer::start(std::move(rooms), "127.0.0.1:0");
     ASSERT_TRUE(started.has_value()) << started.error().message;
     server_ = std::move(*started);
-    auto client = RoomsClient::reach(server_->address(), std::chrono::seconds(5), {});
+    auto client = RoomAdminClient::reach(server_->address(), std::chrono::seconds(5), {});
     ASSERT_TRUE(client.has_value()) << client.error().message;
     client_.emplace(std::move(*client));
   }
@@ -71,7 +71,7 @@ class RoomsTest : public ::testing::Test {
 
   TempDir dir_;
   std::unique_ptr<RoomServer> server_;
-  std::optional<RoomsClient> client_;
+  std::optional<RoomAdminClient> client_;
 };
 
 TEST_F(RoomsTest, WhoIsInOneHearsNothingOfAnother) {

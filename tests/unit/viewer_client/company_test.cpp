@@ -20,7 +20,7 @@ using testing::HasSubstr;
 constexpr AuthorId kAda{3}, kBerg{4}, kSelf{8};
 
 // A room as a server would keep it, as far as a window asks.
-class SmallRoom final : public RoomDesk {
+class SmallRoom final : public SupervisionClient {
  public:
   std::vector<PersonSeen> people_here;
   std::vector<Annotation> drawn;
@@ -47,7 +47,7 @@ class SmallRoom final : public RoomDesk {
     said.push_back({RoomSeq{said.size() + 1}, kSelf, to, words});
     return said.back().place;
   }
-  Result<RoomSeq> supervise(AuthorId, const Supervision&) override { return refused(); }
+  Result<RoomSeq> supervise(AuthorId, const Restrictions&) override { return refused(); }
   Result<std::pair<RoomSeq, std::size_t>> undo(const WhatToUndo&) override { return refused(); }
   Result<std::pair<RoomSeq, std::size_t>> redo(std::uint32_t) override { return refused(); }
   Result<RoomSeq> mark(const std::string&) override { return refused(); }

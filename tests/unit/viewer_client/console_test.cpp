@@ -18,7 +18,7 @@ Digest digest(std::uint8_t n) {
   return out;
 }
 
-class FakeDesk final : public RoomDesk {
+class FakeDesk final : public SupervisionClient {
  public:
   AuthorId self() const override { return {1}; }
   std::vector<PersonSeen> people() const override { return people_; }
@@ -30,7 +30,7 @@ class FakeDesk final : public RoomDesk {
     if (late_) people_.push_back(*std::exchange(late_, std::nullopt));
     return done();
   }
-  Result<RoomSeq> supervise(AuthorId subject, const Supervision& supervision) override {
+  Result<RoomSeq> supervise(AuthorId subject, const Restrictions& supervision) override {
     asked_.emplace_back(subject, supervision);
     for (PersonSeen& person : people_)
       if (person.author == subject ||
@@ -87,7 +87,7 @@ class FakeDesk final : public RoomDesk {
   mutable std::optional<PersonSeen> late_;  // who is in the list of people once it was waited for
   std::vector<Annotation> drawn_;
   std::vector<WordsSeen> words_;
-  std::vector<std::pair<AuthorId, Supervision>> asked_;
+  std::vector<std::pair<AuthorId, Restrictions>> asked_;
   WhatToUndo undo_;
   WhatToDemonstrate shown_;
   std::string label_;
@@ -160,7 +160,7 @@ TEST_F(ConsoleTest, DecisionsAddUp) {
   EXPECT_EQ(say("guide Ben along Ada share 0.25").find("ok"), 0u);
   EXPECT_EQ(say("take Ben").find("ok"), 0u);
   EXPECT_EQ(say("freeze Ben look here").find("ok"), 0u);
-  const Supervision all{.stopped = true,
+  const Restrictions all{.stopped = true,
                         .taken_by = {1},
                         .guide = {1},
                         .guide_share = 250,
@@ -177,7 +177,7 @@ TEST_F(ConsoleTest, DecisionsAddUp) {
   for (const char* line : {"limit force Ben none", "limit zone Ben none", "limit tools Ben none", "unguide Ben",
                            "give-back Ben", "free Ben"})
     EXPECT_EQ(say(line).find("ok"), 0u) << line;
-  EXPECT_EQ(desk.asked_.back().second, Supervision{});
+  EXPECT_EQ(desk.asked_.back().second, Restrictions{});
   EXPECT_EQ(say("limit force Ben 0").find("ok"), 0u);
   EXPECT_EQ(desk.asked_.back().second.force_limit, 1) << "nothing at all is not the same as no limit";
   EXPECT_EQ(say("limit force Ben 1000").find("error"), 0u);
@@ -199,13 +199,13 @@ TEST_F(ConsoleTest, ATakenToolIsInTheHandOfWhoTypes) {
 TEST_F(ConsoleTest, AllAreDecidedAboutAtOnceUnlessMoreHoldsForOne) {
   EXPECT_EQ(say("freeze all"), "ok at 11");
   ASSERT_EQ(desk.asked_.size(), 1u);
-  EXPECT_EQ(desk.asked_[0], (std::pair(AuthorId{}, Supervision{.stopped = true})));
+  EXPECT_EQ(desk.asked_[0], (std::pair(AuthorId{}, Restrictions{.stopped = true})));
   EXPECT_EQ(say("free all"), "ok at 12");
   EXPECT_EQ(say("limit force Ben 3"), "ok at 13");
   desk.asked_.clear();
   EXPECT_EQ(say("freeze all"), "ok at 17");
   ASSERT_EQ(desk.asked_.size(), 4u) << "each hand but the instructor's";
-  EXPECT_EQ(desk.asked_[0], (std::pair(AuthorId{2}, Supervision{.stopped = true, .force_limit = 300})));
+  EXPECT_EQ(desk.asked_[0], (std::pair(AuthorId{2}, Restrictions{.stopped = true, .force_limit = 300})));
 }
 
 TEST_F(ConsoleTest, UndoesWhatWasAskedFor) {

@@ -32,7 +32,7 @@ PersonSeen person(AuthorId author, const std::string& name, Role role = Role::tr
 PeopleSeen all_three() { return {{person(kAda, "Ada"), person(kBerg, "Dr. Berg", Role::instructor), person(kCy, "Cy")}, {}, {}}; }
 
 // Ada under what was decided about her.
-PeopleSeen about_ada(const Supervision& supervision) {
+PeopleSeen about_ada(const Restrictions& supervision) {
   PeopleSeen seen = all_three();
   seen.people[0].supervision = supervision;
   return seen;
@@ -49,7 +49,7 @@ TEST(PeopleView, TheHandIsToldWhatWasDecidedAboutIt) {
   view.take(all_three(), kSelf, kNow);
   EXPECT_THAT(view.notices(kNow), IsEmpty());
   EXPECT_EQ(view.holding(), "");
-  Supervision stopped;
+  Restrictions stopped;
   stopped.stopped = true;
   stopped.words = "mind the dura";
   view.take(about_ada(stopped), kSelf, kNow);
@@ -63,7 +63,7 @@ TEST(PeopleView, TheHandIsToldWhatWasDecidedAboutIt) {
 TEST(PeopleView, OthersAreToldOfWhom) {
   PeopleView view("Cy");
   view.take(all_three(), kSelf, kNow);
-  Supervision stopped;
+  Restrictions stopped;
   stopped.stopped = true;
   view.take(about_ada(stopped), kSelf, kNow);
   EXPECT_THAT(view.notices(kNow), ElementsAre("Dr. Berg has stopped Ada's hand"));
@@ -73,7 +73,7 @@ TEST(PeopleView, OthersAreToldOfWhom) {
 TEST(PeopleView, EveryKindOfDecisionHasItsSentence) {
   PeopleView view("#3");
   view.take(all_three(), kSelf, kNow);
-  const auto told = [&](const Supervision& supervision) {
+  const auto told = [&](const Restrictions& supervision) {
     view.take(about_ada(supervision), kSelf, kNow);
     const auto shown = view.notices(kNow);
     return shown.empty() ? std::string() : shown.back();

@@ -17,23 +17,23 @@ using namespace std::chrono_literals;
 using test::Time;
 using test::Trial;
 
-BonePush some_push(std::uint64_t seq) {
+MountLoad some_push(std::uint64_t seq) {
   return {seq, {{1.2345678, -40.0, 0.0004}, {-300.126, 0.0, 19999.5}}, 12.3459, 17};
 }
 
-BoneSeen some_place(std::uint64_t seq) {
+MountPose some_place(std::uint64_t seq) {
   return {seq, {{0.25, -3.0, 1e-5}, {0.1, -0.2, 0.0}}, 0.9999, 4, 0.1504};
 }
 
 TEST(BoneOnTheWire, ComesBackWithinHalfAStep) {
-  const Result<BonePush> push = wire::from_wire(wire::to_wire(some_push(3)));
+  const Result<MountLoad> push = wire::from_wire(wire::to_wire(some_push(3)));
   ASSERT_TRUE(push.has_value()) << push.error().message;
   EXPECT_EQ(push->push_seq, 3u);
   EXPECT_EQ(push->seen_seq, 17u);
   EXPECT_LE((push->load.force_n - some_push(3).load.force_n).cwiseAbs().maxCoeff(), 0.5e-3);
   EXPECT_LE((push->load.moment_nmm - some_push(3).load.moment_nmm).cwiseAbs().maxCoeff(), 0.5e-2);
 
-  const Result<BoneSeen> seen = wire::from_wire(wire::to_wire(some_place(5)));
+  const Result<MountPose> seen = wire::from_wire(wire::to_wire(some_place(5)));
   ASSERT_TRUE(seen.has_value()) << seen.error().message;
   EXPECT_EQ(seen->seen_seq, 5u);
   EXPECT_EQ(seen->push_seq, 4u);
@@ -45,8 +45,8 @@ TEST(BoneOnTheWire, ComesBackWithinHalfAStep) {
 // What rounding adds would be energy that nobody put in.
 TEST(BoneOnTheWire, RoundsEnergyDown) {
   for (const double mj : {0.0, 0.0004, 0.0019999, 12.3459, 1e6 + 0.00099}) {
-    BonePush push = some_push(1);
-    BoneSeen seen = some_place(1);
+    MountLoad push = some_push(1);
+    MountPose seen = some_place(1);
     push.energy_mj = seen.energy_mj = mj;
     for (const double came : {wire::from_wire(wire::to_wire(push))->energy_mj, wire::from_wire(wire::to_wire(seen))->energy_mj}) {
       EXPECT_LE(came, mj);
@@ -54,7 +54,7 @@ TEST(BoneOnTheWire, RoundsEnergyDown) {
     }
   }
   for (const double wrong : {-5.0, std::numeric_limits<double>::quiet_NaN()}) {
-    BonePush push = some_push(1);
+    MountLoad push = some_push(1);
     push.energy_mj = push.load.force_n.x() = wrong;
     EXPECT_EQ(wire::from_wire(wire::to_wire(push))->energy_mj, 0.0);
   }
@@ -62,21 +62,21 @@ TEST(BoneOnTheWire, RoundsEnergyDown) {
 
 // Every field, what no correct peer sends in it, and its name in the error.
 TEST(BoneOnTheWire, RefusesWhatNoPeerSends) {
-  const std::map<std::string, std::function<void(v1::BonePush&)>> pushes{
+  const std::map<std::string, std::function<void(v1::MountLoad&)>> pushes{
       {"push_seq", [](auto& m) { m.set_push_seq(0); }},
       {"force", [](auto& m) { m.mutable_force()->RemoveLast(); }},
       {"moment", [](auto& m) { m.add_moment(1); }},
       {"energy", [](auto& m) { m.set_energy(-1); }},
   };
   for (const auto& [field, spoil] : pushes) {
-    v1::BonePush message = wire::to_wire(some_push(1));
+    v1::MountLoad message = wire::to_wire(some_push(1));
     spoil(message);
-    const Result<BonePush> read = wire::from_wire(message);
+    const Result<MountLoad> read = wire::from_wire(message);
     ASSERT_FALSE(read.has_value()) << field;
     EXPECT_EQ(read.error().code, ErrorCode::invalid_input);
     EXPECT_NE(read.error().message.find("push." + field), std::string::npos) << read.error().message;
   }
-  const std::map<std::string, std::function<void(v1::BoneSeen&)>> places{
+  const std::map<std::string, std::function<void(v1::MountPose&)>> places{
       {"seen_seq", [](auto& m) { m.set_seen_seq(0); }},
       {"place", [](auto& m) { m.clear_place(); }},
       {"turn", [](auto& m) { m.set_turn(1, 4 << 20); }},
@@ -84,9 +84,9 @@ TEST(BoneOnTheWire, RefusesWhatNoPeerSends) {
       {"lag_ms", [](auto& m) { m.set_lag_ms(60'001); }},
   };
   for (const auto& [field, spoil] : places) {
-    v1::BoneSeen message = wire::to_wire(some_place(1));
+    v1::MountPose message = wire::to_wire(some_place(1));
     spoil(message);
-    const Result<BoneSeen> read = wire::from_wire(message);
+    const Result<MountPose> read = wire::from_wire(message);
     ASSERT_FALSE(read.has_value()) << field;
     EXPECT_NE(read.error().message.find("bone." + field), std::string::npos) << read.error().message;
   }

@@ -74,45 +74,45 @@ Digest all_of(std::uint8_t byte) {
   return out;
 }
 
-Supervision sample_supervision() {
+Restrictions sample_supervision() {
   return {.stopped = true, .taken_by = {3}, .guide = {4}, .guide_share = 250, .force_limit = 1234,
           .zone = ZoneLimit{{-5, 6, -7}, 8}, .tools = {all_of(1), all_of(2)}, .words = "f\xc3\xbcnf"};
 }
 
 TEST(Wire, ASupervisionComesBackWhole) {
-  for (const Supervision& one : {Supervision{}, sample_supervision()}) {
-    v1::Supervision parsed;
+  for (const Restrictions& one : {Restrictions{}, sample_supervision()}) {
+    v1::Restrictions parsed;
     ASSERT_TRUE(parsed.ParseFromString(wire::to_wire(one).SerializeAsString()));
     const auto back = wire::from_wire(parsed);
     ASSERT_TRUE(back) << back.error().message;
     EXPECT_EQ(*back, one);
   }
   // Tools in any order, however often.
-  v1::Supervision message;
+  v1::Restrictions message;
   for (const std::uint8_t tool : {2, 1, 2}) message.add_tools(wire::to_wire(all_of(tool)));
   EXPECT_EQ(wire::from_wire(message).value().tools, (std::vector{all_of(1), all_of(2)}));
 }
 
 TEST(Wire, RefusesBadSupervisionsByTheNameOfTheField) {
-  const auto refused = [](const std::function<void(v1::Supervision&)>& change, const std::string& field) {
-    v1::Supervision message = wire::to_wire(sample_supervision());
+  const auto refused = [](const std::function<void(v1::Restrictions&)>& change, const std::string& field) {
+    v1::Restrictions message = wire::to_wire(sample_supervision());
     change(message);
     const auto back = wire::from_wire(message);
     ASSERT_FALSE(back) << field;
     EXPECT_EQ(back.error().code, ErrorCode::invalid_input);
     EXPECT_NE(back.error().message.find(field), std::string::npos) << back.error().message;
   };
-  refused([](v1::Supervision& s) { s.set_guide_share(1001); }, "guide_share");
-  refused([](v1::Supervision& s) { s.set_guide_share(~0u); }, "guide_share");
-  refused([](v1::Supervision& s) { s.set_force_limit(10'001); }, "force_limit");
-  refused([](v1::Supervision& s) { s.set_force_limit(~0u); }, "force_limit");
-  refused([](v1::Supervision& s) { s.mutable_zone()->add_centre(1); }, "zone.centre");
-  refused([](v1::Supervision& s) { s.mutable_zone()->clear_centre(); }, "zone.centre");
-  refused([](v1::Supervision& s) { s.mutable_zone()->clear_radius(); }, "zone.radius");
-  refused([](v1::Supervision& s) { s.mutable_zone()->set_radius(-1); }, "zone.radius");
-  refused([](v1::Supervision& s) { s.add_tools("short"); }, "tools");
-  refused([](v1::Supervision& s) { for (std::uint8_t n = 3; n < 90; ++n) s.add_tools(wire::to_wire(all_of(n))); }, "tools");
-  refused([](v1::Supervision& s) { s.set_words(std::string(257, 'x')); }, "words");
+  refused([](v1::Restrictions& s) { s.set_guide_share(1001); }, "guide_share");
+  refused([](v1::Restrictions& s) { s.set_guide_share(~0u); }, "guide_share");
+  refused([](v1::Restrictions& s) { s.set_force_limit(10'001); }, "force_limit");
+  refused([](v1::Restrictions& s) { s.set_force_limit(~0u); }, "force_limit");
+  refused([](v1::Restrictions& s) { s.mutable_zone()->add_centre(1); }, "zone.centre");
+  refused([](v1::Restrictions& s) { s.mutable_zone()->clear_centre(); }, "zone.centre");
+  refused([](v1::Restrictions& s) { s.mutable_zone()->clear_radius(); }, "zone.radius");
+  refused([](v1::Restrictions& s) { s.mutable_zone()->set_radius(-1); }, "zone.radius");
+  refused([](v1::Restrictions& s) { s.add_tools("short"); }, "tools");
+  refused([](v1::Restrictions& s) { for (std::uint8_t n = 3; n < 90; ++n) s.add_tools(wire::to_wire(all_of(n))); }, "tools");
+  refused([](v1::Restrictions& s) { s.set_words(std::string(257, 'x')); }, "words");
 }
 
 Annotation sample_line() {

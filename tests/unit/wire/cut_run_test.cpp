@@ -80,8 +80,8 @@ std::vector<Cut> any_cuts(Random& random, std::size_t count, bool wild, AuthorId
   return cuts;
 }
 
-Supervision any_supervision(Random& random, std::size_t most_tools) {
-  Supervision one{.stopped = random.unit() < 0.5, .taken_by = {random.index(3)}, .guide = {any(random)},
+Restrictions any_supervision(Random& random, std::size_t most_tools) {
+  Restrictions one{.stopped = random.unit() < 0.5, .taken_by = {random.index(3)}, .guide = {any(random)},
                   .guide_share = static_cast<int>(random.index(kWholeShare + 1)),
                   .force_limit = static_cast<int>(random.index(kMostForceLimit + 1))};
   if (random.unit() < 0.5) one.zone = ZoneLimit{any_pose(random).position, 1 + static_cast<std::int32_t>(random.index(1 << 20))};

@@ -498,7 +498,7 @@ TEST(LinkEnds, AnInstructorsWordFreezesAndEndsTheLease) {
   EXPECT_EQ(pair.client.lease_epoch(), 8u);
   const auto first = pair.client.take_row();
   ASSERT_TRUE(first);
-  EXPECT_EQ(first->row.supervision, (Supervision{.taken_by = {3}}));
+  EXPECT_EQ(first->row.supervision, (Restrictions{.taken_by = {3}}));
   EXPECT_EQ(first->row.by, (Decider{AuthorId{3}, "Dr. Weber"}));
   EXPECT_FALSE(pair.client.take_row());
   EXPECT_TRUE(pair.client.offer({2, word}));

@@ -1,7 +1,7 @@
 // What a log says of a decision about the hand, and of who made it.
 #include <gtest/gtest.h>
 
-#include "haptic_client/control/oversight.hpp"
+#include "haptic_client/control/supervision_guard.hpp"
 
 namespace osteon::haptic {
 namespace {

@@ -1,0 +1,65 @@
+// Who holds the tool: the simulated hand with a plan, a recording of one, or a person at a device, as the command line says.
+#pragma once
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/tools/tool_box.hpp"
+#include "haptic_client/control/free_hand.hpp"
+#include "haptic_client/device/connection.hpp"
+#include "haptic_client/device/device_list.hpp"
+#include "haptic_client/device/recorded_device.hpp"
+
+namespace osteon::haptic {
+
+struct ToolOperatorOptions {
+  std::string device = "simulated";
+  std::filesystem::path plan;     // a simulated hand's, or a recording's
+  std::string tool;               // a person's, or of a person's recording
+  // A person's; where nothing was said: from the front, over the bone's middle, the tool's own speed and law, sharp.
+  std::optional<std::string> view, at;  // read_view(), read_point()
+  std::optional<double> spindle_rpm;
+  std::optional<std::string> law;
+  std::optional<double> wear;
+  DeviceOptions devices;
+};
+
+class ToolOperator {
+ public:
+  // Checks what can be checked without a room, opens the person's devices and keeps them connected from then on. Errors
+  // are sentences with the remedy.
+  [[nodiscard]] static Result<ToolOperator> make(const ToolOperatorOptions& options, DeviceNotice notice);
+
+  // The session on a bone, with tools of `tools`, all that the room has; `force_scale` 0: from the device, or as it was
+  // recorded. Lives no longer than this choice. Errors: there is no such tool, its law does not suit it, plan or tool does
+  // not suit the bone, the recording is of another bone, tool or plan.
+  [[nodiscard]] Result<std::unique_ptr<Session>> on(const Case& bone, const ToolBox& tools, double force_scale);
+
+  // What moves the handle, where that is a recording; else none.
+  [[nodiscard]] const RecordedDevice* recorded() const { return recorded_.get(); }
+  [[nodiscard]] std::string_view device_name() const;
+  // How often devices were lost.
+  [[nodiscard]] int losses() const;
+  // Force and devices end.
+  void disconnect() noexcept { connections_.clear(); }
+
+ private:
+  ToolOperator() = default;
+  // Checks what a hand without a plan was told.
+  Result<void> take_tool();
+  // What the plan does, or the person's hand.
+  Result<ReadyPlan> ready_on(const Case& bone, const ToolFinder& find) const;
+  // Opens a person's devices.
+  Result<void> connect(const DeviceNotice& notice);
+
+  ToolOperatorOptions options_;
+  std::vector<PlanStep> plan_;
+  SimulatedDeviceParams simulated_;
+  FreeHandOptions free_;
+  std::unique_ptr<RecordedDevice> recorded_;
+  std::unique_ptr<CombinedDevice> person_;
+  std::vector<std::unique_ptr<DeviceConnection>> connections_;  // end before the devices
+};
+
+}  // namespace osteon::haptic

@@ -1,0 +1,93 @@
+// The people of a room as somebody who oversees them sees them, and what they may ask of the room: plain data, no gRPC.
+#pragma once
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/access/role.hpp"
+#include "common/core/digest.hpp"
+#include "common/core/id.hpp"
+#include "common/core/result.hpp"
+#include "common/field/restrictions.hpp"
+#include "common/surface/view_frustum.hpp"
+#include "common/tools/annotation.hpp"
+
+namespace osteon {
+
+struct PersonSeen {
+  AuthorId author;
+  std::string name;                // empty: nobody's
+  Role role = Role::none;
+  bool here = false, hand = false;
+  Restrictions supervision;         // what holds for the hand
+  RoomSeq decided, heard;          // the place of what was decided last, null for nothing; the newest that their client has
+  AuthorId decided_by;             // who decided it; null: nobody knows
+  std::optional<ViewFrustum> look;        // from where they look, where somebody knows
+  std::uint32_t cuts = 0;          // that were taken
+  [[nodiscard]] bool pending() const { return decided && heard < decided; }
+};
+
+struct WordsSeen {
+  RoomSeq place;
+  AuthorId from, to;               // null: to all
+  std::string words;
+};
+
+struct RoomSeen {
+  std::string name;
+  RoomSeq room_seq;
+  Digest field_hash{};
+  double removed_mm3 = 0;
+  std::uint64_t rejected = 0;
+  std::vector<BodyId> bodies;
+  std::vector<std::pair<RoomSeq, std::string>> marks;
+};
+
+// One of them.
+struct WhatToUndo {
+  std::uint32_t count = 0;
+  AuthorId of{};                   // with count; null: of all
+  RoomSeq to{};
+  std::chrono::milliseconds newest{};
+  bool all = false;
+};
+
+struct WhatToDemonstrate {
+  std::string room;                // empty: this one
+  AuthorId of{};                   // null: everyone's
+  RoomSeq from{}, to{};            // null: its beginning, its end
+  double speed = 1.0;
+};
+
+// What is asked waits for the answer. Errors: invalid_input, not_found, denied, unavailable.
+class SupervisionClient {
+ public:
+  virtual ~SupervisionClient() = default;
+  [[nodiscard]] virtual AuthorId self() const = 0;
+  // As far as the room has told.
+  [[nodiscard]] virtual std::vector<PersonSeen> people() const = 0;
+  [[nodiscard]] virtual std::vector<Annotation> annotations() const = 0;
+  [[nodiscard]] virtual std::vector<WordsSeen> words() const = 0;
+  // Until `done`, which is asked after every news. False: the patience was over, or the program is to stop.
+  [[nodiscard]] virtual bool wait(const std::function<bool()>& done, std::chrono::milliseconds patience) const = 0;
+
+  // Place of the event, of the last where there are several. `subject` null: every hand that can be overseen.
+  [[nodiscard]] virtual Result<RoomSeq> supervise(AuthorId subject, const Restrictions& supervision) = 0;
+  [[nodiscard]] virtual Result<std::pair<RoomSeq, std::size_t>> undo(const WhatToUndo& what) = 0;  // and how many events
+  [[nodiscard]] virtual Result<std::pair<RoomSeq, std::size_t>> redo(std::uint32_t count) = 0;
+  [[nodiscard]] virtual Result<RoomSeq> mark(const std::string& label) = 0;
+  [[nodiscard]] virtual Result<std::uint32_t> draw(const Annotation& drawn) = 0;         // which it is
+  [[nodiscard]] virtual Result<void> wipe_off(std::uint32_t annotation) = 0;             // 0: all own ones
+  [[nodiscard]] virtual Result<RoomSeq> say(AuthorId to, const std::string& words) = 0;  // null: to all
+  // The demonstrator, and how many cuts there are to see.
+  [[nodiscard]] virtual Result<std::pair<AuthorId, std::size_t>> demonstrate(const WhatToDemonstrate& what) = 0;
+  [[nodiscard]] virtual Result<void> end_demonstration(AuthorId demonstrator) = 0;
+  [[nodiscard]] virtual Result<std::vector<std::pair<std::string, Digest>>> tools() = 0;  // by name
+  [[nodiscard]] virtual Result<RoomSeen> status() = 0;
+};
+
+}  // namespace osteon
