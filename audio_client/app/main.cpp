@@ -217,7 +217,7 @@ int main(int argc, char** argv) {
   app.add_option("--wav", options.wav_file, "Record what is heard: 48 kHz, 16 bit, mono");
   app.add_option("--state-log", options.state_log_file, "CSV: when each cutting state came and when it sounded");
   app.add_option("--summary", options.summary_file, "JSON written at the end: frames, latencies, callback work, peak");
-  app.add_option("--patience", options.patience_s, "Seconds to wait for the server")
+  app.add_option("--timeout", options.patience_s, "Seconds to wait for the server")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();
   if (const auto code = parse_arguments(app, argc, argv)) return *code;

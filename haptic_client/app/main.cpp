@@ -234,7 +234,7 @@ Result<void> run(Options& options, const StopSignal& stop) {
   if (options.force_scale && !(*options.force_scale > 0.0 && *options.force_scale <= 1.0))
     return failure(ErrorCode::invalid_input, "--scale must be a number above 0 and at most 1");
   if (!(options.patience_s >= 0.0 && options.patience_s <= 3600.0))
-    return failure(ErrorCode::invalid_input, "--patience must be from 0 to 3600 seconds");
+    return failure(ErrorCode::invalid_input, "--timeout must be from 0 to 3600 seconds");
   const Result<wire::ClientCredentials> credentials = wire::client_credentials(options.credentials);
   if (!credentials) return tl::unexpected(credentials.error());
   options.room.credentials = *credentials;
@@ -327,10 +327,10 @@ int main(int argc, char** argv) {
                  "file that is there is left alone");
   app.add_option("--cut-log", options.cut_log, "CSV with a row for each cut");
   app.add_option("--summary", options.summary, "JSON written at the end: steps, forces, loop times, field hash");
-  app.add_option("--fast-path", options.room.fast_path,
+  app.add_option("--udp", options.room.fast_path,
                  "HOST:PORT for the sealed datagrams beside the stream, or off; by default the port that the server says");
   app.add_option("--cache", options.room.cache, "Folder where fetched cases are kept")->capture_default_str();
-  app.add_option("--patience", options.patience_s, "Seconds to wait for the server")->capture_default_str();
+  app.add_option("--timeout", options.patience_s, "Seconds to wait for the server")->capture_default_str();
   app.add_flag("--status", options.client.status, "A short line on standard output each second");
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
 

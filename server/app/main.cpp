@@ -442,7 +442,7 @@ int main(int argc, char** argv) {
                  "After so many days a room's journal forgets who somebody was, when it is opened and once a day; what they did stays")
       ->check(CLI::Range(1, 36500));
   const std::map<std::string, Detail> details{{"auto", Detail::automatic}, {"full", Detail::full}, {"near", Detail::near}};
-  app.add_flag("--mount", options.mount,
+  app.add_flag("--compliant-mount", options.mount,
                "The bone stands on a compliant mount, so that whoever pushes it is felt by all who have a tool at it");
   app.add_option("--detail", options.detail,
                  "full: viewers are sent the whole bone at its own pitch; near: that only where they look and where tools "

@@ -40,7 +40,7 @@ class DoorsOfPrograms : public ::testing::Test {
   }
   // An audio client that is turned away: one sentence that says why, and an exit code.
   std::string turned_away(const std::vector<std::string>& by, ProcessOptions options = {}) {
-    const RunResult result = run(program("osteon-audio"), plus({"--server", stage_.address(), "--output", "none", "--patience", "1"}, by), 30s, std::move(options));
+    const RunResult result = run(program("osteon-audio"), plus({"--server", stage_.address(), "--output", "none", "--timeout", "1"}, by), 30s, std::move(options));
     EXPECT_NE(result.exit_code, 0) << result.out << result.err;
     EXPECT_FALSE(result.timed_out);
     const std::size_t last = result.err.rfind("osteon-audio: ");

@@ -82,7 +82,7 @@ class Confirmed : public ::testing::Test {
 TEST_F(Confirmed, TheCutLogHasEachCutsOwnPlace) {
   ImpairProcess line({"--tcp", stage_.address()});
   ASSERT_FALSE(line.tcp().empty()) << line.process().err();
-  Process hand = drill("hand", line.tcp(), {"--fast-path", "off", "--patience", "30"});
+  Process hand = drill("hand", line.tcp(), {"--udp", "off", "--timeout", "30"});
   ASSERT_TRUE(events_more(30));
   ASSERT_EQ(line.command("delay 100"), "ok");
   for (int i = 0; i < 2; ++i) {

@@ -190,7 +190,7 @@ TEST_F(PhantomInRoom, AHandsRecordingIsPlayedWithItsForceScale) {
 
 TEST_F(PhantomInRoom, WhatIsWrongIsSaidBeforeAServerIsLookedFor) {
   const auto said = [&](std::vector<std::string> more) {
-    std::vector<std::string> all{"--server", "127.0.0.1:1", "--patience", "0"};
+    std::vector<std::string> all{"--server", "127.0.0.1:1", "--timeout", "0"};
     all.insert(all.end(), more.begin(), more.end());
     const RunResult result = run(program("osteon-haptic"), all, 20s);
     EXPECT_EQ(result.exit_code, 1);

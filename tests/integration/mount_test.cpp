@@ -24,14 +24,14 @@ Process start_hand(const Stage& stage, const std::string& name, const json& step
 }
 
 TEST(Mount, TwoHandsPressOneBone) {
-  Stage stage(40.0, {"--mount"});
+  Stage stage(40.0, {"--compliant-mount"});
   ImpairProcess line({"--tcp", stage.address(), "--udp", "127.0.0.1:" + udp_port_of(stage.server())});
   ASSERT_FALSE(line.tcp().empty()) << line.process().err();
   ASSERT_EQ(line.command("delay 150 10"), "ok");
-  Process far = start_hand(stage, "far", drill_at(-8, 0, "expert"), line.tcp(), {"--fast-path", line.udp(), "--patience", "30"});
+  Process far = start_hand(stage, "far", drill_at(-8, 0, "expert"), line.tcp(), {"--udp", line.udp(), "--timeout", "30"});
   Process near = start_hand(stage, "near", drill_at(8, 0, "expert"), stage.address(), {});
   // Somebody who touches nothing, and whose datagrams do not get through.
-  Process idle = start_hand(stage, "idle", {{"action", "wait"}, {"seconds", 9.0}}, stage.address(), {"--fast-path", "off"});
+  Process idle = start_hand(stage, "idle", {{"action", "wait"}, {"seconds", 9.0}}, stage.address(), {"--udp", "off"});
   ASSERT_EQ(near.wait(120s), 0) << near.err();
   ASSERT_EQ(far.wait(120s), 0) << far.err();
   ASSERT_EQ(idle.wait(120s), 0) << idle.err();

@@ -279,7 +279,7 @@ TEST(Together, TheConsoleSaysWhatItDoesNotUnderstand) {
   EXPECT_EQ(console.process().wait(10s), 0);
   // Of a server that is not there.
   const RunResult nobody =
-      run(program("osteon-viewer"), {"--console", "--connect", "127.0.0.1:1", "--plain", "--patience", "0.2"}, 30s);
+      run(program("osteon-viewer"), {"--console", "--connect", "127.0.0.1:1", "--plain", "--timeout", "0.2"}, 30s);
   EXPECT_NE(nobody.exit_code, 0);
   EXPECT_NE(nobody.err.find("127.0.0.1:1"), std::string::npos) << nobody.err;
 }

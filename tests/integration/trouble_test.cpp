@@ -70,13 +70,13 @@ TEST(Trouble, WithoutAServerEveryClientSaysSo) {
   const TempDir temp;
   const std::string nobody = deserted_address();
   write_plan(temp / "plan.json");
-  expect_one_sentence(run(program("osteon-haptic"), {"--server", nobody, "--plan", temp / "plan.json", "--patience", "1"}), "osteon-haptic",
+  expect_one_sentence(run(program("osteon-haptic"), {"--server", nobody, "--plan", temp / "plan.json", "--timeout", "1"}), "osteon-haptic",
                       {nobody, "osteon-server"});
-  expect_one_sentence(run(program("osteon-audio"), {"--server", nobody, "--output", "none", "--patience", "1"}), "osteon-audio",
+  expect_one_sentence(run(program("osteon-audio"), {"--server", nobody, "--output", "none", "--timeout", "1"}), "osteon-audio",
                       {nobody, "osteon-server"});
   const auto screen = Xvfb::start();
   ASSERT_TRUE(screen);
-  expect_one_sentence(run(program("osteon-viewer"), {"--server", nobody, "--patience", "1"}, 60s, screen->options()), "osteon-viewer",
+  expect_one_sentence(run(program("osteon-viewer"), {"--server", nobody, "--timeout", "1"}, 60s, screen->options()), "osteon-viewer",
                       {nobody, "osteon-server"});
 }
 
@@ -119,7 +119,7 @@ TEST(Trouble, AHapticClientNamesWhatIsWrongWithItsPlan) {
   const TempDir temp;
   const auto with_plan = [&](const std::string& text) {
     std::ofstream(temp / "plan.json") << text;
-    return run(program("osteon-haptic"), {"--server", deserted_address(), "--plan", temp / "plan.json", "--patience", "1"});
+    return run(program("osteon-haptic"), {"--server", deserted_address(), "--plan", temp / "plan.json", "--timeout", "1"});
   };
   expect_one_sentence(run(program("osteon-haptic"), {"--server", deserted_address(), "--plan", temp / "missing.json"}), "osteon-haptic", {"missing.json"});
   expect_one_sentence(with_plan("{"), "osteon-haptic", {"plan.json"});
@@ -151,7 +151,7 @@ TEST(Trouble, WhatAPlanSaysItselfIsRefusedBesideIt) {
   const TempDir temp;
   write_plan(temp / "plan.json");
   const auto beside = [&](const std::string& option, const std::string& value) {
-    return run(program("osteon-haptic"), {"--server", deserted_address(), "--patience", "0", "--plan", temp / "plan.json", option, value});
+    return run(program("osteon-haptic"), {"--server", deserted_address(), "--timeout", "0", "--plan", temp / "plan.json", option, value});
   };
   for (const auto& [option, value] : {std::pair<std::string, std::string>{"--wear", "1"}, {"--view", "front"}, {"--at", "0,0,0"}, {"--rpm", "0"}, {"--law", "chi"}})
     expect_one_sentence(beside(option, value), "osteon-haptic", {option + " is for a hand without a plan"});

@@ -224,7 +224,7 @@ int main(int argc, char** argv) {
   app.footer(std::string(kScriptHelp) + "\n\n" + Console::help());
   app.add_option("--server,--connect", arguments.server, "Address of the server, HOST:PORT")->required();
   app.add_option("--name", arguments.name, "Who you are, shown to others");
-  app.add_option("--of", arguments.hand, "Whose hand works before this window, NAME or #NUMBER: shows what is decided about it");
+  app.add_option("--supervise-for", arguments.hand, "Whose hand works before this window, NAME or #NUMBER: shows what is decided about it");
   app.add_flag("--console", arguments.console, "No window: oversee the room by commands on standard input");
   app.add_option("--room", arguments.room, "Name of the room; not needed where the server has one");
   wire::add_credential_options(app, arguments.credentials);
@@ -236,7 +236,7 @@ int main(int argc, char** argv) {
   app.add_flag("--spacemouse", arguments.space_mouse, "A SpaceMouse moves the camera, whenever one is plugged in");
   app.add_option("--frame-log", arguments.frame_log, "CSV: when each event's surface came in and was drawn");
   app.add_option("--summary", arguments.summary, "JSON written at the end: blocks, triangles, hash, times");
-  app.add_option("--patience", arguments.patience_s, "Seconds to wait for the server")
+  app.add_option("--timeout", arguments.patience_s, "Seconds to wait for the server")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 3600.0));
   if (const auto code = parse_arguments(app, argc, argv)) return *code;

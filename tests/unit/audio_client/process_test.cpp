@@ -200,7 +200,7 @@ TEST(AudioProgram, WrongInputsAreOneSentenceEach) {
     std::string says;
   };
   const std::vector<Case> cases = {
-      {{"--server", "127.0.0.1:1", "--output", "none", "--patience", "0.2"}, "127.0.0.1:1"},
+      {{"--server", "127.0.0.1:1", "--output", "none", "--timeout", "0.2"}, "127.0.0.1:1"},
       {{"--server", "nowhere", "--output", "none"}, "nowhere"},
       {{"--server", "127.0.0.1:1", "--output", "tape"}, "--output none"},
       {{"--server", "127.0.0.1:1", "--output", "none", "--wav", "/nowhere/a.wav"}, "/nowhere/a.wav"},
@@ -225,7 +225,7 @@ TEST(AudioProgram, WithoutAServerAnEarlierRecordingStays) {
   ASSERT_TRUE(write_file(temp / "a.wav", "earlier sound"));
   ASSERT_TRUE(write_file(temp / "a.csv", "earlier rows"));
   const test::RunResult result =
-      test::run(test::program("osteon-audio"), {"--server", "127.0.0.1:1", "--output", "none", "--patience", "0.2", "--wav",
+      test::run(test::program("osteon-audio"), {"--server", "127.0.0.1:1", "--output", "none", "--timeout", "0.2", "--wav",
                                                 (temp / "a.wav").string(), "--state-log", (temp / "a.csv").string()});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(*read_file(temp / "a.wav"), "earlier sound");
